@@ -25,7 +25,7 @@ from scipy.signal import welch
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.metrics import mape
-from skthermo.plotting import HistoryDisplay
+from skthermo.plotting import PredictionDisplay
 from skthermo.preprocessing import ModeTracker
 from skthermo.surrogate import DataInformedFEM
 
@@ -168,15 +168,15 @@ def errors(year, modes, seed):
         fem = DataInformedFEM(truss, random_state=seed).fit(year.temperatures.loc[days], frequencies)
         predictions[name] = pd.DataFrame(fem.predict(later.temperatures), later.temperatures.index, MODES)
     table = {name: mape(later.clean_frequencies, each) for name, each in predictions.items()}
-    return pd.DataFrame(table, index=MODES), {"true": later.clean_frequencies, "simulated": predictions["identified"]}
+    return pd.DataFrame(table, index=MODES), later.clean_frequencies, predictions["identified"]
 
 
-table, shown = errors(year, modes, 0)
+table, *shown = errors(year, modes, 0)
 table["difference"] = table["identified"] - table["true"]
 table.loc["mean"] = table.mean()
 print("MAPE in another year, %, trained with frequencies that are")
 print(table.round(3))
-HistoryDisplay.from_predictions(shown, kind="lines", n_columns=2)
+PredictionDisplay.from_predictions(*shown, labels=("true", "simulated"), kind="lines", n_columns=2)
 
 # %%
 # Both chains have the same error, about 0.3 %. It is not the error of identification: temperature acts on zones of the
@@ -187,7 +187,7 @@ HistoryDisplay.from_predictions(shown, kind="lines", n_columns=2)
 rows = [table.loc["mean"]]
 for seed in range(1, options.seeds):
     other = make_truss_campaign(random_state=seed)
-    table, _ = errors(other, identified_modes(other, seed), seed)
+    table, *_ = errors(other, identified_modes(other, seed), seed)
     rows.append(table.assign(difference=table["identified"] - table["true"]).mean())
 print(pd.DataFrame(rows, pd.RangeIndex(options.seeds, name="seed")).round(4))
 

@@ -14,12 +14,14 @@ Run it with ``python examples/plot_detectors.py``. It needs :download:`detector_
 
 import warnings
 
+import matplotlib.pyplot as plt
 from detector_recipes import field_detectors
 from page_recipes import command_line, save_figures
+from sklearn.metrics import RocCurveDisplay
 
 from skthermo.datasets import make_truss, make_truss_campaign, steel_modulus
 from skthermo.fem import add_noise
-from skthermo.plotting import AgreementDisplay, RankingDisplay, ROCDisplay
+from skthermo.plotting import DetectorsDisplay
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM
 
@@ -63,13 +65,16 @@ print((100 * ranking[["false_alarms", "pod", "pod_equal", "behind"]]).round(1).t
 # %%
 # The order by simulated records. Detectors whose difference from the best may be chance are not clearly behind it.
 
-RankingDisplay.from_estimator(study, max_false_alarms=0.03)
+DetectorsDisplay.from_estimator(study, max_false_alarms=0.03)
 
 # %%
 # Damage found over false alarms, for all thresholds.
 
 few = [ranking.index[0], "raw, 20 neighbours", "raw, isolation forest", "raw, less 2 components", "raw, cointegration"]
-ROCDisplay.from_estimator(study, detectors=few)
+with plt.style.context("tableau-colorblind10"):
+    ax = plt.figure(figsize=(6, 5), layout="constrained").add_subplot()
+for name in few:
+    RocCurveDisplay.from_predictions(*study.labelled_scores(name), name=name, ax=ax)
 
 # %%
 # Would truth have chosen the same?
@@ -79,7 +84,7 @@ ROCDisplay.from_estimator(study, detectors=few)
 # learned that very baseline. Leave room below the limit.
 
 results = study.results_
-AgreementDisplay.from_predictions(results[results["scenario"].isin(["healthy", "bottom 10 %", "diagonal 5 %"])])
+DetectorsDisplay.from_predictions(results[results["scenario"].isin(["healthy", "bottom 10 %", "diagonal 5 %"])])
 true = study.ranking(max_false_alarms=0.03, source="reference")
 best = true.loc[ranking.index[0], "pod"]
 print(f"first by simulation: {ranking.index[0]}, which finds {best:.1%} of the true damaged records")

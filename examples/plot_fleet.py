@@ -22,7 +22,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_fleet
 from skthermo.fleet import FleetPrior, fit_fleet
 from skthermo.metrics import mape
-from skthermo.plotting import FleetPriorDisplay, HistoryDisplay
+from skthermo.plotting import FleetPriorDisplay, PredictionDisplay
 from skthermo.preprocessing import SensorMeans
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
@@ -109,6 +109,6 @@ for ax, part in zip(axes, ("deck", "bearings"), strict=True):
 
 later = campaign[girder].records(365, "2026-01-01", gaps=0, outliers=0)
 predictions = {label: chain.predict(later.temperatures)[["f1"]] for label, chain in chains[girder].items()}
-HistoryDisplay.from_predictions({"measured": later.frequencies[["f1"]]} | predictions)
+PredictionDisplay.from_predictions(later.frequencies[["f1"]], predictions)
 
 save_figures(options.figures)

@@ -20,7 +20,6 @@ from sklearn.base import clone
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import linearise
-from skthermo.plotting import HistoryDisplay
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 options = command_line().parse_args()
@@ -82,8 +81,7 @@ print(f"Misfit of the frequencies, mean of {len(before)} records: {before.mean()
 print(f"After one step: {after.mean():.3f} %; after another: {again.mean():.3f} %")
 
 histories = {"inverse surrogate": before, "after one Gauss-Newton step": after}
-display = HistoryDisplay.from_predictions(histories, unit="%", kind="points", titles=["misfit of six frequencies"])
-display.axes_[0].set_ylim(bottom=0)
+pd.DataFrame(histories).plot(style=".", xlabel="", ylabel="misfit of six frequencies (%)", ylim=(0, None))
 
 # %%
 # A second step changes little: the misfit that is left is noise, and the effect of temperature on zones that cut across

@@ -32,7 +32,6 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign, steel_modulus
 from skthermo.fem import add_noise, sample
 from skthermo.metrics import frequency_scorer
-from skthermo.plotting import HistoryDisplay
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
 
@@ -106,7 +105,7 @@ def monitoring(n_days=60, noise=0.005, seed=0):
 
 T, F = monitoring(60 if options.full else 30)
 ten_days = pd.DataFrame({"air (°C)": T["T1"], "$f_1$ (Hz)": F["f1"]})[:240]
-HistoryDisplay.from_predictions(ten_days, unit="", kind="points")
+ten_days.plot(subplots=True, style=".", xlabel="", figsize=(9, 5))
 
 # %%
 # The chain as one estimator

@@ -50,7 +50,7 @@ from kw51_tables_recipes import (
 from page_recipes import command_line, save_figures
 
 from skthermo.fem import sample
-from skthermo.plotting import DamageIndexDisplay, FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.updating import identifiability
 
 parser = command_line()
@@ -79,7 +79,8 @@ both = {
     for name, part in (("measured", records), ("imputed", filled))
 }
 both["imputed"] = both["imputed"].where(both["measured"].isna())
-HistoryDisplay.from_predictions(both, unit="", kind="points")
+labels = ("measured", "imputed")
+PredictionDisplay.from_predictions(both["measured"], both["imputed"], labels=labels, unit="", kind="points")
 
 # %%
 # The paper fills gaps from ten similar records (orange). The other way is to fill none: a record is inverted from the
@@ -173,7 +174,7 @@ PredictionDisplay.from_predictions(best.test(records.frequencies), best.test(pre
 # The records that taught it, over the temperature of the steel, and what the chain makes of them:
 
 steel = records.temperatures["tBD31A"]
-FrequencyTemperatureDisplay.from_predictions(steel[:TRAINED], records.frequencies[:TRAINED], predicted[:TRAINED])
+PredictionDisplay.from_predictions(records.frequencies[:TRAINED], predicted[:TRAINED], temperature=steel[:TRAINED])
 
 # %%
 # Table 8, errors of the frequencies in percent. Beside the truth, which a synthetic campaign knows, the errors are far

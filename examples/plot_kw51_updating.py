@@ -21,7 +21,6 @@ from kw51_appendix_recipes import DESIGN, MEASURED, MODES, NOISE, PAPER_A3, PAPE
 from page_recipes import command_line, save_figures
 
 from skthermo.datasets import make_kw51
-from skthermo.plotting import SensitivityDisplay
 from skthermo.updating import identifiability, sensitivity
 
 parser = command_line()
@@ -43,15 +42,15 @@ for method in ("exact", "central"):
 print(f"largest difference: {(found['exact'] - found['central']).abs().max().max():.1g}")
 
 # %%
-# Table A.3, the paper's beside ours, as maps. In both models the arch and the pipes carry the modes of the arch, whose
+# Table A.3, the paper's beside ours. In both models the arch and the pipes carry the modes of the arch, whose
 # mass lowers them, and the third mode depends on the bottom of the deck alone.
 
 paper = pd.DataFrame(PAPER_A3, index=MODES).T
-fig, axes = plt.subplots(1, 2, figsize=(8, 7.5), sharey=True, layout="constrained")
-for ax, table, title in zip(axes, (paper, found["exact"]), ("paper, Table A.3", "here"), strict=True):
-    display = SensitivityDisplay.from_predictions(table.T, ax=ax, limit=0.45, colorbar=False)
-    ax.set_title(title)
-fig.colorbar(display.image_, ax=axes, label="normalised sensitivity, eq. (A.1)", shrink=0.6)
+both = pd.concat({"paper, Table A.3": paper, "here": found["exact"]}, axis=1).swaplevel(axis=1)
+fig, axes = plt.subplots(1, len(MODES), figsize=(12, 7), sharex=True, sharey=True, layout="constrained")
+for ax, mode in zip(axes, MODES, strict=True):
+    both[mode].plot.barh(ax=ax, title=mode, legend=mode == MODES[0], xlabel="sensitivity, eq. (A.1)")
+axes[0].invert_yaxis()
 
 # %%
 # Three fits

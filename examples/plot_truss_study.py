@@ -29,7 +29,7 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import add_noise
 from skthermo.metrics import error_table
-from skthermo.plotting import AgreementDisplay, DamageIndexDisplay, HistoryDisplay, PODCurveDisplay
+from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PODCurveDisplay, PredictionDisplay
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
@@ -47,7 +47,7 @@ options = parser.parse_args()
 year = make_truss_campaign(noise=NOISE, random_state=0)
 moduli = (210 * year.theta).set_axis([f"E of zone {zone} (GPa)" for zone in (1, 2, 3)], axis=1)
 records = [year.temperatures.add_suffix(" (°C)"), moduli, year.frequencies.add_suffix(" (Hz)")]
-display = HistoryDisplay.from_predictions(pd.concat(records, axis=1), unit="", n_columns=3)
+display = PredictionDisplay.from_predictions(pd.concat(records, axis=1), unit="", n_columns=3)
 display.figure_.set_size_inches(11, 7)
 
 # %%
@@ -70,7 +70,7 @@ print(fem.report_)
 # frequencies do not feel. What four stiffnesses cannot follow is the discrepancy in the report, up to 1 % in the fifth
 # mode (:ref:`discrepancy`).
 
-HistoryDisplay.from_estimator(fem, n_columns=2)
+PredictionDisplay.from_estimator(fem, what="parameters", n_columns=2)
 
 # %%
 # Simulate years that were never measured
@@ -88,8 +88,8 @@ true, simulated = (pd.concat(years, ignore_index=True) for years in (true, simul
 print(error_table(true, simulated, scenarios=np.repeat([one.name for one in HALVED], 365)).round(2))
 
 marks = {one.name: 365 * number for number, one in enumerate(HALVED)}
-years = {"thermo-mechanical": true, "data-informed": simulated}
-HistoryDisplay.from_predictions(years, kind="lines", marks=marks, n_columns=2)
+labels = ("thermo-mechanical", "data-informed")
+PredictionDisplay.from_predictions(true, simulated, labels=labels, kind="lines", marks=marks, n_columns=2)
 
 # %%
 # Ask a detector
@@ -121,7 +121,7 @@ sources = {"thermo-mechanical": "reference", "data-informed": "data-informed"}
 detector = study.detector_name()
 shown = ["healthy", *(f"{group} 20 %" for group in GROUPS)]
 indices = {name: {label: study.indices_[detector, name, source] for label, source in sources.items()} for name in shown}
-display = DamageIndexDisplay.from_scenarios(indices, study.thresholds_[detector], n_columns=2)
+display = DamageIndexDisplay.from_predictions(indices, study.thresholds_[detector], n_columns=2)
 display.figure_.set_size_inches(7, 4.6)
 
 # %%
@@ -157,7 +157,7 @@ bench = DetectabilityStudy(
 bench.run(later.temperatures, reference=true_records)
 print(bench.ranking()[["false_alarms", "pod", "behind", "clearly_behind"]].round(2).to_string())
 print(bench.summary())
-display = AgreementDisplay.from_estimator(bench)
+display = DetectorsDisplay.from_estimator(bench, "agreement")
 
 # %%
 # False alarms are the exception. All detectors were set to 2 %, and in truth they are off by what their one baseline

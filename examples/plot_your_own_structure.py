@@ -30,7 +30,7 @@ from tower_recipes import quietly, said, write_synthetic_log
 
 from skthermo.fem import Beam, Spring, Structure, match_modes
 from skthermo.metrics import mape
-from skthermo.plotting import FrequencyTemperatureDisplay, PredictionDisplay
+from skthermo.plotting import PredictionDisplay
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater, identifiability
@@ -150,10 +150,10 @@ print(fem.report_)
 # The report counts what was left out and why. Parameters over temperature show what was learned:
 
 learned = quietly(fem.predict_parameters, T)
-FrequencyTemperatureDisplay.from_predictions(
-    T["T2"],
+PredictionDisplay.from_predictions(
     fem.parameters_.reindex(T.index),
     learned,
+    temperature=T["T2"],
     labels=("from frequencies", "from temperatures"),
     quantity="multiplier of the updated stiffness",
     unit="",
@@ -197,7 +197,7 @@ PredictionDisplay.from_predictions(F[shown], history[shown], marks={"hold-out": 
 # %%
 # All modes over the outer temperature:
 
-FrequencyTemperatureDisplay.from_predictions(T["T2"], F, history)
+PredictionDisplay.from_predictions(F, history, temperature=T["T2"])
 
 # %%
 # What if the records are wrong?

@@ -24,7 +24,7 @@ from page_recipes import save_figures
 from z24_recipes import MODES, bridge_model, chain, hold_out_table, read_arguments
 
 from skthermo.fem import sample
-from skthermo.plotting import FrequencyTemperatureDisplay, HistoryDisplay, PredictionDisplay
+from skthermo.plotting import PredictionDisplay
 from skthermo.updating import sensitivity
 
 bridge, folder = read_arguments()
@@ -101,7 +101,7 @@ print(fem.report_)
 # Frequencies over the temperature of the pavement, measured and predicted: the knee at 0 °C is in the data, and the
 # chain has learned it.
 
-display = FrequencyTemperatureDisplay.from_estimator(fem, bridge.T, bridge.F, sensor="TP", titles=MODES)
+display = PredictionDisplay.from_estimator(fem, bridge.T, bridge.F, sensor="TP", titles=MODES)
 for ax in display.axes_:
     ax.axvline(0, color="black", lw=0.7)
     ax.set_xlabel("pavement (°C)")
@@ -114,10 +114,10 @@ for ax in display.axes_:
 # In the parameters, frost stiffens the girder, the piers and the soil. ``parameters_`` are estimates from frequencies,
 # with the scatter of single records.
 
-display = FrequencyTemperatureDisplay.from_predictions(
-    bridge.T["TP"],
+display = PredictionDisplay.from_predictions(
     fem.parameters_.reindex(bridge.T.index),
     fem.predict_parameters(bridge.T),
+    temperature=bridge.T["TP"],
     labels=("$M_1$, from frequencies", "$M_2$, from temperatures"),
     quantity="multiplier of the nominal stiffness",
     unit="",
@@ -147,7 +147,7 @@ print(f"training range outside it, the warmest {beyond.max():.0%}")
 fig, axes = plt.subplots(5, 1, figsize=(11, 10), sharex=True, layout="constrained")
 marks = {"hold-out": bridge.T.index[bridge.n_train]}
 PredictionDisplay.from_estimator(fem, bridge.T, bridge.F, ax=axes[:4], titles=MODES, marks=marks)
-HistoryDisplay.from_predictions(bridge.T["TP"], unit="°C", ax=axes[4], titles=["pavement"], marks=marks)
+PredictionDisplay.from_predictions(bridge.T["TP"], unit="°C", ax=axes[4], titles=["pavement"], marks=marks)
 for ax in axes[:4]:
     ax.set_xlabel("")
 

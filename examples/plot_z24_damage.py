@@ -27,7 +27,7 @@ from z24_bench_recipes import DAMAGED, agreement, bench, bench_of_a_warning, cho
 from z24_damage_recipes import FROST, changes, identify, in_parameters
 from z24_recipes import GREY, PAVEMENT, SCALES, Records, alarm_table, compensate, plot_kinds, read_arguments
 
-from skthermo.plotting import AgreementDisplay, IdentifiedDamageDisplay
+from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
 from skthermo.surrogate import TemperatureMapper
 
 bridge, folder = read_arguments()
@@ -215,7 +215,7 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 #    damage found             0.952        0.909       22.0
 
 groups = {name: "raw frequencies" if name.startswith("raw") else "with temperatures" for name in candidates}
-AgreementDisplay.from_predictions(results, groups=groups)
+DetectorsDisplay.from_predictions(results, groups=groups)
 
 # %%
 # .. image:: /images/z24_bench.png

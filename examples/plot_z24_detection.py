@@ -154,7 +154,7 @@ def plot_indices(panels, **options):
         indices[title] = {label: getattr(index, kind) for kind, (label, _) in KINDS.items()}
         thresholds[title] = detector.threshold_
     options = {"onset": records.onset, "colours": dict(KINDS.values()), **options}
-    display = DamageIndexDisplay.from_scenarios(indices, thresholds, **options)
+    display = DamageIndexDisplay.from_predictions(indices, thresholds, **options)
     display.axes_[-1].set_xlabel("time, by the hour counter of the records")
 
 

@@ -27,9 +27,9 @@ from sklearn.utils.metadata_routing import get_routing_for_object
 from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted
 
-from skthermo._arguments import is_model
-from skthermo._arrays import refuse_huge, refuse_no_numbers, without_mask, without_missing
+from skthermo._estimators.arguments import is_model
 from skthermo._io import bars_of, without_bars
+from skthermo._tables.arrays import refuse_huge, refuse_no_numbers, without_mask, without_missing
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any
     Method = TypeVar("Method", bound=Callable[..., Any])
@@ -148,6 +148,9 @@ class Estimator(BaseEstimator):
                     f"{name} is {part!r:.100}, without parameters such as {min(values)!r}; expected an estimator"
                 )
         return self
+
+    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
+        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo._weather import TrainingRange
+from skthermo.residuals.weather import TrainingRange
 
 MEAN, WIDTH = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01])
 """Of the coefficients of a fleet's bridges."""

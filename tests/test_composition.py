@@ -55,7 +55,7 @@ def test_a_folder_can_be_overlooked():
 
 
 def test_short_files_have_a_reason():
-    private = [path for path in FILES if path.name.startswith("_") and path.name != "__init__.py"]
+    private = [path for path in FILES if path.name.startswith("_") and not path.name.startswith("__")]
     short = {path.relative_to(PACKAGE).as_posix() for path in private if len(path.read_text().splitlines()) < SHORT}
     assert_none(short - set(SHORT_FILES), f"expected {SHORT} lines, a place beside the only user, or a reason above:")
     assert_none(set(SHORT_FILES) - short, "not short:")
@@ -64,4 +64,4 @@ def test_short_files_have_a_reason():
 def test_the_guide_for_contributors_lists_what_all_packages_share():
     section = HOUSE.read_text().partition("What every package may use\n")[2].partition("\nDependencies\n")[0]
     listed = set(re.findall(r"\* - ``(\w+?)(?:\.py)?``", section))
-    assert listed == {path.stem for path in PACKAGE.glob("_*") if path.name not in ("__init__.py", "__pycache__")}
+    assert listed == {path.stem for path in PACKAGE.glob("_*") if not path.name.startswith("__")}

@@ -37,6 +37,7 @@ def cluster():
         yield client
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "model",
     [TRUSS, FRAME, FRAME.reduced(0.2, random_state=0), CallableModel(FRAME.frequencies, FRAME.parameter_names, 6)],
@@ -76,6 +77,7 @@ def test_a_model_is_sent_once():
     assert 1 <= len(sent) <= 2  # one for each worker at most
 
 
+@pytest.mark.nightly
 def test_a_grid_search_is_that_of_one_process():
     year = make_truss_campaign(samples_per_year=100, random_state=0)
     chain = DataInformedFEM(
@@ -95,6 +97,7 @@ def test_a_grid_search_is_that_of_one_process():
     np.testing.assert_array_equal(there.predict(weather), here.predict(weather))
 
 
+@pytest.mark.nightly
 def test_a_fleet_is_that_of_one_process():
     years = {name: make_truss_campaign(samples_per_year=100, random_state=seed) for seed, name in enumerate("ab")}
     chain = DataInformedFEM(

@@ -18,8 +18,21 @@ ROOT = Path(__file__).parents[1]
 BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 API = ROOT / "docs" / "reference" / "api"
-ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if m.ispkg and not m.name.startswith("_")]
+PACKAGES = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if not m.name.startswith("_")]
+ROOMS = [name for name in PACKAGES if importlib.import_module(f"skthermo.{name}").__all__]  # with public names
 README, HOME = ROOT / "README.md", ROOT / "docs" / "index.rst"
+LONG = {  # pages whose code takes seconds
+    "choices.rst", "detection.rst", "estimation.rst", "kw51.rst", "many_bridges.rst", "method.rst", "models.rst",
+    "noise_lags_gaps.rst", "report.rst", "studies.rst", "three_steps.rst", "validation.rst",
+}  # fmt: skip
+
+
+def by_page(has_code):
+    """A test of each page that has some code, at night if it takes long."""
+    pages = [page for page in PAGES if has_code(page)]
+    marks = {True: [pytest.mark.nightly], False: []}
+    each = [pytest.param(page, id=page.name, marks=marks[page.name in LONG]) for page in pages]
+    return pytest.mark.parametrize("page", each)
 
 
 def python_blocks(page):
@@ -39,7 +52,7 @@ def run_code(page):
 
 
 @pytest.mark.filterwarnings("ignore:.*see fleet.warnings")  # what is doubtful about a fleet's bridges, counted
-@pytest.mark.parametrize("page", [p for p in PAGES[1:] if python_blocks(p) and p != HOME], ids=lambda p: p.name)
+@by_page(lambda page: page not in (README, HOME) and python_blocks(page))
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_code_runs_from_top_to_bottom(page):
     assert run_code(page).keys() > {"__builtins__"}  # it runs without an error, and defines something
@@ -69,7 +82,7 @@ def test_the_home_page_shows_readmes_code_and_figure():
     assert (image, " ".join(text.split())) == figure
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if "\n>>> " in p.read_text()], ids=lambda p: p.name)
+@by_page(lambda page: "\n>>> " in page.read_text())
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_examples_print_what_it_shows(page):
     options = {"module_relative": False, "optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}

@@ -170,6 +170,7 @@ def test_damaged_files_are_refused(tmp_path, in_process):
         assert re.search(message, str(caught.value)), f"{what}: {caught.value}"
 
 
+@pytest.mark.nightly
 def test_a_crash_too_much_memory_and_too_much_time_are_errors_that_name_the_file(tmp_path, monkeypatch):
     file = tmp_path / "any.mat"
     zeros = variable(6, (40_000_000, 1), element(9, bytes(320_000_000)))
@@ -194,6 +195,7 @@ def outcome(file, content):
         return str(error)
 
 
+@pytest.mark.nightly
 def test_flipped_bits_and_cut_files_give_an_error_or_whole_values(tmp_path):
     fields = {"K0": SPARSE, "M0": np.eye(3), "text": "abc", "cell": np.array([1, "a"], dtype=object)}
     file, random = tmp_path / "any.mat", np.random.default_rng(0)

@@ -61,7 +61,11 @@ def test_npz_members_that_do_not_hold_what_they_state_are_refused(tmp_path, in_p
             read_all(tmp_path / "model.npz")
 
 
-@pytest.mark.parametrize("member", [npz_of(HEADER % "100000, 100000"), bytes(4 * 10**8)], ids=["shape", "bytes"])
+@pytest.mark.parametrize(
+    "member",
+    [npz_of(HEADER % "100000, 100000"), pytest.param(bytes(4 * 10**8), marks=pytest.mark.nightly)],
+    ids=["shape", "bytes"],
+)
 def test_npz_members_that_need_too_much_memory_are_refused(tmp_path, member):
     with zipfile.ZipFile(tmp_path / "model.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("K.npy", member)

@@ -8,9 +8,9 @@ import pytest
 from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
-from skthermo._weather import SensorRegression
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator
+from skthermo.residuals.weather import SensorRegression
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 

@@ -7,8 +7,8 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
 
-from skthermo._arrays import as_floats, as_random_state, real_array
-from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like
+from skthermo._tables.arrays import as_floats, as_random_state, real_array
+from skthermo._tables.frames import check_same_rows, check_temperatures, column_names, frame_like
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures

@@ -15,7 +15,7 @@ ANY = "…"
 ERRORS = "The most common errors"
 """Title of the section that explains errors."""
 
-HELPER = "_warnings.py"
+HELPER = "warnings.py"
 """The file that gives the warnings of others."""
 
 REPORTS = [
@@ -32,7 +32,7 @@ REPORTS = [
 """Functions whose sentences tell what is doubtful."""
 
 
-STATES = {"_in_words.py", "_past.py"}
+STATES = {"monitoring/_in_words.py", "preprocessing/_past.py", "fleet/_fleet.py"}
 """Files whose sentences tell how things stand, not what is doubtful."""
 
 
@@ -49,13 +49,14 @@ class Source:
         self.trees = {name: ast.parse(text) for name, text in files.items()}
         self.functions = defaultdict(list)
         self.constants = defaultdict(list)
+        self.entered = []
         for file, tree in self.trees.items():
             for node in tree.body:
                 match node:
                     case ast.Assign(targets=[ast.Name(id=name)], value=ast.Dict() as value):
                         self.constants[name].append(value)
             for node in ast.walk(tree):
-                if isinstance(node, ast.FunctionDef) and Path(file).name not in STATES:
+                if isinstance(node, ast.FunctionDef) and file not in STATES:
                     self.functions[node.name].append(node)
 
     def warnings(self):
@@ -80,10 +81,14 @@ class Source:
     def given(self, name):
         """Texts that the functions of a name return or yield."""
         texts = set()
+        if name in self.entered:  # functions of one name that call each other
+            return texts
+        self.entered.append(name)
         for function in self.functions[name]:
             for node in ast.walk(function):
-                if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom) and not is_call_of(name, node.value):
+                if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom):
                     texts |= self.texts(node.value, function)
+        self.entered.pop()
         return texts
 
     def texts(self, node, function):
@@ -116,11 +121,6 @@ class Source:
             case ast.Call() if called(node) in self.functions:
                 return self.given(called(node))
         return {ANY}
-
-
-def is_call_of(name, node):
-    """Whether an expression may be what a function of this name gives, as in a method that calls a function."""
-    return any(isinstance(part, ast.Call) and called(part) == name for part in ast.walk(node or ast.Constant(None)))
 
 
 def called(call):

@@ -3,8 +3,9 @@
     python tools/house.py [--files]
 
 For each package: its files and their lines, packages within it included, and how many of its files are entered by
-``DataInformedFEM.fit``, ``DataInformedFEM.simulate`` and ``DetectabilityStudy.run`` on the truss, as Python's profiler
-sees it. Reads the skthermo that is imported (``PYTHONPATH`` chooses another tree).
+``DataInformedFEM.fit`` and ``simulate``, ``DetectabilityStudy.run`` and ``Monitor.update`` on the truss, as Python's
+profiler sees it; at the end, how many functions are. Reads the skthermo
+that is imported (``PYTHONPATH`` chooses another tree).
 """
 
 import argparse
@@ -12,9 +13,14 @@ import sys
 import threading
 from pathlib import Path
 
+import pandas as pd
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
 import skthermo
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring import Monitor
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM
 
@@ -22,12 +28,12 @@ PACKAGE = Path(skthermo.__file__).parent
 
 
 def entered(call, *arguments, **options):
-    """Files of the package whose functions a call enters, and its result."""
-    files = set()
+    """Functions of the package that a call enters, as pairs of file and name, and its result."""
+    functions = set()
 
     def note(frame, event, _):
         if event == "call" and frame.f_code.co_name != "<module>":  # imports are not entered
-            files.add(frame.f_code.co_filename)
+            functions.add((frame.f_code.co_filename, frame.f_code.co_qualname))
 
     threading.setprofile(note)
     sys.setprofile(note)
@@ -36,12 +42,12 @@ def entered(call, *arguments, **options):
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-    inside = {Path(file) for file in files if file.startswith(str(PACKAGE))}
-    return {file.relative_to(PACKAGE) for file in inside}, result
+    inside = {(Path(file).relative_to(PACKAGE), name) for file, name in functions if file.startswith(str(PACKAGE))}
+    return inside, result
 
 
 def actions():
-    """Files that each action enters."""
+    """Functions that each action enters."""
     year, later = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
     chain = DataInformedFEM(make_truss(), random_state=0)
     fit, chain = entered(chain.fit, year.temperatures, year.frequencies)
@@ -52,7 +58,13 @@ def actions():
         chain, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0, uncertainty="noise"
     )
     run, _ = entered(study.run, later.temperatures)
-    return {"fit": fit, "simulate": simulate, "run": run}
+    compensator = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies.columns))
+    records, new = year.temperatures.join(year.frequencies), later.temperatures.join(later.frequencies)
+    records.index = pd.date_range("2020-01-01", periods=len(records))
+    new.index = pd.date_range(records.index[-1] + pd.Timedelta(days=1), periods=len(new))
+    monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records)
+    update, _ = entered(monitor.update, new)
+    return {"fit": fit, "simulate": simulate, "run": run, "update": update}
 
 
 def main():
@@ -61,7 +73,8 @@ def main():
     by_name = parser.parse_args().files
     files = sorted(path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
     lines = {file: len((PACKAGE / file).read_text().splitlines()) for file in files}
-    by_action = actions()
+    functions = actions()
+    by_action = {action: {file for file, _ in found} for action, found in functions.items()}
     print(f"{'package':24}{'files':>7}{'lines':>8}" + "".join(f"{action:>10}" for action in by_action))
     packages = sorted({parent for file in files for parent in file.parents if parent != Path()})
     print_row("directly in skthermo", [file for file in files if file.parent == Path()], lines, by_action)
@@ -69,6 +82,7 @@ def main():
         inside = [file for file in files if package in file.parents]
         print_row("  " * (len(package.parts) - 1) + package.name, inside, lines, by_action)
     print_row("all", files, lines, by_action)
+    print(f"{'functions':39}" + "".join(f"{len(found):10}" for found in functions.values()))
     for action, found in by_action.items() if by_name else ():
         print(f"\n{action} enters", *(file.as_posix() for file in sorted(found)), sep="\n  ")
 

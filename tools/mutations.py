@@ -52,24 +52,22 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "level = values - 0 * self.offsets_",
         ),
     ],
-    ("_gaussian.py", "detection/test_known_errors.py"): [
+    ("residuals/gaussian.py", "detection/test_known_errors.py"): [
         (
             "known errors that count as scatter",
             "precisions(covariance + errors, present)",
             "precisions(covariance, present)",
         ),
     ],
-    ("surrogate/chain/_data_informed.py", "surrogate/test_predicted_covariance.py"): [
+    ("surrogate/chain/_thermal_model.py", "surrogate/test_predicted_covariance.py"): [
         (
             "covariance in the model's domain",
             "slopes[:, :, np.newaxis] * jacobian",
             "slopes[:, :1, np.newaxis] ** 0 * jacobian",
         ),
-        (
-            "intervals of a certain mapper",
-            "np.hypot(self._cost_of_gaps(X), self._uncertainty(X))\n        margin",
-            "self._cost_of_gaps(X)\n        margin",
-        ),
+    ],
+    ("surrogate/chain/_intervals.py", "surrogate/test_predicted_covariance.py"): [
+        ("intervals of a certain mapper", "np.hypot(np.sqrt(fills), np.sqrt(stated))", "np.sqrt(fills)"),
     ],
     ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
@@ -134,7 +132,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
         ("shape derivative of tracked modes", "model.local_modes(row, follow=True)", "model.local_modes(row)"),
     ],
-    ("_arrays.py", "fem/test_linearise.py"): [
+    ("_tables/arrays.py", "fem/test_linearise.py"): [
         ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
     ],
     ("fem/sampling/_linearise.py", "fem/test_linearise.py"): [
@@ -201,8 +199,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
         ("limits of estimates", "REACH = 3.0", "REACH = 1.0"),
         ("parameters at their limits", "held, fixed = held | beyond", "held, fixed = held"),
-    ],
-    ("surrogate/refinement/_levenberg_marquardt.py", "surrogate/test_refinement.py"): [
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         (
             "steps that fail",
@@ -219,21 +215,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/refinement/_refinement.py", "surrogate/test_reduced_refinement.py"): [
         ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
     ],
-    ("surrogate/chain/_estimates.py", "surrogate/test_sample_weight.py"): [
-        ("a user's weights beside those of gaps", "return weights * self.weights", "return weights"),
-    ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
         ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
     ],
-    ("_frames.py", "surrogate/test_sample_weight.py"): [
+    ("_tables/frames.py", "surrogate/test_sample_weight.py"): [
         ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
     ],
-    ("_regressors.py", "surrogate/test_sample_weight.py"): [
+    ("_estimators/regressors.py", "surrogate/test_sample_weight.py"): [
         ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
-    ],
-    ("surrogate/_standardiser.py", "surrogate/test_coordinates.py"): [
-        ("mean of weighted rows", "axis=0, weights=sample_weight", "axis=0"),
-        ("damping of the mapper", "np.diag(np.sqrt(self.damping))", "np.diag(self.damping)"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
         (
@@ -255,11 +244,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
         ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
     ],
-    ("surrogate/chain/_estimates.py", "surrogate/test_coordinates.py"): [
-        ("weights of the chain", "found.residuals, found.weight,", "found.residuals, None,"),
-        ("shrinkage of the prior", "return self.theta * np.exp(np.clip(", "return self.theta * np.exp(0 * np.clip("),
-    ],
-    ("_weather.py", "test_sensor_regression.py"): [
+    ("residuals/weather.py", "test_sensor_regression.py"): [
         ("sensors in unknown weather", "outside = beyond > 0", "outside = beyond > 1e9"),
         ("usual departures of sensors", "TIMES_USUAL * usual", "0.5 * usual"),
     ],
@@ -280,11 +265,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks as long as residuals remember", "CORRELATION_TIMES = 5 ", "CORRELATION_TIMES = 0 "),
         ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
     ],
-    ("_weather.py", "surrogate/test_uncertainty.py"): [
+    ("residuals/weather.py", "surrogate/test_uncertainty.py"): [
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
-    ("_times.py", "surrogate/test_uncertainty.py"): [
+    ("_tables/times.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
     ],
     ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [
@@ -323,7 +308,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),
     ],
-    ("_gaussian.py", "detection/test_gaps.py"): [
+    ("residuals/gaussian.py", "detection/test_gaps.py"): [
         ("spread of missing modes", "+ counts[:, np.newaxis, np.newaxis] * rest", ""),
         (
             "mean of modes with gaps",
@@ -333,7 +318,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
         ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
     ],
-    ("_gaussian.py", "detection/test_whitening.py"): [
+    ("residuals/gaussian.py", "detection/test_whitening.py"): [
         ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
     ],
     ("detection/_patterns.py", "detection/test_gaps.py"): [
@@ -345,13 +330,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
         ("records that a covariance estimator learns from", "clone(self.covariance).fit(others)", "self.covariance_"),
     ],
-    ("detection/_neighbourhoods.py", "detection/test_thresholds.py"): [
+    ("residuals/neighbourhoods.py", "detection/test_thresholds.py"): [
         ("size of a neighbourhood", "REACH = 2 ", "REACH = 1 "),
         ("neighbours in time", "np.median(steps)", "1.0"),
         ("mean of the others", "mean = -_sums(", "mean = _sums("),
         ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
     ],
-    ("detection/_neighbourhoods.py", "detection/test_outlier.py"): [
+    ("residuals/neighbourhoods.py", "detection/test_outlier.py"): [
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
@@ -364,31 +349,31 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
         ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
     ],
-    ("detection/compensation/_local_covariance.py", "detection/test_local_covariance.py"): [
+    ("residuals/local_covariance.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "filled + pseudo * prior.ravel()) / (counts + pseudo)", "filled) / counts"),
     ],
-    ("detection/compensation/_whitening.py", "detection/test_whitening.py"): [
+    ("residuals/spread.py", "detection/test_whitening.py"): [
         ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),
         ("unknown weather", "len(self.covariances) - 1)", "0)"),
     ],
-    ("detection/windows/_laws.py", "detection/test_windowed_alarm.py"): [
+    ("detection/_laws.py", "detection/test_windowed_alarm.py"): [
         ("correlation in a window", "sums**2 - squares", "sums**2"),
         ("variance of a mean", "self.correlation * counts**2", "self.correlation * counts"),
         ("records of a partial window", "self.m * count / self.n", "self.m"),
     ],
-    ("detection/windows/_windows.py", "detection/test_windowed_alarm.py"): [
+    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
         ("records before a run of windows", "before = self.first[start]", "before = start"),
         ("edge of a window of time", 'side="right"', 'side="left"'),
     ],
-    ("detection/windows/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
+    ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
         ("periods of windows", "baseline.away_from(np.isin(np.arange(n_rows), fold))", "np.arange(n_rows)"),
         ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
-    ("_warnings.py", "detection/test_checked_once.py"): [
-        ("what an estimator around has told", "if kind in _told.get():", "if kind in ():"),
+    ("_estimators/warnings.py", "detection/test_checked_once.py"): [
+        ("what an estimator around has told", "if kind in context.told:", "if kind in ():"),
         (
             "a check that is shared",
             "content = ALL if ALL in found else content_of(tables)",
@@ -398,13 +383,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_fused.py", "detection/test_checked_once.py"): [
         ("detectors that share a check", ", checked_once():", ":"),
     ],
-    ("_warnings.py", "surrogate/test_report.py"): [
-        ("a warning for each fold", "if kind in kinds:", "if kind in kinds and not in_folds:"),
+    ("_estimators/warnings.py", "surrogate/test_report.py"): [
+        ("a warning for each fold", "if kind in given:", "if kind in given and not in_folds:"),
     ],
-    ("_threads.py", "test_threads.py"): [
+    ("_estimators/threads.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
-    ("surrogate/chain/_scatter.py", "surrogate/test_scatter.py"): [
+    ("residuals/scatter.py", "surrogate/test_scatter.py"): [
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
         ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
@@ -448,13 +433,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("_changes.py", "studies/test_identify_causes.py"): [
+    ("_effects/changes.py", "studies/test_identify_causes.py"): [
         ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
     ],
-    ("_frequency_effects.py", "studies/test_identify_causes.py"): [
+    ("_effects/frequencies.py", "studies/test_identify_causes.py"): [
         ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
     ],
-    ("studies/identification/measured/_shape_effects.py", "studies/test_identify_shapes.py"): [
+    ("studies/identification/_shapes.py", "studies/test_identify_shapes.py"): [
         ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
     ],
     ("studies/detectability/_world_rates.py", "studies/test_worlds.py"): [
@@ -467,7 +452,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/detectability/_judged.py", "studies/test_several_detectors.py"): [
         ("a detector that failed stays failed", "if name not in self.errors], {}", "], {}"),
     ],
-    ("studies/detectability/_view.py", "studies/test_several_detectors.py"): [
+    ("studies/detectability/_candidates.py", "studies/test_several_detectors.py"): [
         ("temperatures for detectors without targets", "compensates | (known >= n_sensors)", "known >= 0"),
     ],
     ("studies/detectability/_ranking.py", "studies/test_ranking.py"): [
@@ -509,8 +494,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
     ],
-    ("plotting/comparison/_agreement.py", "plotting/test_comparison.py"): [
-        ("measured rates outside their bands", '(rows["inside"] == 0)', '(rows["inside"] == 2)'),
+    ("plotting/_detectors.py", "plotting/test_detectors.py"): [
+        ("measured rates outside their bands", 'is_open=rates["inside"] == 0', 'is_open=rates["inside"] == 2'),
         ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
     ],
     ("reporting/service/_standing.py", "reporting/test_service.py"): [
@@ -521,7 +506,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("called alarms among the others", "CALLED if called & set(opened.index) else OPEN", "OPEN"),
         ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
     ],
-    ("plotting/comparison/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
+    ("plotting/_fleet_prior.py", "plotting/test_fleet_prior.py"): [
         ("where own records end", "ends[0].max()), float(ends[1].min())", "ends[0].min()), float(ends[1].max())"),
     ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
@@ -534,10 +519,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("reporting/_choice.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
-    ("plotting/comparison/_roc.py", "plotting/test_comparison.py"): [
-        ("records before the onset in a curve", "-np.inf if onset is None", "-np.inf if True"),
+    ("studies/detectability/_judged.py", "plotting/test_detectors.py"): [
+        ("records before the onset in a curve", "if onset is None else", "if True else"),
     ],
-    ("plotting/structures/_view.py", "plotting/test_structures.py"): [
+    ("plotting/structures/_projection.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_promise.py", "monitoring/test_promise.py"): [
@@ -554,7 +539,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
         ("versions of a saved monitor", "if monitor.versions_ != versions():", "if False:"),
     ],
-    ("monitoring/__main__.py", "monitoring/test_command.py"): [
+    ("commands/main.py", "commands/test_monitor_commands.py"): [
         ("an alarm that has ended within a batch", 'if "alarm" in states or monitor', "if monitor"),
         ("a night without a new record", "if is_judged else NOT_JUDGED", "if True else NOT_JUDGED"),
     ],

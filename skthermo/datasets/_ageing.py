@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import is_real
+from skthermo._tables.arrays import is_real
 
 
 def stiffness_factors(

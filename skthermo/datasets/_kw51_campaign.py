@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from skthermo._arguments import check_flag, check_noise
-from skthermo._arrays import Array, as_random_state, positive_integer
+from skthermo._estimators.arguments import check_flag, check_noise
+from skthermo._tables.arrays import Array, as_random_state, positive_integer
 from skthermo.datasets._ageing import stiffness_factors
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors

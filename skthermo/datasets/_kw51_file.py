@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arguments import check_path
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import check_path
+from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_matlab
-from skthermo._warnings import warn_user
+from skthermo._tables.arrays import Array
 from skthermo.datasets._results import KW51Monitoring
 
 MOST_LABELS = 1000

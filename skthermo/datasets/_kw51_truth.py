@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.datasets._kw51_model import N_BAYS, N_PANELS, kw51_structure, updated_model
 from skthermo.datasets._kw51_weather import REFERENCE
 from skthermo.fem import AffineModel, Element, PointMass, ReducedModel, Spring, Structure

@@ -5,7 +5,7 @@ import pandas as pd
 import scipy  # which loads scipy.signal once it is used
 from scipy.stats import norm
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 START = pd.Timestamp("2018-10-01")
 N_HOURS = 11328
@@ -92,6 +92,7 @@ def smooth_noise(n_hours: int, n_columns: int, hours: float, random: np.random.R
 
 def memory(values: Array, hours: float) -> Array:
     """Exponentially weighted mean of the past, which starts settled at the first value."""
+    if hours == 0:
+        return values
     decay = np.exp(-1 / hours)
-    start = np.array([decay * values[0]])
-    return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=start)[0]
+    return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=decay * values[:1])[0]

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arguments import check_path
+from skthermo._estimators.arguments import check_path
 from skthermo._io import read_matlab
 from skthermo.datasets._results import Z24Monitoring
 

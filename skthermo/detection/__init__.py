@@ -1,9 +1,17 @@
 """Damage detection from frequencies."""
 
+from skthermo.detection._base import DamageDetector
+from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._fused import FusedDetector
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
-from skthermo.detection.compensation import TemperatureCompensator
-from skthermo.detection.windows import WindowedAlarm
+from skthermo.detection._windowed_alarm import WindowedAlarm
 
-__all__ = ["FusedDetector", "MahalanobisDetector", "OutlierDetector", "TemperatureCompensator", "WindowedAlarm"]
+__all__ = [
+    "DamageDetector",
+    "FusedDetector",
+    "MahalanobisDetector",
+    "OutlierDetector",
+    "TemperatureCompensator",
+    "WindowedAlarm",
+]

@@ -12,22 +12,65 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._arrays import Array
-from skthermo._frames import frame_like, warn_of_absurd, warn_of_markers
-from skthermo._times import row_times
+from skthermo._estimators.warnings import explain_rows, explained_rows, warn_user
+from skthermo._tables.arrays import Array
+from skthermo._tables.frames import frame_like, warn_of_absurd, warn_of_markers
+from skthermo._tables.times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
-from skthermo._warnings import explain_rows, explained_rows, warn_user
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
-    A detector has the parameter ``contamination`` and the methods `_learn` and `_index`, which get rows in which modes
-    may be missing, `_limit` and `_cause`. One that learns a distribution says so and has `_log_densities`.
+    It reads tables, gives alarms and keeps to scikit-learn's rules. A detector of one's own has three methods:
+    ``_learn(F, times)`` fits to the baseline, NaN where a mode is missing, and returns the damage index that sets the
+    threshold; ``_limit(index)`` is that threshold; ``_index(F)`` is the index of any rows, NaN where there is none.
+
+    Parameters
+    ----------
+    contamination : float, default=0.02
+        Share of healthy records above the threshold.
+
+    Attributes
+    ----------
+    baseline_index_ : ndarray of shape (n_samples,)
+        Damage index of the baseline, as ``_learn`` returns it.
+    threshold_ : float
+        A damage index above it is an alarm.
+    offset_ : float
+        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
+
+    Notes
+    -----
+    A detector, or a step before it, that looks at earlier records says how far by ``lookback_``: a number of rows, or a
+    time, as `WindowedAlarm` and `~skthermo.preprocessing.LagFeatures` have it. `~skthermo.monitoring.Monitor` keeps
+    that many records; those of steps in a row add up. ``_cause(X, rows)`` says why rows have no index. A detector that
+    learns a distribution has ``_has_likelihood()`` True and ``_log_densities(F)``, and with them a ``score``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import DamageDetector
+    >>> class LargestDeviation(DamageDetector):
+    ...     def _learn(self, F, times):
+    ...         self.mean_, self.std_ = np.nanmean(F, axis=0), np.nanstd(F, axis=0)
+    ...         return self._index(F)
+    ...     def _limit(self, index):
+    ...         return np.quantile(index, 1 - self.contamination)
+    ...     def _index(self, F):
+    ...         return np.fmax.reduce(np.abs(F - self.mean_) / self.std_, axis=1)
+    >>> year = make_truss_campaign(random_state=0)
+    >>> detector = LargestDeviation().fit(year.frequencies)
+    >>> print(f"{(detector.predict(year.frequencies) == -1).mean():.0%} alarms")
+    2% alarms
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
+
+    def __init__(self, contamination: float = 0.02):
+        self.contamination = contamination
 
     def _records(self, X: Any, F: Array) -> Any:
         """Hook: preprocess validated rows."""

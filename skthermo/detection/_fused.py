@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 
-from skthermo._arrays import Array
+from skthermo._estimators.warnings import checked_once, explain_rows, explained_rows, warnings_once
+from skthermo._tables.arrays import Array
 from skthermo._validation import _BaseComposition, last_step
-from skthermo._warnings import checked_once, explain_rows, explained_rows, warnings_once
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
 

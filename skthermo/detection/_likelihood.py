@@ -7,8 +7,8 @@ from weakref import ref
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
 
 _volumes: dict[int, tuple[ref, tuple[int, ...], Callable[[], Array]]] = {}
 """Arrays by the address of their numbers while they exist, their shapes, and the `log_volumes` of their rows."""

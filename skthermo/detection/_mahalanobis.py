@@ -10,14 +10,14 @@ from scipy.stats import chi2
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
 
-from skthermo._arrays import Array
-from skthermo._gaussian import Gaussian, check_invertible, check_not_empty, modes_text
+from skthermo._estimators.warnings import warn_user, without_warnings
+from skthermo._tables.arrays import Array
 from skthermo._validation import HasMethods, StrOptions
-from skthermo._warnings import warn_user, without_warnings
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, modes_text
+from skthermo.residuals.neighbourhoods import Neighbourhoods
 
 ROWS_AT_ONCE = 20_000  # whose distances are computed, which bounds memory
 N_FOLDS = 10  # of the baseline, whose distances come from the others where there is no closed form
@@ -164,7 +164,7 @@ class MahalanobisDetector(DamageDetector):
         return True
 
     def _log_densities(self, F: Array) -> Array:
-        return Gaussian(self.covariance_.location_, self.covariance_.covariance_).log_densities(F)
+        return self._normal.log_densities(F)
 
     def _of_few(self, F: Array) -> Array:
         distances, present = self._distances(F), ~np.isnan(F)
@@ -176,7 +176,7 @@ class MahalanobisDetector(DamageDetector):
         """Distances of rows in the modes that they have; NaN where there is none."""
         if self.covariance is not None and not np.isnan(F).any():
             return np.sqrt(self.covariance_.mahalanobis(F))
-        return Gaussian(self.covariance_.location_, self.covariance_.covariance_).distances(F)
+        return self._normal.distances(F)
 
     def _left_out(self, baseline: Neighbourhoods) -> Array:
         """Distances of baseline rows from the others."""
@@ -186,11 +186,16 @@ class MahalanobisDetector(DamageDetector):
         if self.covariance is not None:
             distances[known] = some.out_of_fold(N_FOLDS, self._distances_from)
         elif complete[known].all():
-            distances[known] = some.distances(Gaussian(self.covariance_.location_, self.covariance_.covariance_))
+            distances[known] = some.distances(self._normal)
         else:
             with without_warnings():  # which the fit on all rows has given
                 distances[known] = some.out_of_fold(N_FOLDS, _distances_from)
         return distances
+
+    @property
+    def _normal(self) -> Gaussian:
+        """The baseline's normal distribution."""
+        return Gaussian(self.covariance_.location_, self.covariance_.covariance_)
 
     def _distances_from(self, others: Array, rows: Array) -> Array:
         """Distances of complete rows from others, by a covariance estimator."""

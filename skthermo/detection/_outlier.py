@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, DensityMixin, clone
 from sklearn.neighbors import KernelDensity
 
-from skthermo._arrays import Array, as_floats
-from skthermo._formatting import listed
-from skthermo._frames import column_names
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import column_names
+from skthermo._tables.text import listed
 from skthermo._validation import HasMethods, Interval, StrOptions
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._neighbourhoods import Neighbourhoods
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+from skthermo.residuals.neighbourhoods import Neighbourhoods
 
 N_FOLDS = 5  # of the baseline, each judged by a clone that was fitted on the others
 

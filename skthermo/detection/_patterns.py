@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from skthermo._arrays import Array, patterns
-from skthermo._gaussian import Mask
+from skthermo._tables.arrays import Array, patterns
+from skthermo.residuals.gaussian import Mask
 
 CHANCE = 0.95  # groups of rows get factors only if they differ by more than chance would with this probability
 PATTERN_SHARE = 0.1  # of a pattern's rows above the level that gives its factor; alarms alone are too few for that

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from skthermo._arrays import Array
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
 
 
 def quantile_threshold(index: Array, contamination: float) -> float:

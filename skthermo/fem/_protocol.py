@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 
 @runtime_checkable

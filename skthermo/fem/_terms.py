@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, Matrix, as_dense
+from skthermo._tables.arrays import Array, Matrix, as_dense
 from skthermo.fem._factors import Elimination, elimination
 from skthermo.fem._theta import ROWS_PER_CHUNK
 

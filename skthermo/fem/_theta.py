@@ -5,8 +5,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from skthermo._arrays import Array
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
 
 ROWS_PER_CHUNK = 256  # largest number of samples solved together
 

@@ -8,7 +8,7 @@ import time
 import traceback
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -20,14 +20,16 @@ import numpy as np
 import pandas as pd
 import sklearn
 from joblib import parallel_config, wrap_non_picklable_objects
-from sklearn.base import clone
+from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator, clone
 
 import skthermo
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import counted_warnings
 from skthermo._io import without_bars
-from skthermo._threads import single_blas_thread
 from skthermo._validation import seed_parts
-from skthermo._warnings import counted_warnings
 from skthermo.metrics import mape
+from skthermo.monitoring import Monitor
 
 SPEED = 1  # fastest compression of zlib, which adds a checksum
 LIBRARIES = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "dask", "distributed"}
@@ -63,20 +65,21 @@ class Failure:
         return f"{self.type}: {self.message}"
 
 
+Table = ArrayLike | pd.DataFrame
 Told = tuple[str, str, int]  # kind and text of a warning, and how often it came
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BridgeOutcome:
     """All that is known of a bridge, fitted or not, beside its fitted objects, which are bytes.
 
     ``content`` tells by which records, estimator and versions it was fitted.
     """
 
-    name: Any
+    name: Hashable
     content: str = ""
     is_fitted: bool = False
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: dict[str, float] = field(default_factory=dict)
     standing: dict[str, Any] = field(default_factory=lambda: dict(NOT_WATCHED))
     events: pd.DataFrame | None = None
     warnings: tuple[Told, ...] = ()
@@ -94,51 +97,53 @@ class Outcome:
 class Result(NamedTuple):
     """What a worker sends back: fitted objects as bytes where they are new, and judgements of new records."""
 
-    outcome: Outcome
+    outcome: BridgeOutcome
     fitted: bytes | None = None
     answers: pd.DataFrame | None = None
     is_as_before: bool = False
 
 
 @dataclass(frozen=True)
-class Fit:
+class BridgeFit:
     """A bridge to be fitted, unless that has been done with the same content before (``known``)."""
 
-    name: Any
-    maker: Any
+    name: Hashable
+    maker: BaseEstimator | Callable[[], BaseEstimator]
     records: Any
-    monitor: Callable[[Any], Any] | None
+    monitor: Callable[[BaseEstimator], Monitor] | None
     seed: int
-    known: Outcome | None
+    known: BridgeOutcome | None
 
     def __call__(self) -> Result:
         """What was found, and fitted objects as bytes; those of what is known stay as they were."""
-        start, stage, outcome = time.perf_counter(), _Stage("records"), Outcome(self.name)
+        start, stage, outcome = time.perf_counter(), "records", BridgeOutcome(self.name)
         with _on_its_own() as counts:
             try:
                 T, F = pair(call(self.records), self.name)
                 outcome = replace(outcome, facts=_facts(T, F))
-                stage.name = "maker"
+                stage = "maker"
                 estimator = clone(call(self.maker))
                 seed_parts(estimator, np.random.RandomState(self.seed))
                 content = content_of(estimator, (T, F), self.monitor)
                 if self.known is not None and self.known.content == content:
                     return Result(self.known, is_as_before=True)
-                outcome, stage.name = replace(outcome, content=content), "fit"
+                outcome, stage = replace(outcome, content=content), "fit"
                 chain = estimator.fit(T, F)
                 outcome = replace(outcome, facts=outcome.facts | {"mape": _error(chain, T, F)})
                 outcome, watch = self._watched(outcome, chain, T, F)
-                stage.name = "saving"
+                stage = "saving"
                 fitted = pickled((chain, watch))
                 outcome = replace(outcome, is_fitted=True, n_bytes=len(fitted))
             except (Exception, SystemExit) as error:
-                failure, fitted = Failure.of(stage.name, error), None
+                failure, fitted = Failure.of(stage, error), None
                 if not outcome.content:
                     return self.lost(failure, outcome.facts, told(counts))
-                outcome = Outcome(self.name, facts=outcome.facts, failures=(failure,))
+                outcome = BridgeOutcome(self.name, facts=outcome.facts, failures=(failure,))
         return Result(replace(outcome, warnings=told(counts), seconds=time.perf_counter() - start), fitted)
 
-    def _watched(self, outcome: Outcome, chain: Any, T: Any, F: Any) -> tuple[Outcome, Any]:
+    def _watched(
+        self, outcome: BridgeOutcome, chain: BaseEstimator, T: Table, F: Table
+    ) -> tuple[BridgeOutcome, Monitor | None]:
         """The monitor of a fitted chain; where it fails, it is tried again in the next call."""
         if self.monitor is None:
             return outcome, None
@@ -148,19 +153,19 @@ class Fit:
         except (Exception, SystemExit) as error:
             return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
 
-    def lost(self, failure: Failure, facts: Any = None, warnings: tuple[Told, ...] = ()) -> Result:
+    def lost(self, failure: Failure, facts: dict[str, float] | None = None, warnings: tuple[Told, ...] = ()) -> Result:
         """What is known if the records or the estimator cannot be had: what was fitted before, not judged any more."""
         if self.known is not None and self.known.is_fitted:
             return Result(_not_judged(self.known, failure, warnings))
-        return Result(Outcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
+        return Result(BridgeOutcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
 
 
 @dataclass(frozen=True)
-class Update:
+class BridgeUpdate:
     """New records for the monitor of a bridge."""
 
-    name: Any
-    outcome: Outcome
+    name: Hashable
+    outcome: BridgeOutcome
     records: Any
     kept: Any
     fitted: bytes = b""
@@ -171,12 +176,12 @@ class Update:
 
     def __call__(self) -> Result:
         """What is known now, fitted objects as bytes, and judgements."""
-        stage = _Stage("new records")
+        stage = "new records"
         with _on_its_own() as counts:
             try:
                 new = call(self.records)
                 new = joined(*new) if isinstance(new, tuple) else new
-                stage.name = "update"
+                stage = "update"
                 chain, monitor = unpickled(self.fitted or self.kept.fitted(self.name))
                 if monitor is None:
                     raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
@@ -184,7 +189,7 @@ class Update:
                 fitted = pickled((chain, monitor))
                 known: dict[str, Any] = {"standing": standing_of(monitor), "events": monitor.events_}
             except (Exception, SystemExit) as error:
-                return self.lost(Failure.of(stage.name, error), told(counts))
+                return self.lost(Failure.of(stage, error), told(counts))
         known |= {"failures": (), "late_warnings": told(counts), "n_bytes": len(fitted)}
         return Result(replace(self.outcome, **known), fitted, _answers(self.name, answers))
 
@@ -194,19 +199,12 @@ class Update:
         return Result(_not_judged(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
 
 
-def _not_judged(outcome: Outcome, failure: Failure, warnings: tuple[Told, ...]) -> Outcome:
+def _not_judged(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Told, ...]) -> BridgeOutcome:
     """The bridge as it was; it is not healthy, because nothing is known of it."""
     standing = dict(outcome.standing)
     if outcome.is_watched:
         standing["state"] = "alarm" if standing["n_open"] else "not judged"
     return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
-
-
-@dataclass
-class _Stage:
-    """What is being done."""
-
-    name: str
 
 
 @contextmanager
@@ -225,7 +223,7 @@ def call(given: Any) -> Any:
     return given() if is_function else given
 
 
-def pair(records: Any, name: Any) -> tuple[Any, Any]:
+def pair(records: Any, name: Hashable) -> tuple[Table, Table]:
     """Temperatures and frequencies."""
     if not isinstance(records, tuple | list) or len(records) != 2:
         raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
@@ -238,7 +236,7 @@ def pair(records: Any, name: Any) -> tuple[Any, Any]:
     return records[0], records[1]
 
 
-def joined(T: Any, F: Any) -> pd.DataFrame:
+def joined(T: Table, F: Table) -> pd.DataFrame:
     """Temperatures and frequencies side by side, as monitors want them."""
     if not (isinstance(T, pd.DataFrame) and isinstance(F, pd.DataFrame) and T.index.equals(F.index)):
         raise ValueError(
@@ -248,7 +246,7 @@ def joined(T: Any, F: Any) -> pd.DataFrame:
     return T.join(F)
 
 
-def _watching(monitor: Any, seed: int, T: Any, F: Any) -> Any:
+def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
     """A monitor that is fitted to the records."""
     if not hasattr(monitor, "update") or not hasattr(monitor, "fit"):
         raise ValueError(f"monitor gave {type(monitor).__name__!r}; expected an unfitted Monitor")
@@ -256,20 +254,20 @@ def _watching(monitor: Any, seed: int, T: Any, F: Any) -> Any:
     return monitor.fit(joined(T, F))
 
 
-def _facts(T: Any, F: Any) -> dict[str, Any]:
+def _facts(T: Table, F: Table) -> dict[str, float]:
     """Number of records, and share of values that are missing."""
     missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
     return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
 
 
-def _error(chain: Any, T: Any, F: Any) -> float:
+def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
     """Mean absolute error of the training frequencies in percent."""
     report = getattr(chain, "report_", None)
     errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
 
 
-def standing_of(monitor: Any) -> dict[str, Any]:
+def standing_of(monitor: Monitor) -> dict[str, Any]:
     """What a monitor says of its bridge."""
     days, events, drift = monitor.days_, monitor.events_, monitor.drift_
     damage = events[events["kind"] == "damage"]
@@ -290,14 +288,14 @@ def standing_of(monitor: Any) -> dict[str, Any]:
     return standing
 
 
-def _answers(name: Any, judged: pd.DataFrame) -> pd.DataFrame:
+def _answers(name: Hashable, judged: pd.DataFrame) -> pd.DataFrame:
     """Judgements with the name of their bridge."""
     judged = judged.rename_axis("time").reset_index()
     judged.insert(0, "bridge", pd.Series([name] * len(judged), dtype=object))
     return judged
 
 
-def _no_answer(name: Any, failure: Failure) -> pd.DataFrame:
+def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
     """One row for a bridge of which no new record was judged."""
     row = {"bridge": name, "time": pd.NaT, "state": "not judged", "index": np.nan, "reason": str(failure), "event": 0}
     return pd.DataFrame([row | {"revised": False}])
@@ -323,12 +321,14 @@ def by_value(thing: Any) -> bytes:
     return pickle.dumps(wrap_non_picklable_objects(thing, keep_wrapper=False))
 
 
-def seed_of(base: int, name: Any) -> int:
+def seed_of(base: int, name: Hashable) -> int:
     """The seed of a bridge, whatever the others are."""
     return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
 
 
-def content_of(estimator: Any, records: Any, monitor: Any) -> str:
+def content_of(
+    estimator: BaseEstimator, records: tuple[Table, Table], monitor: Callable[[BaseEstimator], Monitor] | None
+) -> str:
     """A text that is another one for other records, another estimator or monitor, or other versions."""
     versions = (skthermo.__version__, sklearn.__version__, joblib.__version__)
     return joblib.hash((versions, *(_content(part) for part in (estimator, records, monitor))))
@@ -348,12 +348,10 @@ def _content(part: Any) -> str:
 def _place(error: BaseException) -> str:
     """File, line and function of the last line in the package or in the user's code."""
     frames = list(traceback.walk_tb(error.__traceback__))
-    own = [one for one in frames if _package(one[0]) not in LIBRARIES | sys.stdlib_module_names]
+    packages = [str(frame.f_globals.get("__name__", "")).partition(".")[0] for frame, _ in frames]
+    foreign = LIBRARIES | sys.stdlib_module_names
+    own = [one for one, package in zip(frames, packages, strict=True) if package not in foreign]
     if not own:
         return ""
     frame, line = own[-1]
     return f"{Path(frame.f_code.co_filename).name}:{line} in {frame.f_code.co_name}"
-
-
-def _package(frame: Any) -> str:
-    return str(frame.f_globals.get("__name__", "")).partition(".")[0]

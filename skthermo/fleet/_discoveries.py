@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import false_discovery_control
 
-from skthermo._arguments import check_size
-from skthermo._formatting import counted_number, percent, significant
+from skthermo._estimators.arguments import check_size
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import counted_number, percent, significant
+from skthermo.monitoring import Monitor
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,12 +88,13 @@ class Discoveries:
 
 
 def discover(
-    monitors: Mapping[Hashable, Any], standings: Mapping[Hashable, Mapping[str, Any]], share: float, days: float
+    monitors: Mapping[Hashable, Monitor], standings: Mapping[Hashable, Mapping[str, Any]], share: float, days: float
 ) -> Discoveries:
     """Compare the events of all monitors that were open within so many days before the newest record of all."""
     share = check_size(share, "share", 0, 1, "a number between 0 and 1, such as 0.1")
     window = pd.Timedelta(days=check_size(days, "days", 0, np.inf, "a number of days, such as 365"))
-    begin = max((without_zone(standings[name]["last"]) for name in _seen(standings)), default=pd.NaT) - window
+    last = [without_zone(standing["last"]) for standing in standings.values() if not pd.isna(standing["last"])]
+    begin = max(last, default=pd.NaT) - window
     tables, p_values, years, promised, not_judged = [], {}, {}, 0.0, []
     for name in monitors:
         try:
@@ -119,7 +122,7 @@ def discover(
     return Discoveries(share, table, p, not_judged, false, promised)
 
 
-def _limits(p_values: Any, share: float) -> tuple[float, float]:
+def _limits(p_values: Array, share: float) -> tuple[float, float]:
     """The highest p value that is called, negative if none is, and the level at which p values are called."""
     n = len(p_values)
     if not n:
@@ -128,7 +131,7 @@ def _limits(p_values: Any, share: float) -> tuple[float, float]:
     return (float(called.max()) if len(called) else -1.0), share * max(len(called), 1) / n
 
 
-def _compared(monitor: Any, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
+def _compared(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
     """Events of a monitor with their p values, and the years that it has watched since then, or since the first."""
     if not len(monitor.days_) or pd.isna(begin):
         return monitor.events_.iloc[:0].assign(p_value=0.0), 0.0
@@ -137,11 +140,6 @@ def _compared(monitor: Any, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
     table = monitor.events_.loc[chances.index].assign(p_value=chances)
     table = table[~table["harmless"].astype(bool)]
     return table, monitor.years_watched(min([since, *table.loc[table["end"].isna(), "start"]]))
-
-
-def _seen(standings: Mapping[Hashable, Mapping[str, Any]]) -> list[Hashable]:
-    """Bridges of which there is a record since the fit."""
-    return [name for name, standing in standings.items() if not pd.isna(standing["last"])]
 
 
 def without_zone(stamp: pd.Timestamp) -> pd.Timestamp:

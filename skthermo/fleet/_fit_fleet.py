@@ -9,22 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sklearn.base import BaseEstimator
 
-from skthermo._arguments import check_jobs, check_path
+from skthermo._estimators.arguments import check_jobs, check_path
+from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
-from skthermo._warnings import warn_user
-from skthermo.fleet._bridge import Fit, Outcome, seed_of, standing_of, unpickled
+from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of, unpickled
 from skthermo.fleet._crew import work_off
-from skthermo.fleet._fleet import Fleet, warn_of_bridges
-from skthermo.fleet._in_words import named
+from skthermo.fleet._fleet import Fleet, named, warn_of_bridges
 from skthermo.fleet._kept import Kept
+from skthermo.monitoring import Monitor
 
 
 def fit_fleet(
-    makers: Mapping[Hashable, Any],
+    makers: Mapping[Hashable, BaseEstimator | Callable[[], BaseEstimator]],
     records: Mapping[Hashable, Any],
     *,
-    monitor: Callable[[Any], Any] | None = None,
+    monitor: Callable[[BaseEstimator], Monitor] | None = None,
     folder: str | os.PathLike[str] | None = None,
     n_jobs: int | None = None,
     random_state: int | np.random.RandomState | None = 0,
@@ -114,7 +115,7 @@ def fit_fleet(
     with kept.alone():
         kept.read()
         tasks = {
-            name: Fit(name, makers[name], records[name], monitor, seed_of(base, name), kept.outcomes.get(name))
+            name: BridgeFit(name, makers[name], records[name], monitor, seed_of(base, name), kept.outcomes.get(name))
             for name in makers
         }
         kept.outcomes = {name: kept.outcomes[name] for name in makers if name in kept.outcomes}
@@ -123,7 +124,8 @@ def fit_fleet(
             work = work_off(tasks, n_jobs)
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 if not result.is_as_before:
-                    if begins_again(tasks[name].known, result.outcome):
+                    before = tasks[name].known
+                    if before is not None and before.standing["n_judged"] and before.content != result.outcome.content:
                         kept.set_aside(name)
                         begun_again.append(name)
                     kept.put(result.outcome, result.fitted)
@@ -145,11 +147,6 @@ def fit_fleet(
             "monitors that begin again",
         )
     return fleet
-
-
-def begins_again(before: Outcome | None, now: Outcome) -> bool:
-    """Whether a monitor that has judged records is replaced by another."""
-    return before is not None and before.standing["n_judged"] > 0 and before.content != now.content
 
 
 def _restore(kept: Kept, name: Hashable) -> None:

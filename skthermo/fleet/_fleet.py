@@ -3,24 +3,86 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
-from skthermo._arguments import check_jobs, check_path
-from skthermo._formatting import counted
+from skthermo._estimators.arguments import check_jobs, check_path
+from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
-from skthermo._warnings import warn_user
-from skthermo.fleet._bridge import NOT_WATCHED, Outcome, Update, pickled, unpickled
+from skthermo._tables.text import counted
+from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, pickled, unpickled
 from skthermo.fleet._crew import work_off
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
-from skthermo.fleet._in_words import in_words, kinds, named
 from skthermo.fleet._kept import Kept
+from skthermo.monitoring import Monitor
+
+MOST_NAMED = 5  # bridges or kinds in a sentence
+SILENT = 7  # days without a record, after which a bridge counts as silent
 
 ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
+
+
+def in_words(fleet: Fleet) -> str:
+    """What was fitted, and how the bridges stand."""
+    return "\n".join(_sentences(fleet))
+
+
+def _sentences(fleet: Fleet) -> Iterator[str]:
+    table = fleet.table
+    broken = table.index[~table["is_fitted"]]
+    yield f"{int(table['is_fitted'].sum())} of {len(table)} bridges are fitted."
+    if len(broken):
+        yield f"Not fitted: {named(broken)}."
+    fitted = table[table["is_fitted"]]
+    watched = fitted[fitted["state"] != ""]
+    if len(watched) < len(fitted):
+        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor: nothing is known of their state."
+    if len(watched):
+        begun = watched["last"].notna()
+        if not begun.all():
+            yield (
+                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted: nothing is "
+                "known of their bridges."
+            )
+        watched = watched[begun]
+    if len(watched):
+        state = watched["state"]
+        yield (
+            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not judged').sum()} "
+            f"cannot judge, {(state == 'healthy').sum()} saw no change in their newest record."
+        )
+        if (state == "alarm").any():
+            yield f"In alarm: {named(watched.index[state == 'alarm'])}."
+        if (state == "not judged").any():
+            yield f"Not judged, and so not known to be healthy: {named(watched.index[state == 'not judged'])}."
+        silent = watched.index[(state != "not judged") & (watched["days_silent"] > SILENT)]
+        if len(silent):
+            yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."
+    failed = fitted.index[fitted["error"] != ""]
+    if len(failed):
+        yield f"Fitted, but with an error since: {named(failed)}."
+    warned = fleet.warnings
+    if len(warned):
+        yield f"Warnings: {kinds(warned)}."
+
+
+def named(names: Sequence[Hashable] | pd.Index) -> str:
+    """The first names, and how many there are besides."""
+    shown = ", ".join(str(name) for name in names[:MOST_NAMED])
+    return shown if len(names) <= MOST_NAMED else f"{shown} and {len(names) - MOST_NAMED} more"
+
+
+def kinds(warned: pd.DataFrame) -> str:
+    """Kinds of warnings by how many bridges gave them."""
+    numbers = warned.groupby("kind")["bridge"].nunique().sort_values(ascending=False, kind="stable")
+    shown = [f"{kind!r} of {counted(number, 'bridge')}" for kind, number in numbers.iloc[:MOST_NAMED].items()]
+    rest = [f"{len(numbers) - MOST_NAMED} other kinds"] if len(numbers) > MOST_NAMED else []
+    return ", ".join(shown + rest).replace("\N{NO-BREAK SPACE}", " ")
 
 
 class Fleet:
@@ -105,16 +167,16 @@ class Fleet:
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
 
     @property
-    def _outcomes(self) -> dict[Hashable, Outcome]:
+    def _outcomes(self) -> dict[Hashable, BridgeOutcome]:
         return self._kept.outcomes
 
     @property
-    def chains(self) -> Mapping[Hashable, Any]:
+    def chains(self) -> Mapping[Hashable, BaseEstimator]:
         """Fitted estimators by name, read when asked for."""
         return ReadWhenAsked({n: (self._kept, 0) for n, one in self._outcomes.items() if one.is_fitted})
 
     @property
-    def monitors(self) -> Mapping[Hashable, Any]:
+    def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
         watched = (n for n, one in self._outcomes.items() if one.is_fitted and one.is_watched)
         return ReadWhenAsked(dict.fromkeys(watched, (self._kept, 1)))
@@ -220,7 +282,7 @@ class Fleet:
             known = set(kept.outcomes)
             kept.read()  # another process may have updated the folder since
             kept.outcomes = {name: one for name, one in kept.outcomes.items() if name in known}
-            tasks = {name: Update(name, kept.outcomes[name], given, kept) for name, given in records.items()}
+            tasks = {name: BridgeUpdate(name, kept.outcomes[name], given, kept) for name, given in records.items()}
             work = work_off(tasks, n_jobs)
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 kept.put(result.outcome, result.fitted)
@@ -320,7 +382,7 @@ class ReadWhenAsked(Mapping):
         return f"<{len(self)} fitted objects by name, read when asked for>"
 
 
-def _row(one: Outcome) -> dict[str, Any]:
+def _row(one: BridgeOutcome) -> dict[str, Any]:
     """One bridge in the table."""
     facts = {"n_records": 0, "gaps": np.nan, "mape": np.nan} | one.facts
     standing = one.standing if one.is_fitted else NOT_WATCHED

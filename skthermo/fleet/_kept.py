@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from skthermo._io import alone_with, write_when_complete
-from skthermo.fleet._bridge import Failure, Outcome
+from skthermo.fleet._bridge import BridgeOutcome, Failure
 
 ENDING, REPLACED = ".bridge", ".replaced"
 LONGEST = 40  # letters of a name that its file shows
@@ -24,7 +24,7 @@ class Kept:
     """Outcomes by name, at hand; fitted objects as bytes, in memory or in a folder."""
 
     folder: Path | None = None
-    outcomes: dict[Hashable, Outcome] = field(default_factory=dict)
+    outcomes: dict[Hashable, BridgeOutcome] = field(default_factory=dict)
     in_memory: dict[Hashable, bytes] = field(default_factory=dict)
 
     def read(self) -> None:
@@ -35,10 +35,10 @@ class Kept:
             try:
                 outcome = _content(file)[0]
             except Exception as error:  # damaged files raise errors of every type
-                outcome = Outcome(file.stem, failures=(Failure.of("reading its file", error),))
+                outcome = BridgeOutcome(file.stem, failures=(Failure.of("reading its file", error),))
             self.outcomes[outcome.name] = outcome
 
-    def put(self, outcome: Outcome, fitted: bytes | None) -> None:
+    def put(self, outcome: BridgeOutcome, fitted: bytes | None) -> None:
         """Keep what is known of a bridge; without bytes, its fitted objects stay what they are."""
         if fitted is None:
             fitted = self.fitted(outcome.name) if outcome.is_fitted else b""
@@ -76,7 +76,7 @@ class Kept:
         return self.folder / f"{shown}-{sha256(repr(name).encode()).hexdigest()[:10]}{ENDING}"
 
 
-def _content(file: Path) -> tuple[Outcome, bytes]:
+def _content(file: Path) -> tuple[BridgeOutcome, bytes]:
     """What `Kept.put` wrote, with a checksum."""
     outcome, fitted = pickle.loads(zlib.decompress(file.read_bytes()))
     return outcome, fitted

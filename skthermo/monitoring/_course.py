@@ -11,48 +11,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._saved_frames import SavesFrames
-from skthermo.monitoring._direction import Direction
+from skthermo._tables.arrays import Array
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._corrections import Corrections, CorrectionState
 from skthermo.monitoring._events import EventLog
-from skthermo.monitoring._judge import Judge
-from skthermo.monitoring._promise import EventRule
-from skthermo.monitoring._records import Plausible, RecordStore, stamps_of
-from skthermo.monitoring._stages import Stages, StageState
+from skthermo.monitoring._records import RecordStore
 
 ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
-
-
-@dataclass(frozen=True)
-class Bench:
-    """What records go through: plausible values, stages, the detector, the direction. It does not change.
-
-    Without a direction, all changes are damage.
-    """
-
-    plausible: Plausible
-    stages: Stages
-    judge: Judge
-    direction: Direction | None
-    threshold: float
-    release: float
-
-    def series(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
-        """Index of the records from a position on for each kind of event.
-
-        It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
-        """
-        if self.direction is None:
-            return {"damage": index}
-        with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.release)
-        stiffer = np.zeros(len(index), dtype=bool)
-        if wanted.any():
-            begin = self.judge.memory.start(stamps_of(records), first)
-            signs = self.direction.of_rows(records.iloc[begin:][self.judge.columns], wanted[begin:])
-            stiffer = signs[first - begin :] < 0
-        softer = wanted[first:] & ~stiffer
-        return {"damage": np.where(stiffer, np.nan, index), "stiffening": np.where(softer, np.nan, index)}
 
 
 @dataclass(frozen=True)
@@ -60,7 +26,7 @@ class Checkpoint(SavesFrames):
     """Where everything stood at the beginning of a day, before its first record."""
 
     day: pd.Timestamp
-    stages: StageState
+    corrections: CorrectionState
     log: EventLog
 
 
@@ -78,79 +44,81 @@ class Course(SavesFrames):
     days: pd.DataFrame
 
     @classmethod
-    def of(cls, bench: Bench, baseline: pd.DataFrame, log: EventLog) -> Course:
+    def of(cls, active: ActiveDetector, baseline: pd.DataFrame) -> Course:
         """The course that begins after a baseline, whose last records are the first memory."""
-        times, end = stamps_of(baseline), baseline.index[-1]
-        start = bench.judge.memory.start(times, len(times), int(times[-1]) + 1)
+        times, end = baseline.index.asi8, baseline.index[-1]
+        start = active.memory.start(times, len(times), int(times[-1]) + 1)
         nothing = nothing_judged(baseline.index[:0])
-        checkpoint = Checkpoint(end.normalize(), bench.stages.start(), log)
-        return cls(bench.plausible.cleaned(baseline)[0].iloc[start:], (checkpoint,), log, nothing, _days_of(nothing))
+        checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
+        return cls(
+            active.plausible.cleaned(baseline)[0].iloc[start:],
+            (checkpoint,),
+            checkpoint.log,
+            nothing,
+            _days_of(nothing),
+        )
 
     @property
-    def stages(self) -> StageState:
-        """States of the stages at the beginning of the newest day."""
-        return self.checkpoints[-1].stages
+    def corrections(self) -> CorrectionState:
+        """States of the corrections at the beginning of the newest day."""
+        return self.checkpoints[-1].corrections
 
-    def advanced(self, bench: Bench, fresh: pd.DataFrame, store: RecordStore) -> tuple[Course, pd.DataFrame]:
+    def advanced(self, active: ActiveDetector, fresh: pd.DataFrame, store: RecordStore) -> tuple[Course, pd.DataFrame]:
         """The course after new records, which are in the store already, and what it says of these and of later ones.
 
         It goes on from the beginning of the day of the first new record, and judges all records from that one on.
         """
-        first = fresh.index[0]
+        first, rules = fresh.index[0], active.rules
         place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
         begin = self.checkpoints[place]
         raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
-        cleaned, marks = bench.plausible.cleaned(raw)
-        days, states, corrected = _through_stages(bench.stages, begin, cleaned)
+        cleaned, marks = active.plausible.cleaned(raw)
+        days, states, corrected = _corrected_by_day(active.corrections, begin, cleaned)
         memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
         records, n_memory = pd.concat([memory, corrected]), len(memory)
         told = self.judged.iloc[slice(*self.judged.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
         new = n_memory + len(told)
-        index = np.append(told["index"].to_numpy(), bench.judge.index(records, new))
-        series, times = bench.series(records, n_memory, index), stamps_of(raw)
-        is_open = np.any(list(begin.log.follow(series, times)[0].values()), axis=0) & ~np.isnan(index)
+        index = np.append(told["index"].to_numpy(), active.index(records, new))
+        series, times = active.by_kind(records, n_memory, index), raw.index.asi8
+        is_open = np.any(list(begin.log.follow(rules, series, times)[0].values()), axis=0) & ~np.isnan(index)
         modes, rows = np.full(len(raw), "", dtype=object), np.flatnonzero(is_open)
-        modes[rows] = bench.judge.drivers(records, rows + n_memory)
+        modes[rows] = active.drivers(records, rows + n_memory)
         bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
         log, numbers, points = begin.log, {kind: np.zeros(len(raw), dtype=np.int64) for kind in series}, []
         for day, state, (start, stop) in zip(days, states, pairwise(bounds), strict=True):
             points.append(Checkpoint(day, state, log))
             own = slice(start, stop)
-            found, log = log.follow({kind: one[own] for kind, one in series.items()}, times[own], modes[own])
+            found, log = log.follow(rules, {kind: one[own] for kind, one in series.items()}, times[own], modes[own])
             for kind, number in found.items():
                 numbers[kind][own] = number
-        reasons = bench.judge.reasons(records, new, index[len(told) :], marks[len(told) :])
+        reasons = active.reasons(records, new, index[len(told) :], marks[len(told) :])
         reasons = _with_stiffening(told["reason"].tolist() + reasons, numbers, len(told))
-        answers = _answers(raw.index, index, bench.threshold, modes, reasons, numbers)
+        answers = _answers(raw.index, index, active.threshold, modes, reasons, numbers)
         points = _since([*self.checkpoints[:place], *points], store.last - store.late)
-        needed = bench.judge.memory.start(
-            stamps_of(records), records.index.searchsorted(points[0].day), points[0].day.value
-        )
+        needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
         judged = pd.concat([self.judged.iloc[: self.judged.index.searchsorted(begin.day)], answers])
         course = Course(
             records.iloc[min(needed, records.index.searchsorted(store.last - store.keep)) :],
             tuple(points),
             log,
             judged.iloc[judged.index.searchsorted(store.last - store.keep) :],
-            self._with_days(bench.stages, days, states, answers),
+            self._with_days(active.corrections, days, states, answers),
         )
         return course, self._news(answers.iloc[len(told) :], fresh.index)
 
-    def handed_over(
-        self, bench: Bench, store: RecordStore, rules: dict[str, EventRule], end: int | None = None
-    ) -> Course:
+    def handed_over(self, active: ActiveDetector, store: RecordStore, end: int | None = None) -> Course:
         """The course with another detector, which judges the records of the newest day anew.
 
         With an ``end``, events that are open have ended then, and sensors are watched from new.
         """
-        points = tuple(replace(one, log=one.log.under(rules, end)) for one in self.checkpoints)
+        points, log = self.checkpoints, self.log
         if end is not None:
-            points = tuple(replace(one, stages=bench.stages.start()) for one in points)
+            log, start = log.ended(end), active.corrections.start()
+            points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
         day = points[-1].day
-        before = self.judged[self.judged.index < day]
-        course = replace(self, checkpoints=points, log=self.log.under(rules, end), judged=before)
+        course = replace(self, checkpoints=points, log=log, judged=self.judged[self.judged.index < day])
         today = store.kept[store.kept.index >= day]
-        return course.advanced(bench, today, store)[0] if len(today) else course
+        return course.advanced(active, today, store)[0] if len(today) else course
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
         """The answers to new records, and those to others that have changed."""
@@ -164,29 +132,33 @@ class Course(SavesFrames):
         return answers.assign(revised=changed)[is_new | changed]
 
     def _with_days(
-        self, stages: Stages, days: Sequence[pd.Timestamp], states: Sequence[StageState], answers: pd.DataFrame
+        self,
+        corrections: Corrections,
+        days: Sequence[pd.Timestamp],
+        states: Sequence[CorrectionState],
+        answers: pd.DataFrame,
     ) -> pd.DataFrame:
         """Daily summaries, those of some days anew."""
         new = _days_of(answers)
-        if stages.drift is not None:
+        if corrections.drift is not None:
             by_day = dict(zip(days, states, strict=True))
-            shares = pd.DataFrame({day: stages.drifts(by_day[day])["taken_out"] for day in new.index}).T
+            shares = pd.DataFrame({day: corrections.drifts(by_day[day])["taken_out"] for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
         before = self.days.iloc[: self.days.index.searchsorted(days[0])]
         return pd.concat([before, new]) if len(before) else new
 
 
-def _through_stages(
-    stages: Stages, begin: Checkpoint, records: pd.DataFrame
-) -> tuple[list[pd.Timestamp], list[StageState], pd.DataFrame]:
-    """Days from a checkpoint to the last record, the states of the stages before each, and the corrected records."""
+def _corrected_by_day(
+    corrections: Corrections, begin: Checkpoint, records: pd.DataFrame
+) -> tuple[list[pd.Timestamp], list[CorrectionState], pd.DataFrame]:
+    """Days from a checkpoint to the last record, states of the corrections before each, and the corrected records."""
     days = list(pd.date_range(begin.day, records.index[-1].normalize(), freq="D"))
     bounds = [*records.index.searchsorted(pd.DatetimeIndex(days)), len(records)]
     parts = [records.iloc[start:stop] for start, stop in pairwise(bounds)]
-    states = [begin.stages]
+    states = [begin.corrections]
     for day in parts[:-1]:
-        states.append(stages.advance(states[-1], day))
-    corrected = [stages.corrected(state, day) for state, day in zip(states, parts, strict=True) if len(day)]
+        states.append(corrections.advance(states[-1], day))
+    corrected = [corrections.corrected(state, day) for state, day in zip(states, parts, strict=True) if len(day)]
     return days, states, pd.concat(corrected)
 
 
@@ -237,16 +209,14 @@ def _days_of(answers: pd.DataFrame) -> pd.DataFrame:
 
     ``n_records``, of which ``n_judged`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if none is judged.
     """
-    day = answers.index.normalize()
-    starts = np.flatnonzero(np.append(True, day[1:] != day[:-1])) if len(day) else np.empty(0, dtype=np.intp)
-    stops = np.append(starts, len(day))[1:]
-    index, is_alarm = answers["index"].to_numpy(), (answers["state"] == "alarm").to_numpy()
-    known = [index[start:stop][~np.isnan(index[start:stop])] for start, stop in zip(starts, stops, strict=True)]
-    table = {
-        "n_records": stops - starts,
-        "n_judged": np.array([len(values) for values in known], dtype=np.int64),
-        "n_alarms": np.array([is_alarm[a:b].sum() for a, b in zip(starts, stops, strict=True)], dtype=np.int64),
-        "index_median": np.array([np.median(values) if len(values) else np.nan for values in known], dtype=float),
-        "index_max": np.array([values.max() if len(values) else np.nan for values in known], dtype=float),
-    }
-    return pd.DataFrame(table, day[starts].rename("day"))
+    by_day = answers.assign(is_alarm=answers["state"] == "alarm").groupby(answers.index.normalize().rename("day"))
+    index = by_day["index"]
+    return pd.DataFrame(
+        {
+            "n_records": by_day.size(),
+            "n_judged": index.count(),
+            "n_alarms": by_day["is_alarm"].sum().astype("int64"),
+            "index_median": index.median(),
+            "index_max": index.max(),
+        }
+    )

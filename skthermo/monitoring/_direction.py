@@ -13,10 +13,10 @@ from scipy.optimize import nnls
 from scipy.stats import chi
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array
-from skthermo._gaussian import Gaussian, whitenings
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array
 from skthermo._validation import last_step
-from skthermo._warnings import without_warnings
+from skthermo.residuals.gaussian import Gaussian, whitenings
 
 LOWERED = 1e-3  # share by which a frequency is lowered to see what the detector gets
 MIXED = 0.02  # share of a squared departure that raised frequencies may leave where it counts as stiffening
@@ -39,7 +39,7 @@ class Direction:
 
     steps: Any
     columns: list
-    window: int | str
+    window: int | pd.Timedelta
     lowered: Array
     baseline: Gaussian
 
@@ -49,7 +49,8 @@ class Direction:
         while hasattr(last_step(detector), "detectors_"):  # several that are fused: the first speaks for all
             detector = last_step(detector).detectors_[0]
         steps = detector[:-1] if isinstance(detector, Pipeline) and len(detector) > 1 else None
-        columns, window = list(targets), getattr(last_step(detector), "window", 1)
+        columns, lookback = list(targets), getattr(last_step(detector), "lookback_", 0)
+        window = pd.Timedelta(lookback) if isinstance(lookback, np.timedelta64) else lookback + 1
         some = baseline.iloc[-MOST_ROWS:]
         before, lowered = _features(steps, columns, some), []
         for mode in columns:
@@ -87,6 +88,6 @@ def _features(steps: Any, columns: list, X: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(np.asarray(features, dtype=float), X.index)
 
 
-def _means(features: pd.DataFrame, window: int | str) -> Array:
+def _means(features: pd.DataFrame, window: int | pd.Timedelta) -> Array:
     """Mean of what is there in the window that ends with each row."""
     return features.rolling(window, min_periods=1).mean().to_numpy()

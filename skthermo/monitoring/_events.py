@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.monitoring._promise import EventRule, EventState
 
 
@@ -31,18 +31,21 @@ class Event:
 class EventLog:
     """All events in order of their start, and for each kind whether one is open."""
 
-    rules: dict[str, EventRule]
     states: dict[str, EventState] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
 
     def follow(
-        self, by_kind: dict[str, Array], times: NDArray[np.int64], modes: Sequence[str] | None = None
+        self,
+        rules: dict[str, EventRule],
+        by_kind: dict[str, Array],
+        times: NDArray[np.int64],
+        modes: Sequence[str] | None = None,
     ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
         modes = [""] * len(times) if modes is None else modes
         is_open, states = {}, dict(self.states)
         for kind, index in by_kind.items():
-            is_open[kind], states[kind] = self.rules[kind].follow(states.get(kind, EventState()), index, times)
+            is_open[kind], states[kind] = rules[kind].follow(states.get(kind, EventState()), index, times)
         events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
@@ -55,14 +58,12 @@ class EventLog:
                 closing = np.flatnonzero(~is_open[kind][begin:end])
                 end_time = int(times[begin + closing[0]]) if len(closing) else None
                 events[n] = _grown(events[n], index, times, modes, inside, end_time)
-        return numbers, replace(self, states=states, events=tuple(events))
+        return numbers, EventLog(states, tuple(events))
 
-    def under(self, rules: dict[str, EventRule], end: int | None = None) -> EventLog:
-        """The log under other rules; with an ``end``, open events ended then, or at their start if that is later."""
-        if end is None:
-            return replace(self, rules=rules)
+    def ended(self, end: int) -> EventLog:
+        """The log in which open events ended at a time, or at their start if that is later."""
         events = tuple(e if e.end is not None else replace(e, end=max(e.start, end)) for e in self.events)
-        return EventLog(rules, {}, events)
+        return EventLog(events=events)
 
     def _openings(self, is_open: dict[str, NDArray[np.bool_]]) -> list[tuple[int, str]]:
         """Record and kind of each event that opens, in order of time."""

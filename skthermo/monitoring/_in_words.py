@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._formatting import counted_number
+from skthermo._tables.text import counted_number
 
 MOST_EVENTS = 5  # that are told, the latest ones
 
@@ -25,7 +25,7 @@ def in_words(monitor: Any) -> str:
         *_sensors(monitor.faults_),
     ]
     if monitor.drift_ is not None:
-        lines += _drift(monitor.drift_, monitor.course_.stages.drift.n_left_out)
+        lines += _drift(monitor.drift_, monitor.course_.corrections.drift.n_left_out)
     return "\n".join(lines)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,8 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.pipeline import Pipeline
 
-from skthermo._arguments import is_model
-from skthermo.detection import WindowedAlarm
-from skthermo.preprocessing import ExponentialMeans, HampelFilter, LagFeatures
+from skthermo._estimators.arguments import is_model
+from skthermo.preprocessing import HampelFilter
 
 Path = tuple[tuple[int, int], ...]
 """Reaches of the steps on one way through a detector, the last step first: (rows, nanoseconds), one of them zero."""
@@ -28,7 +28,7 @@ class Memory:
 
     @classmethod
     def of(cls, detector: Any) -> Memory:
-        """That of a fitted detector: lags and windows in a row add up, beside each other the longest counts."""
+        """That of a fitted detector by ``lookback_`` of its parts: those in a row add up, of several ways all count."""
         return cls(tuple(sorted(_paths(detector, set()))))
 
     @classmethod
@@ -39,6 +39,12 @@ class Memory:
     def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
         """Position of the earliest record that is needed for the one at a position, or at a time before it."""
         return min(_back(path, times, place, time) for path in self.paths)
+
+    def duration(self, step: pd.Timedelta) -> pd.Timedelta:
+        """The longest of all ways in time, of records that are so far apart."""
+        return max(
+            sum((n * step + pd.Timedelta(time, "ns") for n, time in path), pd.Timedelta(0)) for path in self.paths
+        )
 
     def __str__(self) -> str:
         """The reaches in words, such as "30 h" or "24 records and 30 h"."""
@@ -73,18 +79,11 @@ def _paths(part: Any, seen: set[int]) -> set[Path]:
             f"the detector holds {part!r:.100}, which compares records with later ones; expected steps that look back "
             "only: filter the baseline before fit"
         )
-    if isinstance(part, LagFeatures) and hasattr(part, "lags_"):
-        lags = max(part.lags_)
-        if part.freq_ is None:
-            return {((lags, 0),)} if lags else {()}
-        nanoseconds = lags * part.freq_ + part.tolerance_
-        return {((0, int(nanoseconds.astype("timedelta64[ns]").astype(np.int64))),)} if lags else {()}
-    if isinstance(part, ExponentialMeans) and hasattr(part, "time_constants_"):
-        return {((0, part.reach_) if part.stamps_ is not None else (part.reach_, 0),)}
-    if isinstance(part, WindowedAlarm) and hasattr(part, "law_"):
-        if isinstance(part.window, str):
-            return {((0, pd.Timedelta(part.window).as_unit("ns").value),)}
-        return {((part.window - 1, 0),)} if part.window > 1 else {()}
+    if hasattr(part, "lookback_"):
+        lookback = part.lookback_
+        is_time = isinstance(lookback, np.timedelta64 | timedelta)
+        reach = (0, pd.Timedelta(lookback).as_unit("ns").value) if is_time else (int(lookback), 0)
+        return {(reach,)} if any(reach) else {()}
     found = set().union(*(_paths(inner, seen) for inner in _inner(part)))
     return found or {()}
 
@@ -98,12 +97,3 @@ def _inner(part: Any) -> Iterator[Any]:
                 made = isinstance(inner, BaseEstimator) or (is_dataclass(inner) and not isinstance(inner, type))
                 if made and not is_model(inner):
                     yield inner
-
-
-def _walk(part: Any, seen: set[int]) -> Iterator[Any]:
-    """A part and all within it, each once."""
-    if id(part) not in seen:
-        seen.add(id(part))
-        yield part
-        for inner in _inner(part):
-            yield from _walk(inner, seen)

@@ -6,15 +6,17 @@ import os
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._arguments import check_flag
-from skthermo._frames import positions_of
-from skthermo._saved_frames import SavesFrames
+from skthermo._estimators.arguments import check_flag
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.frames import positions_of
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -22,37 +24,24 @@ from skthermo._validation import (
     StrOptions,
     _fit_context,
     check_is_fitted,
-    last_step,
     seed_parts,
     seeded,
 )
-from skthermo._warnings import warn_user
 from skthermo.detection import TemperatureCompensator
-from skthermo.monitoring._course import Bench, Course, nothing_judged
-from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._events import Acknowledgement, EventLog, event_table
+from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._corrections import Corrections
+from skthermo.monitoring._course import Course, nothing_judged
+from skthermo.monitoring._events import Acknowledgement, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._in_words import in_words
-from skthermo.monitoring._judge import Judge
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import YEAR, EventRule, Promise, promised_rule, release_level
-from skthermo.monitoring._records import Intake, Plausible, RecordStore, read_records
-from skthermo.monitoring._stages import Stages
+from skthermo.monitoring._promise import Promise
+from skthermo.monitoring._records import Intake, RecordStore, read_records
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
+from skthermo.preprocessing.checks import Plausible
 
-ONE_DAY = pd.Timedelta("1D")
 COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
 MOST_CAUSES = 3  # in a warning
-
-
-class Charge(NamedTuple):
-    """A fitted detector and all by which it judges."""
-
-    detector: Any
-    memory: Memory
-    promise: Promise
-    rules: dict[str, EventRule]
-    bench: Bench
 
 
 class Monitor(SavesFrames, Estimator):
@@ -127,9 +116,9 @@ class Monitor(SavesFrames, Estimator):
         After `begin_again`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
-    bench_, store_, course_, said_ : object
-        What records go through; the records; judgements so far, and the checkpoints from which late records are judged;
-        what the owner has said of events.
+    active_, store_, course_, said_ : object
+        The detector in charge and all by which it judges; the records; judgements so far, and the checkpoints from
+        which late records are judged; what the owner has said of events.
 
     See Also
     --------
@@ -234,7 +223,7 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing.
         """
         late, keep = (_duration(getattr(self, name), name) for name in ("late", "keep"))
-        if keep < late + 2 * ONE_DAY:
+        if keep < late + 2 * DAY:
             raise ValueError(f"keep is {self.keep!r} and late {self.late!r}; expected to keep records two days longer")
         baseline = read_records(X)
         if not len(baseline):
@@ -252,20 +241,20 @@ class Monitor(SavesFrames, Estimator):
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
         self.targets_ = self._frequency_columns(baseline, compensators)
         columns = list(baseline.columns) if compensators else self.targets_
-        anything = Plausible.of_anything(baseline)
-        n_markers, cleaned = int(anything.implausible(baseline).sum()), anything.cleaned(baseline)[0]
+        anything = Plausible.of_anything(baseline.shape[1])
+        n_markers, cleaned = int(anything.implausible(baseline.to_numpy()).sum()), anything.cleaned(baseline)[0]
         if n_markers:
             warn_user(
                 f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
                 "markers",
             )
-        stages = Stages.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
-        charge = self._charge_of(detector.fit(cleaned[columns]), cleaned, columns, stages)
-        charge.bench.judge.check_memory(cleaned)
+        corrections = Corrections.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
+        active = self._activated(detector.fit(cleaned[columns]), cleaned, columns, corrections)
+        active.check_memory()
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.promises_: tuple[tuple[pd.Timestamp, Promise], ...] = ()
-        self._put_in_charge(charge, cleaned, Course.of(charge.bench, baseline, EventLog(charge.rules)))
+        self.active_, self.course_ = active, Course.of(active, baseline)
+        self.promises_ = ((self.last_, self.promise_),)
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
         self.prior_, self.since_ = None, None
@@ -304,7 +293,7 @@ class Monitor(SavesFrames, Estimator):
         store, course = self.store_.with_records(intake.fresh), self.course_
         answers = nothing_judged(self.baseline_.index[:0]).assign(revised=False)
         if len(intake.fresh):
-            course, answers = course.advanced(self.bench_, intake.fresh, store)
+            course, answers = course.advanced(self.active_, intake.fresh, store)
         if len(intake.too_late):
             refused = nothing_judged(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
@@ -346,9 +335,9 @@ class Monitor(SavesFrames, Estimator):
             judged = judged[judged >= pd.Timestamp(since).floor("D")]
         if not len(judged):
             return 0.0
-        steps = np.diff(judged.as_unit("ns").asi8) / ONE_DAY.value
+        steps = np.diff(judged.as_unit("ns").asi8) / DAY.value
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
-        return float((1 + np.minimum(steps, longest).sum()) * (ONE_DAY / YEAR))
+        return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
     def event_chances(self, since: Any = None) -> pd.Series:
         """How probable so high a peak is for a healthy structure, by event.
@@ -362,7 +351,7 @@ class Monitor(SavesFrames, Estimator):
         -------
         Series
             By number of the event, for those of damage: the probability that a healthy structure has so high a peak in
-            the time watched since then. NaN where the monitor is of an earlier version, which does not tell.
+            the time watched since then.
 
         Notes
         -----
@@ -380,9 +369,8 @@ class Monitor(SavesFrames, Estimator):
             events = events[events["end"].isna() | (events["end"] >= begin)]
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
-        promises = getattr(self, "promises_", ((self.baseline_.index[0], self.promise_),))
         chances = [
-            [promise for taken, promise in promises if taken <= event["start"]][-1].chance(event["peak"], n_years)
+            [promise for taken, promise in self.promises_ if taken <= event["start"]][-1].chance(event["peak"], n_years)
             for _, event in events.iterrows()
         ]
         return pd.Series(chances, events.index, dtype=float, name="chance")
@@ -452,10 +440,9 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         if records is not None:
-            records = self.bench_.plausible.cleaned(
-                read_records(records, self.baseline_.columns, self.baseline_.index.tz)
-            )[0]
-        retraining = retrained(self, records, until=until, force=check_flag(force, "force"), limit=self._limit)
+            records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
+            records = self.active_.plausible.cleaned(records)[0]
+        retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
@@ -492,57 +479,33 @@ class Monitor(SavesFrames, Estimator):
         cover their time of the year. Call again as days come; `refit` goes on in the same way.
         """
         check_is_fitted(self)
-        retraining = begun_again(self, since, until=until, limit=self._limit)
+        retraining = begun_again(self, since, self._activated, until=until)
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
 
-    def _charge_of(self, detector: Any, trained: pd.DataFrame, columns: list[Any], stages: Stages) -> Charge:
-        """All by which a detector judges that was fitted on some records."""
-        memory = Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory"))
-        index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind = None, {"damage": index}
-        if self.direction == "softening":
-            direction = Direction.of(detector, trained[columns], self.targets_)
-            stiffer = direction.of_rows(trained[columns]) < 0
-            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
-            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        level = release_level(index, ONE_DAY)
-        promises = {
-            kind: promised_rule(one, self.false_alarms_per_year, hold=ONE_DAY, release=level)
-            for kind, one in by_kind.items()
-        }
-        rules = {kind: promise.rule for kind, promise in promises.items()}
-        judge = Judge.of(detector, memory, columns, self.targets_, trained)
-        release = min(one.release for one in rules.values())
-        threshold = rules["damage"].threshold
-        bench = Bench(Plausible.of(trained, self.targets_), stages, judge, direction, threshold, release)
-        return Charge(detector, memory, promises["damage"], rules, bench)
-
-    def _put_in_charge(self, charge: Charge, trained: pd.DataFrame, course: Course) -> None:
-        self.detector_, self.memory_, self.promise_, self.bench_ = (
-            charge.detector,
-            charge.memory,
-            charge.promise,
-            charge.bench,
+    def _activated(
+        self,
+        detector: Any,
+        trained: pd.DataFrame,
+        columns: list[Any] | None = None,
+        corrections: Corrections | None = None,
+    ) -> ActiveDetector:
+        """All by which a detector judges that was fitted on some records; by default as the one in charge."""
+        return ActiveDetector.of(
+            detector,
+            trained,
+            self.active_.columns if columns is None else columns,
+            self.targets_,
+            self.active_.corrections if corrections is None else corrections,
+            Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory")),
+            by_direction=self.direction == "softening",
+            per_year=self.false_alarms_per_year,
         )
-        self.threshold_, self.release_ = charge.promise.rule.threshold, charge.promise.rule.release
-        self.promises_ = (*self.promises_, (self.last_, charge.promise))
-        self.trained_, self.course_ = trained, course
-
-    def _limit(self, detector: Any, trained: pd.DataFrame) -> float:
-        """The promised threshold of a detector that was fitted on some records."""
-        return self._charge_of(detector, trained, self.bench_.judge.columns, self.bench_.stages).promise.rule.threshold
-
-    def _renewed_chain(self, trained: pd.DataFrame) -> Any:
-        """The chain of the structure after an intervention, from which drift is followed; None without one."""
-        if self.fem is None:
-            return None
-        return clone(self.fem).fit(trained.drop(columns=self.targets_), trained[self.targets_])
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, stages, said = retraining.baseline, None, self.bench_.stages, self.said_
+        trained, end, corrections, said = retraining.baseline, None, self.active_.corrections, self.said_
         if retraining.kind == "new baseline":
             end = (self.last_ + pd.Timedelta("1s")).as_unit("ns").value
             note = f"ended by the new baseline since {retraining.since}"
@@ -552,10 +515,12 @@ class Monitor(SavesFrames, Estimator):
                 for one, is_known in zip(self.course_.log.events, known, strict=True)
                 if one.end is None and not is_known
             )
-            stages = Stages.of(trained, self.targets_, fem=self._renewed_chain(trained), sensors=self.sensors)
-        charge = self._charge_of(retraining.detector, trained, self.bench_.judge.columns, stages)
-        course = self.course_.handed_over(charge.bench, self.store_, charge.rules, end)
-        self._put_in_charge(charge, trained, course)
+            T, F = trained.drop(columns=self.targets_), trained[self.targets_]
+            fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
+            corrections = Corrections.of(trained, self.targets_, fem=fem, sensors=self.sensors)
+        active = self._activated(retraining.detector, trained, corrections=corrections)
+        self.course_ = self.course_.handed_over(active, self.store_, end)
+        self.active_, self.promises_ = active, (*self.promises_, (self.last_, active.promises["damage"]))
         self.prior_, self.since_, self.said_ = retraining.prior, retraining.since, said
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -591,58 +556,79 @@ class Monitor(SavesFrames, Estimator):
         return in_words(self)
 
     @property
+    def detector_(self) -> Any:
+        """The fitted detector."""
+        return self.active_.detector
+
+    @property
+    def trained_(self) -> pd.DataFrame:
+        """What the detector in charge was fitted on."""
+        return self.active_.trained
+
+    @property
+    def memory_(self) -> Memory:
+        """Which earlier records the judgement of a record needs."""
+        return self.active_.memory
+
+    @property
+    def promise_(self) -> Promise:
+        """How the threshold was set, and how many false events to expect."""
+        return self.active_.promises["damage"]
+
+    @property
+    def threshold_(self) -> float:
+        """A damage event opens with an index above it."""
+        return self.promise_.rule.threshold
+
+    @property
+    def release_(self) -> float:
+        """An event closes when the index has stayed at or below it."""
+        return self.promise_.rule.release
+
+    @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
-        check_is_fitted(self)
         return self.store_.baseline
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
-        check_is_fitted(self)
         return self.store_.kept
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
-        check_is_fitted(self)
         return self.course_.corrected.loc[self.records_.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
-        check_is_fitted(self)
         return self.store_.last
 
     @property
     def judged_(self) -> pd.DataFrame:
         """The latest judgement of each record that is kept."""
-        check_is_fitted(self)
         return self.course_.judged
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
-        check_is_fitted(self)
         return self.course_.days
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
-        check_is_fitted(self)
         return event_table(self.course_.log.events, self.said_, self.baseline_.index.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
-        check_is_fitted(self)
-        return self.bench_.stages.faults(self.course_.stages)
+        return self.active_.corrections.faults(self.course_.corrections)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        check_is_fitted(self)
-        return self.bench_.stages.drifts(self.course_.stages)
+        return self.active_.corrections.drifts(self.course_.corrections)
 
     def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:
         """Names of the frequency columns: as given, those of the compensators, or those of the chain."""
@@ -685,7 +671,8 @@ class Monitor(SavesFrames, Estimator):
             "n_late": counts["n_late"] + intake.n_late,
             "n_too_late": n_too_late,
             "n_not_judged": int(n_records - n_judged) + n_too_late,
-            "n_implausible": counts["n_implausible"] + int(self.bench_.plausible.implausible(intake.fresh).sum()),
+            "n_implausible": counts["n_implausible"]
+            + int(self.active_.plausible.implausible(intake.fresh.to_numpy()).sum()),
         }
 
 

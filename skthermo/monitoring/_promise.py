@@ -10,13 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import gamma, nbinom
 
-from skthermo._arrays import Array
-from skthermo._formatting import counted_number
-from skthermo._saved_frames import SavesFrames
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import counted_number
+from skthermo._tables.times import DAY, YEAR
 
-YEAR = pd.Timedelta(days=365.25)
-ONE_DAY = pd.Timedelta(days=1)
 N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
 NEAR = 15  # days of the year, up to which a record stands for the season around it
@@ -166,7 +165,7 @@ class Promise:
     n_peaks: int
     unseen: str
     method: str
-    tail: Tail | None = None  # None in files of earlier versions
+    tail: Tail
 
     def __str__(self) -> str:
         expected = counted_number(self.expected, "false alarm")
@@ -176,9 +175,7 @@ class Promise:
         )
 
     def chance(self, peak: float, n_years: float) -> float:
-        """Probability that a healthy structure has an event as high in so many years; NaN where it is not known."""
-        if self.tail is None:
-            return np.nan
+        """Probability that a healthy structure has an event as high in so many years."""
         return self.tail.chance(peak**2, n_years / self.n_years)
 
 
@@ -223,7 +220,7 @@ def promised_rule(
         raise ValueError(
             f"false_alarms_per_year is {per_year:g}, but the {years} of the baseline have only "
             f"{counted_number(len(squares), 'excursion')} that end with "
-            f"{counted_number(hold / ONE_DAY, 'day')} of quiet; expected at "
+            f"{counted_number(hold / DAY, 'day')} of quiet; expected at "
             f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
     tail = Tail.of(squares, asked)

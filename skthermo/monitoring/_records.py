@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import MARKERS
-from skthermo._saved_frames import SavesFrames
+from skthermo._tables.arrays import as_floats
+from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import with_nan
 
 
@@ -54,11 +53,6 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
     stamps.freq = None  # that of one batch is not that of its parts
     frame = pd.DataFrame(values, stamps, X.columns)
     return frame if X.index.is_monotonic_increasing else frame.sort_index(kind="stable")
-
-
-def stamps_of(records: pd.DataFrame) -> NDArray[np.int64]:
-    """Stamps in nanoseconds."""
-    return records.index.asi8
 
 
 @dataclass(frozen=True)
@@ -117,7 +111,7 @@ class RecordStore(SavesFrames):
         """Which rows of a batch stand in a table; an error if some have other values there."""
         if not len(batch) or not len(table) or batch.index[-1] < table.index[0] or batch.index[0] > table.index[-1]:
             return np.zeros(len(batch), dtype=bool)
-        wanted, stamps = stamps_of(batch), stamps_of(table)
+        wanted, stamps = batch.index.asi8, table.index.asi8
         place = np.minimum(np.searchsorted(stamps, wanted), len(stamps) - 1)
         known = stamps[place] == wanted
         new, old = batch.to_numpy()[known], table.to_numpy()[place[known]]
@@ -130,43 +124,3 @@ class RecordStore(SavesFrames):
                 f"{old[row, column]:.10g}; expected each stamp once, or with the same values"
             )
         return known
-
-
-@dataclass(frozen=True)
-class Plausible:
-    """Which values can be measured: none that loggers write for a missing one, no frequency of zero or below, no
-    temperature in kelvin."""
-
-    lowest: Array
-    highest: Array
-
-    @classmethod
-    def of(cls, baseline: pd.DataFrame, targets: list) -> Plausible:
-        """From a baseline in which missing values are NaN: what is 100 degrees beyond it is no temperature."""
-        is_target = baseline.columns.isin(targets)
-        values = baseline.to_numpy()
-        least, most = np.fmin.reduce(values), np.fmax.reduce(values)
-        positive = np.where(least > 0, np.nextafter(0, 1), -np.inf)
-        lowest = np.where(is_target, positive, np.fmin(least - 100, -80))
-        return cls(lowest, np.where(is_target, np.inf, np.fmax(most + 100, 100)))
-
-    @classmethod
-    def of_anything(cls, records: pd.DataFrame) -> Plausible:
-        """All values but those that loggers write for a missing one."""
-        least = np.full(records.shape[1], -np.inf)
-        return cls(least, -least)
-
-    def implausible(self, records: pd.DataFrame) -> NDArray[np.bool_]:
-        """Which values no sensor measures."""
-        values = records.to_numpy()
-        return np.isin(values, MARKERS) | (values < self.lowest) | (values > self.highest)
-
-    def cleaned(self, records: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
-        """Records with NaN for what no sensor measures, and a phrase about each that had such values."""
-        values = records.to_numpy()
-        wrong = self.implausible(records)
-        told = [""] * len(records)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            parts = [f"{records.columns[k]} is {values[row, k]:g}" for k in np.flatnonzero(wrong[row])]
-            told[row] = f"{', '.join(parts)}: taken as missing"
-        return records.mask(wrong) if wrong.any() else records, told

@@ -1,39 +1,40 @@
 """New axes, or those that the user gives; panels, dates, legends, and maps of colours."""
 
-from collections.abc import Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
 from numbers import Real
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from skthermo.plotting._style import GREY, drawing, label_of, plain, pyplot
 
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""
 
-DARK = 0.55  # share of the limit above which a cell of a map is so dark that its number is white
-
-Axes: TypeAlias = Any
-"""Matplotlib's axes, or an array of them; matplotlib is not imported for the sake of its types."""
-
-
-def one_axes(ax: Axes, size: tuple[float, float]) -> Axes:
-    """The axes that are given, or those of a new figure."""
-    if ax is None:
-        return pyplot().subplots(figsize=size, layout="constrained")[1]
-    return panels(ax, ["one display"], size)[0]
-
 
 def panels(
-    ax: Axes, names: Sequence[Any], size: tuple[float, float], n_columns: int = 1, share_x: bool = False
+    ax: Axes | np.ndarray | None,
+    names: Sequence[object],
+    size: tuple[float, float],
+    n_columns: int = 1,
+    share_x: bool = False,
+    heights: Sequence[float] | None = None,
 ) -> np.ndarray:
-    """One axes for each name: those that are given, or those of a new figure."""
+    """One axes for each name: those that are given, or those of a new figure, perhaps with heights of its rows."""
     if ax is None:
         n_columns = min(n_columns, len(names))
         n_rows = -(-len(names) // n_columns)
-        figure = pyplot().figure(figsize=(size[0] * n_columns, size[1] * n_rows), layout="constrained")
-        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False).ravel()
+        height = size[1] * n_rows if heights is None else sum(heights)
+        figure = pyplot().figure(figsize=(size[0] * n_columns, height), layout="constrained")
+        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False, height_ratios=heights).ravel()
         for unused in axes[len(names) :]:
             unused.remove()
         for above in axes[max(len(names) - n_columns, 0) : len(names)] if share_x else ():
@@ -47,7 +48,7 @@ def panels(
     return given
 
 
-def panel_names(titles: Sequence[str] | None, columns: Sequence[Any]) -> list[str]:
+def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
     """Names of the panels: those that are given, or those of the columns."""
     if titles is not None and len(titles) != len(columns):
         raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
@@ -62,7 +63,7 @@ def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
     """One legend of all panels' labels above those of a new figure, or within the first of given axes."""
-    by_label: dict[str, Any] = {}
+    by_label: dict[str, Artist] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             by_label.setdefault(label, handle)
@@ -79,7 +80,7 @@ def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> 
         axes[0].legend(frameon=False, markerscale=scale, fontsize="small")
 
 
-def legend_columns(labels: Sequence[str], figure: Any, most: int) -> int:
+def legend_columns(labels: Sequence[str], figure: Figure, most: int) -> int:
     """How many columns of a legend fit into the width of a figure."""
     widest = HANDLE + LETTER * max(map(len, labels))
     return int(np.clip(figure.get_figwidth() // widest, 1, most))
@@ -97,7 +98,7 @@ def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
         ax.set_xlabel(label or plain(index.name or "record"))
 
 
-def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Index) -> None:
+def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
     """Vertical lines in all panels, with their labels above the first."""
     for text, place in (marks or {}).items():
         for ax in axes:
@@ -106,7 +107,7 @@ def draw_marks(axes: np.ndarray, marks: Mapping[str, Any] | None, index: pd.Inde
         axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
 
 
-def on_axis(place: Any, index: pd.Index) -> Any:
+def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
     """A time in the zone of the index, or a number; on an axis of time, a number is the position of a record."""
     is_number = isinstance(place, Real)
     if not isinstance(index, pd.DatetimeIndex):
@@ -124,19 +125,3 @@ def on_axis(place: Any, index: pd.Index) -> Any:
     if time.tz is not None and index.tz is not None:
         time = time.tz_convert(index.tz)
     return time.tz_localize(None).to_datetime64()
-
-
-def draw_heat_map(ax: Axes, table: pd.DataFrame, limit: float | None, smallest: float = 0.0) -> Axes:
-    """Draw cells coloured from -limit to limit with their numbers; values below ``smallest`` stay without a number."""
-    values = table.to_numpy(dtype=float)
-    known = np.abs(values[np.isfinite(values)])
-    largest = limit or (known.max() if known.size and known.max() > 0 else 1.0)
-    image = ax.imshow(values, cmap="RdBu_r", vmin=-largest, vmax=largest, aspect="auto")
-    for (row, column), value in np.ndenumerate(values):
-        if np.isfinite(value) and abs(value) >= smallest:
-            colour = "white" if abs(value) > DARK * largest else "black"
-            ax.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize="small", color=colour)
-    ax.set_xticks(range(table.shape[1]), [label_of(name) for name in table.columns])
-    ax.set_yticks(range(table.shape[0]), [label_of(name) for name in table.index])
-    ax.tick_params(length=0)
-    return image

@@ -4,29 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting._axes import Axes, date_axis, figure_legend, on_axis, panels
+from skthermo.plotting._axes import date_axis, figure_legend, on_axis
+from skthermo.plotting._display import Display
 from skthermo.plotting._limits import hold_outliers, mark_unjudged
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
-from skthermo.plotting._tables import as_tables, check_study, in_time, names_from
+from skthermo.plotting._tables import as_table, check_study, in_time, names_from
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+    from skthermo.studies import DetectabilityStudy
 
 
 @dataclass(eq=False, repr=False)
-class DamageIndexDisplay:
+class DamageIndexDisplay(Display):
     """Damage index of every record, the threshold above which it is an alarm, and the onset of damage.
 
     Records without an index, which are not judged, are grey ticks at the bottom, with their number. A few indices far
     above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
-    It is best made by `from_estimator`, `from_predictions`, `from_study` with a panel for each detector or
-    `from_scenarios` with one for each scenario.
+    It is best made by `from_estimator`, `from_predictions`, or `from_study` with a panel for each detector.
 
     Parameters
     ----------
@@ -35,7 +42,7 @@ class DamageIndexDisplay:
     thresholds : dict of str to float
         Threshold of each panel.
     onset : time or number, optional
-        When damage began.
+        When damage began; on an axis of time, a number is the position of a record of the first table.
     label : str
         Label of the vertical axes.
 
@@ -70,12 +77,12 @@ class DamageIndexDisplay:
     scenarios: Mapping[str, Mapping[str, pd.DataFrame]]
     thresholds: Mapping[str, float]
     _: KW_ONLY
-    onset: Any = None
+    onset: object = None
     label: str = DAMAGE_INDEX
 
     @classmethod
     def from_estimator(
-        cls, estimator: Any, X: Mapping[str, ArrayLike] | ArrayLike, *, onset: Any = None, **options: Any
+        cls, estimator: BaseEstimator, X: Mapping[str, ArrayLike] | ArrayLike, **options: object
     ) -> DamageIndexDisplay:
         """Draw the damage index that a fitted detector gives to records.
 
@@ -86,10 +93,8 @@ class DamageIndexDisplay:
             that ends with one.
         X : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such
             What the detector judges, in Hz for frequencies; several tables by label.
-        onset : time or number, optional
-            When damage began; on an axis of time, a number is the position of a record of the first table.
         **options : dict
-            Options of `plot`, and ``label`` of `from_predictions`.
+            ``onset`` and ``label`` of the display, and options of `plot`.
 
         Returns
         -------
@@ -109,18 +114,17 @@ class DamageIndexDisplay:
         tables = X if isinstance(X, Mapping) else {"records": X}
         indices = {label: index_of(estimator, records) for label, records in tables.items()}
         name = DAMAGE_INDEX if isinstance(last, MahalanobisDetector) else "damage index"
-        return cls.from_predictions(indices, threshold, onset=onset, **{"label": name, **options})
+        return cls.from_predictions(indices, threshold, **{"label": name, **options})
 
     @classmethod
     def from_study(
         cls,
-        study: Any,
+        study: DetectabilityStudy,
         scenarios: Sequence[str] | None = None,
         *,
         detectors: Sequence[str] | None = None,
         source: str = "data-informed",
-        onset: Any = None,
-        **options: Any,
+        **options: object,
     ) -> DamageIndexDisplay:
         """Draw the records of the first repeat of a study, one panel for each detector.
 
@@ -134,10 +138,8 @@ class DamageIndexDisplay:
             Those that are drawn; by default all that did not fail.
         source : str, default="data-informed"
             "data-informed" or "reference".
-        onset : time or number, optional
-            When damage began; on an axis of time, a number is the position of a record of the first table.
         **options : dict
-            Options of `plot`, and ``label`` of `from_scenarios`.
+            ``onset`` and ``label`` of the display, and options of `plot`.
 
         Returns
         -------
@@ -161,68 +163,22 @@ class DamageIndexDisplay:
         thresholds = {name: study.thresholds_[name] for name in chosen}
         is_distance = all(isinstance(last_step(study.detectors_[name]), MahalanobisDetector) for name in chosen)
         options = {"label": DAMAGE_INDEX if is_distance else "damage index"} | options
-        return cls.from_scenarios(shown, thresholds, onset=onset, **options)
+        return cls.from_predictions(shown, thresholds, **options)
 
     @classmethod
     def from_predictions(
-        cls,
-        index: Mapping[str, ArrayLike] | ArrayLike,
-        threshold: float,
-        *,
-        onset: Any = None,
-        label: str = DAMAGE_INDEX,
-        **options: Any,
+        cls, index: Mapping[str, Any] | ArrayLike, threshold: float | Mapping[str, float], **options: object
     ) -> DamageIndexDisplay:
         """Draw damage indices.
 
         Parameters
         ----------
-        index : array-like or Series of shape (n_samples,), or mapping of str to such
-            Damage index of each record; several by label.
-        threshold : float
-            A damage index above it is an alarm.
-        onset : time or number, optional
-            When damage began; on an axis of time, a number is the position of a record of the first table.
-        label : str, default="damage index (Mahalanobis, unsquared)"
-            Label of the vertical axis.
-        **options : dict
-            Options of `plot`.
-
-        Returns
-        -------
-        DamageIndexDisplay
-
-        Raises
-        ------
-        ValueError
-            If an index is not a column of numbers, or the threshold not a number.
-        """
-        return cls.from_scenarios({"": index}, threshold, onset=onset, label=label, **options)
-
-    @classmethod
-    def from_scenarios(
-        cls,
-        scenarios: Mapping[str, Any],
-        threshold: float | Mapping[str, float],
-        *,
-        onset: Any = None,
-        label: str = DAMAGE_INDEX,
-        **options: Any,
-    ) -> DamageIndexDisplay:
-        """Draw damage indices, one panel for each scenario.
-
-        Parameters
-        ----------
-        scenarios : mapping of str to index, or to mapping of str to index
-            Damage indices by the title of their panel, and by their label.
+        index : array-like or Series of shape (n_samples,), or mapping of str to such, or of str to such mappings
+            Damage index of each record; several by label; or by the title of their panel, and then by label.
         threshold : float or mapping of str to float
             A damage index above it is an alarm; one for all panels, or one for each title.
-        onset : time or number, optional
-            When damage began; on an axis of time, a number is the position of a record of the first table.
-        label : str, default="damage index (Mahalanobis, unsquared)"
-            Label of the vertical axes.
         **options : dict
-            Options of `plot`.
+            ``onset`` and ``label`` of the display, and options of `plot`.
 
         Returns
         -------
@@ -233,23 +189,16 @@ class DamageIndexDisplay:
         ValueError
             If an index is not a column of numbers, or a threshold missing or not a number.
         """
-        if not isinstance(scenarios, Mapping) or not scenarios:
-            raise ValueError(f"scenarios is {scenarios!r:.200}; expected a mapping of title to damage index")
-        tables = {
-            title: as_tables(index if isinstance(index, Mapping) else {"records": index}, "damage index", "index")
-            for title, index in scenarios.items()
-        }
-        for by_label in tables.values():
-            for name, table in by_label.items():
-                if table.shape[1] != 1:
-                    raise ValueError(f"damage index {name!r} has {table.shape[1]} columns; expected one")
-        given = threshold if isinstance(threshold, Mapping) else dict.fromkeys(scenarios, threshold)
-        thresholds = {title: as_threshold(given.get(title), title) for title in scenarios}
-        return cls(tables, thresholds, onset=onset, label=label).plot(**options)
+        has_panels = isinstance(index, Mapping) and any(isinstance(one, Mapping) for one in index.values())
+        panels = index if has_panels else {"": index if isinstance(index, Mapping) else {"records": index}}
+        tables = {title: columns_of(by_label) for title, by_label in panels.items()}
+        given = threshold if isinstance(threshold, Mapping) else dict.fromkeys(panels, threshold)
+        thresholds = {title: as_threshold(given.get(title), title) for title in panels}
+        return cls._drawn(tables, thresholds, **options)
 
     def plot(
         self,
-        ax: Axes = None,
+        ax: Axes | np.ndarray | None = None,
         *,
         n_columns: int = 1,
         colours: Mapping[str, str] | None = None,
@@ -284,9 +233,9 @@ class DamageIndexDisplay:
         titles = list(self.scenarios)
         width = 9.0 if n_columns == 1 else 4.6
         height = 3.4 if len(titles) == 1 else 2.6
-        self.axes_ = panels(ax, titles, (width, height), n_columns, share_x=True)
-        self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
-        self.points_, self.threshold_lines_ = {}, []
+        self._take_axes(ax, titles, (width, height), n_columns=n_columns, share_x=True)
+        self.points_: dict[str, list[Line2D]] = {}
+        self.threshold_lines_: list[Line2D] = []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
             self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
             unjudged = {label: unjudged_places(table) for label, table in self.scenarios[title].items()}
@@ -311,7 +260,7 @@ class DamageIndexDisplay:
         figure_legend(self.axes_, ax is None, n_columns=5)
         return self
 
-    def _draw_points(self, ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Any]:
+    def _draw_points(self, ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Line2D]:
         """Points in the colour and marker that their label has in every panel."""
         drawn, labels = [], list(dict.fromkeys(label for by_label in self.scenarios.values() for label in by_label))
         for label, table in tables.items():
@@ -322,13 +271,24 @@ class DamageIndexDisplay:
         return drawn
 
 
+def columns_of(by_label: Mapping[str, ArrayLike]) -> dict[str, pd.DataFrame]:
+    """Damage indices of one panel as frames of one column."""
+    if not isinstance(by_label, Mapping) or not by_label:
+        raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
+    tables = {str(label): as_table(values, f"damage index {label!r}", "index") for label, values in by_label.items()}
+    for label, table in tables.items():
+        if table.shape[1] != 1:
+            raise ValueError(f"damage index {label!r} has {table.shape[1]} columns; expected one")
+    return tables
+
+
 def unjudged_places(table: pd.DataFrame) -> NDArray:
     """Places on the horizontal axis of the records that have no damage index."""
     x, values = in_time(table)
     return x[np.isnan(values[:, 0])]
 
 
-def index_of(estimator: Any, records: ArrayLike) -> Any:
+def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:
     """Damage index of records: a detector's own, or minus its score."""
     if hasattr(estimator, "damage_index"):
         return estimator.damage_index(records)
@@ -336,7 +296,7 @@ def index_of(estimator: Any, records: ArrayLike) -> Any:
     return pd.Series(index, records.index) if isinstance(records, pd.DataFrame) else index
 
 
-def as_threshold(value: Any, title: str) -> float:
+def as_threshold(value: object, title: str) -> float:
     """A threshold as a number."""
     try:
         threshold = float(value)

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import chance_text
-from skthermo.plotting._axes import Axes, panels
+from skthermo._tables.text import chance_text
+from skthermo.plotting._display import Display
 from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, drawing, label_of, plain, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.container import BarContainer, ErrorbarContainer
+
+    from skthermo.studies import IdentifiedDamage
 
 NEEDED = {
     "told": {"probability"},
@@ -26,7 +32,7 @@ SHORT_NAME = 8  # number of letters up to which names of modes fit beside each o
 
 
 @dataclass(eq=False, repr=False)
-class IdentifiedDamageDisplay:
+class IdentifiedDamageDisplay(Display):
     """Explanations with their probabilities, severity of each group, and shift of each mode.
 
     It is best made by `from_predictions`.
@@ -77,10 +83,10 @@ class IdentifiedDamageDisplay:
     >>> plt.close(display.figure_)
     """
 
-    identified: Any
+    identified: IdentifiedDamage
 
     @classmethod
-    def from_predictions(cls, identified: Any, **options: Any) -> IdentifiedDamageDisplay:
+    def from_predictions(cls, identified: IdentifiedDamage, **options: object) -> IdentifiedDamageDisplay:
         """Draw identified damage.
 
         Parameters
@@ -109,7 +115,7 @@ class IdentifiedDamageDisplay:
                 )
         return cls(identified).plot(**options)
 
-    def plot(self, ax: Axes = None) -> IdentifiedDamageDisplay:
+    def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:
         """Draw into axes.
 
         Parameters
@@ -124,17 +130,16 @@ class IdentifiedDamageDisplay:
         """
         has_long_labels = self.identified.told.index[:MOST_BARS].astype(str).str.len().max() > LABEL
         height = max(4.9 if has_long_labels else 3.8, 1.4 + 0.3 * len(self.identified.table))
-        self.axes_ = panels(ax, ["explanations", "severities", "shifts"], (4.6, height), 3)
-        self.figure_ = self.axes_[0].figure
-        self.bars_ = self._draw_explanations(self.axes_[0])
-        self.severities_ = self._draw_severities(self.axes_[1])
-        self._draw_shifts(self.axes_[2])
-        answer = getattr(self.identified, "answer", None)
-        if ax is None and answer is not None:
-            self.figure_.suptitle(plain(textwrap.fill(answer()[0], LINE)), fontsize="medium")
+        names = ["explanations", "severities", "shifts"]
+        explanations, severities, shifts = self._take_axes(ax, names, (4.6, height), n_columns=3)
+        self.bars_ = self._draw_explanations(explanations)
+        self.severities_ = self._draw_severities(severities)
+        self._draw_shifts(shifts)
+        if ax is None:
+            self._head(self.identified, LINE)
         return self
 
-    def _draw_explanations(self, ax: Axes) -> Any:
+    def _draw_explanations(self, ax: Axes) -> BarContainer:
         """Bars with the causes above and the probability behind them."""
         told = 100 * self.identified.told["probability"].astype(float)
         shown = told.iloc[:MOST_BARS]
@@ -154,7 +159,7 @@ class IdentifiedDamageDisplay:
         ax.spines[["top", "right"]].set_visible(False)
         return bars
 
-    def _draw_severities(self, ax: Axes) -> Any:
+    def _draw_severities(self, ax: Axes) -> ErrorbarContainer:
         """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
         table, unseen = self.identified.table, set(getattr(self.identified, "unseen", ()))
         places, is_known = np.arange(len(table)), ~table.index.isin(unseen)

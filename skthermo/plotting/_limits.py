@@ -1,13 +1,18 @@
 """Axes that a few outliers do not stretch: marks at the edges count what lies beyond, or is not judged."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skthermo._arrays import Array
-from skthermo.plotting._axes import Axes
+from skthermo._tables.arrays import Array
 from skthermo.plotting._style import GREY, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
 FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
 FEWEST = 10  # points of a line from which on it may have outliers
@@ -15,14 +20,13 @@ MARGIN = 0.05  # empty share of the axis next to its edges
 BEYOND = "beyond"
 """Name (gid) of the marks at the edges."""
 
-EDGES: dict[
-    tuple[str, bool], tuple[str, float, dict[str, Any]]
-] = {  # marker, coordinates of the edge in shares of the axes, and how its text stands
+EDGES: dict[tuple[str, bool], tuple[str, float, dict[str, object]]] = {
     ("y", False): ("v", 0.0, {"x": 0.99, "y": 0.03, "ha": "right", "va": "bottom"}),
     ("y", True): ("^", 1.0, {"x": 0.99, "y": 0.96, "ha": "right", "va": "top"}),
     ("x", False): ("<", 0.0, {"x": 0.02, "y": 0.5, "ha": "left", "va": "center", "rotation": 90}),
     ("x", True): (">", 1.0, {"x": 0.98, "y": 0.5, "ha": "right", "va": "center", "rotation": 90}),
 }
+"""Marker of an edge, its coordinate in shares of the axes, and how its text stands."""
 
 
 def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = (), direction: str = "y") -> None:
@@ -63,7 +67,7 @@ def middle_of(values: Array) -> Array:
 
 
 def _mark_edge(
-    ax: Axes, lines: list[Any], columns: list[Array], beyond: list[Array], direction: str, is_upper: bool
+    ax: Axes, lines: list[Line2D], columns: list[Array], beyond: list[Array], direction: str, is_upper: bool
 ) -> None:
     """A triangle at the edge for each point beyond it, in the colour of its line, and a text that counts them."""
     marker, edge, place = EDGES[direction, is_upper]
@@ -92,7 +96,7 @@ def mark_unjudged(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
         _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not judged")
 
 
-def _write(ax: Axes, text: str, x: float, y: float, **style: Any) -> None:
+def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
     """A small text in shares of the axes, on a ground that keeps points off it."""
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
     ax.text(x, y, plain(text), transform=ax.transAxes, fontsize="small", color=GREY, bbox=box, **style)

@@ -4,23 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo.plotting._axes import Axes, date_axis, figure_legend, panels
+from skthermo._tables.arrays import Array
+from skthermo.plotting._axes import date_axis, figure_legend
+from skthermo.plotting._display import Display
 from skthermo.plotting._limits import hold_outliers, mark_unjudged
-from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, line_style, marker_style, pyplot, shortened
+from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, line_style, marker_style, shortened
 from skthermo.plotting._tables import in_time, with_breaks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Polygon
+
+    from skthermo.monitoring import Monitor
+
+Time: TypeAlias = str | pd.Timestamp | None
 
 NEEDED = ("days_", "events_", "threshold_")
 PARTS = ("index", "drift", "sensors")
 DRIFT = "drift "  # how columns of daily drift begin
 N_ERRORS = 2  # standard errors on either side of a change
 DODGE = 0.02  # share of the axis of time between error bars beside the last day
-SHADES: dict[str, dict[str, Any]] = {
+SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
     "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
     "event said to be harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
@@ -28,7 +39,7 @@ SHADES: dict[str, dict[str, Any]] = {
 
 
 @dataclass(eq=False, repr=False)
-class MonitorDisplay:
+class MonitorDisplay(Display):
     """Damage index of a monitor over time with its threshold and events; below it, drift and failed sensors.
 
     Records in alarm are orange triangles, others blue dots. Records or days that are not judged are grey ticks at the
@@ -98,13 +109,13 @@ class MonitorDisplay:
     @classmethod
     def from_estimator(
         cls,
-        monitor: Any,
+        monitor: Monitor,
         *,
-        start: Any = None,
-        end: Any = None,
+        start: Time = None,
+        end: Time = None,
         by: Literal["day", "record"] = "day",
         parts: Sequence[str] | None = None,
-        **options: Any,
+        **options: object,
     ) -> MonitorDisplay:
         """Draw a monitor.
 
@@ -155,7 +166,7 @@ class MonitorDisplay:
         index = index.assign(threshold=_thresholds(monitor, index.index, pd.Timedelta("1D" if by == "day" else "1ns")))
         return cls(index, events, drift, errors, faults, asked).plot(**options)
 
-    def plot(self, ax: Axes = None) -> MonitorDisplay:
+    def plot(self, ax: Axes | np.ndarray | None = None) -> MonitorDisplay:
         """Draw into axes.
 
         Parameters
@@ -169,15 +180,12 @@ class MonitorDisplay:
             Itself.
         """
         heights = {"index": 3.2, "drift": 2.2, "sensors": 0.9 + 0.3 * self.faults["column"].nunique()}
-        if ax is None:
-            size = [heights[part] for part in self.parts]
-            figure = pyplot().figure(figsize=(9.0, sum(size)), layout="constrained")
-            self.axes_ = figure.subplots(len(size), 1, sharex=True, squeeze=False, height_ratios=size).ravel()
-        else:
-            self.axes_ = panels(ax, list(self.parts), (9.0, 3.2))
-        self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
-        self.points_, self.threshold_line_, self.event_spans_ = [], None, []
-        self.drift_lines_, self.fault_bars_ = [], []
+        self._take_axes(ax, self.parts, (9.0, 3.2), share_x=True, heights=[heights[part] for part in self.parts])
+        self.points_: list[Line2D] = []
+        self.threshold_line_: Line2D | None = None
+        self.event_spans_: list[Polygon] = []
+        self.drift_lines_: list[Line2D] = []
+        self.fault_bars_: list[PolyCollection] = []
         draw = {"index": self._draw_index, "drift": self._draw_drift, "sensors": self._draw_sensors}
         first, last = self._ends()
         room = DODGE * self.drift.shape[1] * (last - first) if "drift" in self.parts else pd.Timedelta(0)
@@ -189,7 +197,7 @@ class MonitorDisplay:
         figure_legend(self.axes_, ax is None, n_columns=4)
         return self
 
-    def _ends(self) -> tuple[Any, Any]:
+    def _ends(self) -> tuple[pd.Timestamp, pd.Timestamp]:
         """Ends of the axis of time: half a step beyond the first and the last row."""
         times = _naive(self.index.index)
         half = pd.Timedelta("12h") if len(times) < 2 else (times[-1] - times[0]) / (2 * (len(times) - 1))
@@ -251,7 +259,7 @@ class MonitorDisplay:
         ax.set_yticks(range(len(columns)), [shortened(name) for name in columns])
         ax.set(ylim=(len(columns) - 0.4, -0.6), ylabel="failed\nsensors")
 
-    def _span(self, begin: Any, end: Any) -> tuple[Any, Any]:
+    def _span(self, begin: Time, end: Time) -> tuple[pd.Timestamp, pd.Timestamp]:
         """Beginning and end within the axis of time; what has no end lasts to the end of it."""
         first, last = self._ends()
         begin = _naive(pd.DatetimeIndex([begin]))[0]
@@ -264,7 +272,7 @@ def _naive(times: pd.DatetimeIndex) -> pd.DatetimeIndex:
     return times.tz_localize(None)
 
 
-def _between(table: pd.DataFrame, start: Any, end: Any) -> pd.DataFrame:
+def _between(table: pd.DataFrame, start: Time, end: Time) -> pd.DataFrame:
     """Rows of a time; stamps in order."""
     zone = table.index.tz
     ends = [None if time is None else pd.Timestamp(time) for time in (start, end)]
@@ -287,7 +295,7 @@ def _by_record(judged: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame({"index": judged["index"], "is_alarm": judged["state"] == "alarm"})
 
 
-def _thresholds(monitor: Any, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:
+def _thresholds(monitor: Monitor, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:
     """Threshold at the end of records or days of this length; before what is kept, the earliest known."""
     judged = getattr(monitor, "judged_", None)
     if judged is None or not len(judged):

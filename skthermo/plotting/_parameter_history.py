@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
-from skthermo.plotting._axes import Axes, date_axis, panels, size_in_time
+import numpy as np
+
+from skthermo.plotting._axes import date_axis, size_in_time
+from skthermo.plotting._display import Display
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
+
+    from skthermo.monitoring import ParameterHistory
 
 LINE = 100  # number of letters of a line of the heading
 
 
 @dataclass(eq=False, repr=False)
-class ParameterHistoryDisplay:
+class ParameterHistoryDisplay(Display):
     """Stiffness of each group over years, with its band, and a limit.
 
     It is best made by `from_history`.
@@ -54,13 +63,13 @@ class ParameterHistoryDisplay:
     >>> plt.close(display.figure_)
     """
 
-    history: Any
+    history: ParameterHistory
     _: KW_ONLY
     groups: Sequence[str] | None = None
 
     @classmethod
     def from_history(
-        cls, history: Any, *, groups: Sequence[str] | None = None, **options: Any
+        cls, history: ParameterHistory, *, groups: Sequence[str] | None = None, **options: object
     ) -> ParameterHistoryDisplay:
         """Draw what `~skthermo.monitoring.track_parameters` found.
 
@@ -93,7 +102,9 @@ class ParameterHistoryDisplay:
             raise ValueError(f"groups is {groups!r}; expected some of {known}")
         return cls(history, groups=groups).plot(**options)
 
-    def plot(self, ax: Axes = None, *, limit: float | None = None, n_columns: int = 1) -> ParameterHistoryDisplay:
+    def plot(
+        self, ax: Axes | np.ndarray | None = None, *, limit: float | None = None, n_columns: int = 1
+    ) -> ParameterHistoryDisplay:
         """Draw into axes.
 
         Parameters
@@ -115,9 +126,9 @@ class ParameterHistoryDisplay:
         names = list(dict.fromkeys(table.columns.get_level_values(0)))
         shown = [name for name in names if drifts.get(name) != "not seen"] if self.groups is None else list(self.groups)
         shown = shown or names
-        self.axes_ = panels(ax, shown, size_in_time(len(shown), n_columns), n_columns, share_x=True)
-        self.figure_ = self.axes_[0].figure
-        self.lines_, self.bands_ = {}, {}
+        self._take_axes(ax, shown, size_in_time(len(shown), n_columns), n_columns=n_columns, share_x=True)
+        self.lines_: dict[str, Line2D] = {}
+        self.bands_: dict[str, PolyCollection] = {}
         for one, name in zip(self.axes_, shown, strict=True):
             change = 100 * (table[name] - 1)
             colour = ORANGE if drifts.get(name, "") in ("yes", "perhaps") else BLUE
@@ -133,7 +144,6 @@ class ParameterHistoryDisplay:
             one.set_xlim(table.index[0], table.index[-1])
         for one in self.axes_[-n_columns:] if ax is None else self.axes_:
             date_axis(one, table.index)
-        answer = getattr(self.history, "answer", None)
-        if ax is None and answer is not None:
-            self.figure_.suptitle(textwrap.fill(answer()[0], LINE), fontsize="medium")
+        if ax is None:
+            self._head(self.history, LINE)
         return self

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skthermo._arrays import Array
-from skthermo.plotting._axes import Axes, one_axes
+from skthermo._tables.arrays import Array
+from skthermo.plotting._display import Display
 from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS, shortened
 from skthermo.plotting._tables import check_study
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+
+    from skthermo.studies import DetectabilityStudy, PODCurve
 
 NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
 QUANTILE = 1.959964
@@ -18,7 +25,7 @@ N_DRAWN = 200
 
 
 @dataclass(eq=False, repr=False)
-class PODCurveDisplay:
+class PODCurveDisplay(Display):
     """Probability of detection over severity: observed shares, fitted curve and its confidence bounds.
 
     It is best made by `from_estimator` or `from_predictions`. Several curves can be drawn into the same axes; each gets
@@ -34,7 +41,7 @@ class PODCurveDisplay:
 
     Attributes
     ----------
-    ax_, figure_ : matplotlib's Axes and Figure
+    ax_, axes_, figure_ : matplotlib's Axes, array that holds them, and Figure
         Where it is drawn.
     line_ : Line2D
         The curve.
@@ -66,20 +73,20 @@ class PODCurveDisplay:
     >>> plt.close(display.figure_)
     """
 
-    curve: Any
+    curve: PODCurve
     _: KW_ONLY
     label: str | None = None
 
     @classmethod
     def from_estimator(
         cls,
-        study: Any,
+        study: DetectabilityStudy,
         family: str,
         *,
         detector: str | None = None,
         source: str = "data-informed",
         label: str | None = None,
-        **options: Any,
+        **options: object,
     ) -> PODCurveDisplay:
         """Draw the curve of one family of scenarios of a study.
 
@@ -119,17 +126,15 @@ class PODCurveDisplay:
         return cls.from_predictions(curve, label=label or detector or family, **options)
 
     @classmethod
-    def from_predictions(cls, curve: Any, *, label: str | None = None, **options: Any) -> PODCurveDisplay:
+    def from_predictions(cls, curve: PODCurve, **options: object) -> PODCurveDisplay:
         """Draw a curve.
 
         Parameters
         ----------
         curve : PODCurve
             As in `PODCurveDisplay`.
-        label : str, optional
-            Legend of the curve.
         **options : dict
-            Options of `plot`.
+            ``label`` of the display, and options of `plot`.
 
         Returns
         -------
@@ -143,9 +148,9 @@ class PODCurveDisplay:
         missing = [name for name in NEEDED if not hasattr(curve, name)]
         if missing:
             raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
-        return cls(curve, label=label).plot(**options)
+        return cls._drawn(curve, **options)
 
-    def plot(self, ax: Axes = None, *, colour: str | None = None, marks: bool = True) -> PODCurveDisplay:
+    def plot(self, ax: Axes | None = None, *, colour: str | None = None, marks: bool = True) -> PODCurveDisplay:
         """Draw into axes.
 
         Parameters
@@ -163,8 +168,7 @@ class PODCurveDisplay:
         PODCurveDisplay
             Itself.
         """
-        self.ax_ = one_axes(ax, (6.5, 4.2))
-        self.figure_ = self.ax_.figure
+        self._take_axes(ax, ["one display"], (6.5, 4.2))
         number = sum(line.get_gid() == "POD" for line in self.ax_.lines)
         colour = colour or COLOURS[number % len(COLOURS)]
         marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
@@ -181,7 +185,7 @@ class PODCurveDisplay:
         self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
         return self
 
-    def _draw_worlds(self, drawn: Array, colour: str) -> Any:
+    def _draw_worlds(self, drawn: Array, colour: str) -> PolyCollection | None:
         """The band of a measured campaign; None for a curve without one."""
         if not getattr(self.curve, "worlds", ()):
             return None
@@ -206,7 +210,7 @@ class PODCurveDisplay:
             elinewidth=0.8,
         )
 
-    def _draw_marks(self, colour: str) -> dict[str, Any]:
+    def _draw_marks(self, colour: str) -> dict[str, Artist]:
         """Vertical lines from the axis up to 90 %."""
         drawn = {}
         for name, text, dashes in (("a90", "$a_{90}$", ":"), ("a90_95", "$a_{90/95}$", "-.")):

@@ -1,43 +1,61 @@
-"""Measured and predicted frequencies."""
+"""Measured and predicted frequencies or parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator
 
-from skthermo._frames import check_same_rows
-from skthermo._warnings import warnings_once
-from skthermo.plotting._axes import Axes, date_axis, draw_marks, figure_legend, panel_names, panels, size_in_time
+from skthermo._estimators.warnings import warnings_once
+from skthermo._tables.arrays import Array
+from skthermo._tables.frames import check_same_rows, column_names
+from skthermo.plotting._axes import date_axis, draw_marks, figure_legend, panel_names, size_in_time
+from skthermo.plotting._display import Display
 from skthermo.plotting._limits import hold_outliers
-from skthermo.plotting._style import BLACK, BLUE, ORANGE, line_style, marker_style, plain, with_unit
+from skthermo.plotting._style import BLACK, BLUE, ORANGE, label_of, line_style, marker_style, shortened, with_unit
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
+
+FREQUENCIES, PARAMETERS = ("measured", "predicted"), ("from frequencies", "from temperatures")
+KINDS = ("time", "points", "lines", "scatter", "temperature")
 
 
 @dataclass(eq=False, repr=False)
-class PredictionDisplay:
-    """Measured and predicted frequencies or parameters, in time with intervals, or one over the other.
+class PredictionDisplay(Display):
+    """Measured and predicted frequencies or parameters: in time, over a temperature, or one over the other.
 
-    A few values far from the others do not stretch the axes: triangles at the edge and a number stand for them.
+    There is a panel for each mode or parameter. A few values far from the others do not stretch the axes: triangles at
+    the edge and a number stand for them. Lines break at NaN and in long gaps of time.
 
     It is best made by `from_estimator` or `from_predictions`.
 
     Parameters
     ----------
-    measured, predicted : DataFrame of shape (n_samples, n_columns)
+    measured : DataFrame of shape (n_samples, n_columns)
         One panel for each column.
+    predicted : dict of str to DataFrame of shape (n_samples, n_columns), optional
+        By label; there may be several, or none.
     lowest, highest : DataFrame of shape (n_samples, n_columns), optional
-        Intervals of the predictions.
-    labels : tuple of str, default=("measured", "predicted")
-        Legend of the two.
+        Intervals of the first of them.
+    temperature : Series of shape (n_samples,), optional
+        In degrees Celsius; what is drawn then goes over it. Its name becomes part of the label.
+    label : str, default="measured"
+        Legend of what is measured.
     interval_label : str, default="interval"
         Legend of the intervals.
+    quantity : str, optional
+        What the values are, beside the names of the panels.
     unit : str, default="Hz"
-        Unit of the values.
+        Unit of the values; an empty string for none.
 
     Attributes
     ----------
@@ -45,8 +63,8 @@ class PredictionDisplay:
         One panel for each column.
     figure_ : Figure
         Their figure.
-    measured_, predicted_ : list of Line2D
-        What is drawn, panel by panel; ``predicted_`` is empty in a scatter plot.
+    lines_ : dict of str to list of Line2D
+        Points or lines of each label, panel by panel; in a scatter plot, under the label of what is predicted.
     bands_ : list of PolyCollection
         Intervals, panel by panel; empty where there are none.
 
@@ -61,36 +79,54 @@ class PredictionDisplay:
     >>> display = PredictionDisplay.from_estimator(fem, later.temperatures, later.frequencies, confidence=0.9)
     >>> len(display.axes_), display.axes_[0].get_ylabel(), display.bands_[0].get_label()
     (6, '$f_{1}$ (Hz)', 'interval, 90 %')
-    >>> plt.close(display.figure_)
+    >>> display = PredictionDisplay.from_predictions(year.frequencies, temperature=year.temperatures["T1"])
+    >>> display.axes_[0].get_xlabel()
+    '$T_{1}$ (°C)'
+    >>> plt.close("all")
     """
 
     measured: pd.DataFrame
-    predicted: pd.DataFrame
+    predicted: Mapping[str, pd.DataFrame] | None = None
     lowest: pd.DataFrame | None = None
     highest: pd.DataFrame | None = None
     _: KW_ONLY
-    labels: tuple[str, str] = ("measured", "predicted")
+    temperature: pd.Series | None = None
+    label: str = "measured"
     interval_label: str = "interval"
+    quantity: str = ""
     unit: str = "Hz"
 
     @classmethod
     def from_estimator(
-        cls, estimator: Any, X: ArrayLike, y: ArrayLike, *, confidence: float | None = 0.9, **options: Any
+        cls,
+        estimator: BaseEstimator,
+        X: ArrayLike | None = None,
+        y: ArrayLike | None = None,
+        *,
+        what: Literal["frequencies", "parameters"] = "frequencies",
+        sensor: Hashable | None = None,
+        confidence: float | None = 0.9,
+        **options: object,
     ) -> PredictionDisplay:
-        """Draw measured frequencies and what a fitted estimator predicts.
+        """Draw measured frequencies and what a fitted estimator predicts, or the parameters that a chain finds in both.
 
         Parameters
         ----------
         estimator : fitted regressor
             From temperatures to frequencies, such as `~skthermo.surrogate.DataInformedFEM`.
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        y : array-like or DataFrame of shape (n_samples, n_modes)
-            Measured frequencies in Hz.
+        X : array-like or DataFrame of shape (n_samples, n_sensors), optional
+            Temperatures in degrees Celsius; by default the records that a chain was fitted to.
+        y : array-like or DataFrame of shape (n_samples, n_modes), optional
+            Measured frequencies in Hz; needed if X is given.
+        what : {"frequencies", "parameters"}, default="frequencies"
+            Parameters are those that a chain estimates from the frequencies, and predicts from the temperatures.
+        sensor : hashable or int, optional
+            Name of a temperature, or its number in an array: what is drawn goes over it instead of in time.
         confidence : float, optional
-            Probability of the intervals, for an estimator with ``predict_interval``; None draws none.
+            Probability of the intervals of frequencies in time, for an estimator with ``predict_interval``; None draws
+            none.
         **options : dict
-            Options of `plot`.
+            Options of `from_predictions` and of `plot`.
 
         Returns
         -------
@@ -99,38 +135,51 @@ class PredictionDisplay:
         Raises
         ------
         ValueError
-            If temperatures and frequencies have different rows, or intervals are asked of an estimator without any.
+            If temperatures and frequencies have different rows, the sensor is unknown, intervals are asked of an
+            estimator without any, or ``what`` is something else.
 
         Warns
         -----
         UserWarning
             Once for each kind of doubt about the weather, such as rows without temperatures.
         """
+        X, y = estimator.training_records_ if X is None else (X, y)
         check_same_rows(X, y, ("temperatures", "frequencies"))
+        if what not in ("frequencies", "parameters"):
+            raise ValueError(f"what is {what!r}; expected 'frequencies' or 'parameters'")
+        if sensor is not None:
+            options["temperature"] = chosen_sensor(X, sensor)
+        if what == "parameters":
+            tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
+            measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
+            options = {"labels": PARAMETERS, "unit": "", "quantity": "multiplier"} | options
+            return cls.from_predictions(measured, predicted, **options)
+        if sensor is not None or options.get("kind") == "scatter":
+            confidence = None
         if confidence is not None and not hasattr(estimator, "predict_interval"):
             raise ValueError(
                 f"confidence is {confidence!r}, and {estimator!r:.200} has no method 'predict_interval'; expected an "
                 "estimator with one, such as DataInformedFEM, or confidence=None"
             )
-        if confidence is None or options.get("kind") == "scatter":
-            return cls.from_predictions(y, estimator.predict(X), **options)
+        ends: Sequence[ArrayLike] = ()
         with warnings_once():
-            predicted, (lowest, highest) = estimator.predict(X), estimator.predict_interval(X, confidence)
-        label = f"interval, {100 * confidence:g} %"
-        return cls.from_predictions(y, predicted, lowest, highest, **{"interval_label": label, **options})
+            predicted = estimator.predict(X)
+            if confidence is not None:
+                ends = estimator.predict_interval(X, confidence)
+                options = {"interval_label": f"interval, {100 * confidence:g} %"} | options
+        return cls.from_predictions(y, predicted, *ends, **options)
 
     @classmethod
     def from_predictions(
         cls,
         measured: ArrayLike,
-        predicted: ArrayLike,
+        predicted: ArrayLike | Mapping[str, ArrayLike] | None = None,
         lowest: ArrayLike | None = None,
         highest: ArrayLike | None = None,
         *,
-        labels: tuple[str, str] = ("measured", "predicted"),
-        interval_label: str = "interval",
-        unit: str = "Hz",
-        **options: Any,
+        temperature: ArrayLike | None = None,
+        labels: tuple[str, str] = FREQUENCIES,
+        **options: object,
     ) -> PredictionDisplay:
         """Draw measured and predicted values, or true and estimated ones.
 
@@ -138,20 +187,18 @@ class PredictionDisplay:
         ----------
         measured : array-like or DataFrame of shape (n_samples, n_columns)
             Frequencies in Hz, or another quantity.
-        predicted : array-like or DataFrame of shape (n_samples, n_columns)
-            The same, predicted.
+        predicted : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such, optional
+            The same, predicted; several by label.
         lowest : array-like or DataFrame of shape (n_samples, n_columns), optional
             Lower ends of the intervals.
         highest : array-like or DataFrame of shape (n_samples, n_columns), optional
             Upper ends of the intervals.
+        temperature : array-like or Series of shape (n_samples,), optional
+            In degrees Celsius: what is drawn goes over it instead of in time.
         labels : tuple of str, default=("measured", "predicted")
             Legend of the two.
-        interval_label : str, default="interval"
-            Legend of the intervals.
-        unit : str, default="Hz"
-            Unit of the values; an empty string for none.
         **options : dict
-            Options of `plot`.
+            ``interval_label``, ``quantity`` and ``unit`` of the display, and options of `plot`.
 
         Returns
         -------
@@ -164,21 +211,25 @@ class PredictionDisplay:
         """
         if (lowest is None) != (highest is None):
             raise ValueError("only one of lowest and highest is given; expected both or none")
-        tables = {"predicted": predicted, "lowest": lowest, "highest": highest}
-        for name, table in tables.items():
+        by_label = predicted if isinstance(predicted, Mapping) else {labels[1]: predicted}
+        by_label = {str(label): table for label, table in by_label.items() if table is not None}
+        given = {"predicted" if label == labels[1] else label: table for label, table in by_label.items()}
+        for name, table in {**given, "lowest": lowest, "highest": highest}.items():
             if table is not None:
                 check_like(measured, table, ("measured", name))
-        read = [None if table is None else as_table(table, name) for name, table in tables.items()]
-        display = cls(as_table(measured, "measured"), *read, labels=labels, interval_label=interval_label, unit=unit)
-        return display.plot(**options)
+        tables = {label: as_table(table, label) for label, table in by_label.items()}
+        ends = [None if table is None else as_table(table, "interval") for table in (lowest, highest)]
+        if temperature is not None:
+            options["temperature"] = one_temperature(temperature, measured)
+        return cls._drawn(as_table(measured, "measured"), tables, *ends, label=labels[0], **options)
 
     def plot(
         self,
-        ax: Axes = None,
+        ax: Axes | np.ndarray | None = None,
         *,
-        kind: Literal["time", "scatter"] = "time",
+        kind: Literal["time", "points", "lines", "scatter", "temperature"] | None = None,
         titles: Sequence[str] | None = None,
-        marks: Mapping[str, Any] | None = None,
+        marks: Mapping[str, object] | None = None,
         n_columns: int | None = None,
     ) -> PredictionDisplay:
         """Draw into axes.
@@ -187,14 +238,15 @@ class PredictionDisplay:
         ----------
         ax : matplotlib's Axes or array of Axes, optional
             One for each column. A new figure by default.
-        kind : {"time", "scatter"}, default="time"
-            Both in time, or the predicted value over the measured one.
+        kind : {"time", "points", "lines", "scatter", "temperature"}, optional
+            By default "temperature" if there is one, or else "time": measured points and predicted lines in time.
+            "points" or "lines" draw both so; "scatter" draws the first predicted value over the measured one.
         titles : sequence of str, optional
             Names of the panels; by default those of the columns.
         marks : mapping of str to time or number, optional
-            Vertical lines by their label, for ``kind="time"``; on an axis of time, a number is a record's position.
+            Vertical lines in time by their label; on an axis of time, a number is a record's position.
         n_columns : int, optional
-            Panels beside each other in a new figure; by default 1 in time and 3 in a scatter plot.
+            Panels beside each other in a new figure; by default 1 in time, and 3 or 4 otherwise.
 
         Returns
         -------
@@ -206,58 +258,107 @@ class PredictionDisplay:
         ValueError
             If ``kind`` is something else, or a mark is not on the axis.
         """
-        if kind not in ("time", "scatter"):
-            raise ValueError(f"kind is {kind!r}; expected 'time' or 'scatter'")
+        kind = kind or ("time" if self.temperature is None else "temperature")
+        if kind not in KINDS:
+            raise ValueError(f"kind is {kind!r}; expected one of {KINDS}")
         names = panel_names(titles, list(self.measured.columns))
-        n_columns = n_columns or (1 if kind == "time" else 3)
-        size = (3.4, 3.3) if kind == "scatter" else size_in_time(len(names), n_columns)
-        self.axes_ = panels(ax, names, size, n_columns, share_x=kind == "time")
-        self.figure_ = self.axes_[0].figure
-        self.measured_: list[Any] = []
-        self.predicted_: list[Any] = []
-        self.bands_: list[Any] = []
+        is_square = kind in ("scatter", "temperature")
+        n_columns = n_columns or (1 if not is_square else 3 if kind == "scatter" or len(names) == 6 else 4)
+        size = (3.3, 3.2) if is_square else size_in_time(len(names), n_columns)
+        self._take_axes(ax, names, size, n_columns=n_columns, share_x=not is_square)
+        self.lines_: dict[str, list[Line2D]] = {}
+        self.bands_: list[PolyCollection] = []
         if kind == "scatter":
             self._draw_scatter(names)
             return self
-        self._draw_time()
-        for one, name in zip(self.axes_, names, strict=True):
-            one.set_ylabel(with_unit(name, self.unit))
-        bands = [table.to_numpy() for table in (self.lowest, self.highest) if table is not None]
-        for column, one in enumerate(self.axes_):
-            hold_outliers(one, also=[band[:, column] for band in bands])
-        for one in self.axes_[-n_columns:] if ax is None else self.axes_:
-            date_axis(one, self.measured.index)
-        draw_marks(self.axes_, marks, self.measured.index)
-        figure_legend(self.axes_, ax is None)
+        if kind == "temperature":
+            self._draw_over_temperature(names, n_columns)
+        else:
+            self._draw_in_time(names, kind)
+            for one in self.axes_[-n_columns:] if ax is None else self.axes_:
+                date_axis(one, self.measured.index)
+            draw_marks(self.axes_, marks, self.measured.index)
+        if len(self.lines_) > 1 or self.bands_:
+            figure_legend(self.axes_, ax is None)
         return self
 
-    def _draw_time(self) -> None:
-        x, measured = in_time(self.measured)
-        x_line, predicted = with_breaks(*in_time(self.predicted))
-        points = marker_style(0, len(x))
-        for column, one in enumerate(self.axes_):
-            self.measured_ += one.plot(x, measured[:, column], **points, label=plain(self.labels[0]))
-            style = line_style(1)
-            self.predicted_ += one.plot(x_line, predicted[:, column], **style, label=plain(self.labels[1]))
-        if self.lowest is None or self.highest is None:
-            return
-        lowest, highest = (with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest))
-        is_known = np.isfinite(lowest) & np.isfinite(highest)
-        for column, one in enumerate(self.axes_):
-            ends = lowest[:, column], highest[:, column]
-            style = {"color": ORANGE, "alpha": 0.25, "linewidth": 0, "zorder": 1, "label": plain(self.interval_label)}
-            self.bands_.append(one.fill_between(x_line, *ends, where=is_known[:, column], **style))
+    @property
+    def _tables(self) -> dict[str, pd.DataFrame]:
+        """What is measured and what is predicted, by label."""
+        return {self.label: self.measured, **(self.predicted or {})}
+
+    def _draw_lines(self, label: str, x: Array, values: Array, style: Mapping[str, object]) -> None:
+        style = {**style, "label": shortened(label)}
+        self.lines_[label] = [one.plot(x, column, **style)[0] for one, column in zip(self.axes_, values.T, strict=True)]
+
+    def _draw_in_time(self, names: Sequence[str], kind: str) -> None:
+        for number, (label, table) in enumerate(self._tables.items()):
+            x, values = in_time(table)
+            if kind == "points" or (kind == "time" and number == 0):
+                self._draw_lines(label, x, values, marker_style(number, len(x)))
+            else:
+                style = line_style(number, number - (kind == "time"))
+                self._draw_lines(label, *with_breaks(x, values), style)
+        ends: list[Array] = []
+        if self.lowest is not None and self.highest is not None:
+            x = with_breaks(*in_time(self.lowest))[0]
+            ends = [with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest)]
+            is_known = np.isfinite(ends).all(axis=0)
+            style = {"color": ORANGE, "alpha": 0.25, "linewidth": 0, "zorder": 1}
+            style["label"] = shortened(self.interval_label)
+            for column, one in enumerate(self.axes_):
+                both = [end[:, column] for end in ends]
+                self.bands_.append(one.fill_between(x, *both, where=is_known[:, column], **style))
+        for column, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
+            one.set_ylabel(with_unit(f"{name}\n{self.quantity}" if self.quantity else name, self.unit))
+            hold_outliers(one, also=[end[:, column] for end in ends])
+
+    def _draw_over_temperature(self, names: Sequence[str], n_columns: int) -> None:
+        if self.temperature is None:
+            raise ValueError("kind is 'temperature', and no temperature is given; expected one")
+        for number, (label, table) in enumerate(self._tables.items()):
+            style = marker_style(number, len(table)) | {"alpha": 0.7 if number else 1.0}
+            self._draw_lines(label, self.temperature.to_numpy(), table.to_numpy(), style)
+        sensor = "temperature" if self.temperature.name is None else label_of(self.temperature.name)
+        for number, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
+            one.set(title=name, xlabel=with_unit(sensor, "°C"))
+            hold_outliers(one, direction="x")
+            hold_outliers(one)
+            if number % n_columns == 0:
+                one.set_ylabel(with_unit(self.quantity or "frequency", self.unit))
 
     def _draw_scatter(self, names: Sequence[str]) -> None:
-        points = {**marker_style(0, len(self.measured)), "color": BLUE}
+        label, predicted = next(iter((self.predicted or {}).items()))
+        points = marker_style(0, len(self.measured)) | {"color": BLUE}
+        self.lines_[label] = []
         for column, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
-            pair = self.measured.iloc[:, column].to_numpy(), self.predicted.iloc[:, column].to_numpy()
-            self.measured_ += one.plot(*pair, **points)
-            known = np.isfinite(pair[0]) & np.isfinite(pair[1])
+            pair = self.measured.iloc[:, column].to_numpy(), predicted.iloc[:, column].to_numpy()
+            self.lines_[label] += one.plot(*pair, **points)
+            known = np.isfinite(pair).all(axis=0)
             if known.any():
                 one.axline((np.mean(pair[0][known]),) * 2, slope=1, color=BLACK, linewidth=0.8, linestyle="--")
-            one.set(title=name)
-            one.set_xlabel(with_unit(self.labels[0], self.unit))
-            one.set_ylabel(with_unit(self.labels[1], self.unit))
+            one.set(title=name, xlabel=with_unit(self.label, self.unit), ylabel=with_unit(label, self.unit))
             for direction in "xy":
                 hold_outliers(one, direction=direction)
+
+
+def one_temperature(temperature: ArrayLike, measured: ArrayLike) -> pd.Series:
+    """One sensor's temperatures on the rows of what is measured, without a name where they have none."""
+    check_same_rows(temperature, measured, ("temperature", "measured"))
+    table = as_table(temperature, "temperature", "T")
+    if table.shape[1] != 1:
+        raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
+    is_named = getattr(temperature, "name", None) is not None or isinstance(temperature, pd.DataFrame)
+    return table.iloc[:, 0].rename(table.columns[0] if is_named else None)
+
+
+def chosen_sensor(X: ArrayLike, sensor: Hashable) -> pd.Series:
+    """One column of the temperatures, by its name or, in an array, by its number."""
+    temperatures = as_table(X, "temperatures", "T")
+    if isinstance(X, pd.DataFrame):
+        if sensor not in X:
+            raise ValueError(f"sensor is {sensor!r}; expected one of {column_names(X, 'T')}")
+        return temperatures[sensor]
+    if not isinstance(sensor, int | np.integer) or not 0 <= sensor < temperatures.shape[1]:
+        raise ValueError(f"sensor is {sensor!r}; expected a column's number from 0 to {temperatures.shape[1] - 1}")
+    return temperatures.iloc[:, sensor]

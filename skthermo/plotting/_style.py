@@ -4,7 +4,7 @@ import re
 from collections.abc import Hashable
 from types import ModuleType
 
-from skthermo._formatting import printable
+from skthermo._tables.text import printable
 from skthermo._validation import import_optional
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"

@@ -1,20 +1,25 @@
 """What is drawn, as frames of columns over time or over the number of the record."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.exceptions import NotFittedError
 
-from skthermo._arrays import as_columns, real_array
-from skthermo._frames import check_same_rows
+from skthermo._tables.arrays import as_columns, real_array
+from skthermo._tables.frames import check_same_rows
+
+if TYPE_CHECKING:
+    from skthermo.studies import DetectabilityStudy
 
 LONG_GAP = 10  # usual steps of time from which on a line breaks between two records
 
 
-def as_table(values: Any, what: str, prefix: str = "f") -> pd.DataFrame:
+def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
     """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0."""
     if isinstance(values, pd.Series):
         values = values.to_frame(f"{prefix}1" if values.name is None else values.name)
@@ -27,7 +32,7 @@ def as_table(values: Any, what: str, prefix: str = "f") -> pd.DataFrame:
     return pd.DataFrame(columns, columns=[f"{prefix}{i + 1}" for i in range(columns.shape[1])])
 
 
-def check_like(first: Any, other: Any, names: tuple[str, str]) -> None:
+def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
     """Raise an error if two tables differ in shape or index."""
     check_same_rows(first, other, names)
     if np.shape(as_columns(first)) != np.shape(as_columns(other)):
@@ -35,22 +40,6 @@ def check_like(first: Any, other: Any, names: tuple[str, str]) -> None:
             f"{names[0]} has {as_columns(first).shape[1]} columns and {names[1]} {as_columns(other).shape[1]}; "
             "expected the same"
         )
-
-
-def as_tables(histories: Any, what: str, prefix: str = "f") -> dict[str, pd.DataFrame]:
-    """Labelled tables with the same number of columns, which may have different rows."""
-    if not isinstance(histories, Mapping):
-        histories = {"": histories}
-    tables = {str(label): as_table(values, f"{what} {label!r}", prefix) for label, values in histories.items()}
-    if not tables:
-        raise ValueError(f"{what} is empty; expected a mapping of label to table")
-    first_label, first = next(iter(tables.items()))
-    for label, table in tables.items():
-        if table.shape[1] != first.shape[1]:
-            raise ValueError(
-                f"{what} {label!r} has {table.shape[1]} columns and {first_label!r} {first.shape[1]}; expected the same"
-            )
-    return tables
 
 
 def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:
@@ -75,7 +64,7 @@ def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
     return np.insert(x, before + 1, x[before] + usual), np.insert(values, before + 1, np.nan, axis=0)
 
 
-def check_study(study: Any) -> None:
+def check_study(study: DetectabilityStudy) -> None:
     """Raise an error for what is no study, or one without results."""
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")

@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
-from skthermo._arguments import by_mode, is_model
-from skthermo._arrays import as_floats, real_array
-from skthermo._frames import check_columns, frame_like, warn_of_markers
+from skthermo._estimators.arguments import by_mode, is_model
+from skthermo._tables.arrays import as_floats, real_array
+from skthermo._tables.frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -20,7 +20,6 @@ from skthermo._validation import (
     _fit_context,
     check_array,
     check_is_fitted,
-    validate_data,
 )
 
 
@@ -159,9 +158,6 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
         if self.method == "scale":
             return frame_like(X, F / self.reference_ * self.mean_)
         return frame_like(X, F - self.reference_ + self.mean_)
-
-    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
 
     def _read_reference(self, n_modes: int) -> NDArray[np.float64]:
         if self.reference is None:

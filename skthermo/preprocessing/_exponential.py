@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._frames import frame_like
-from skthermo._validation import _check_feature_names_in, _fit_context, check_is_fitted
-from skthermo._warnings import explain_rows, warn_user
-from skthermo.preprocessing._past import PastFeatures, in_words
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.text import duration_text
+from skthermo._validation import _fit_context, check_is_fitted
+from skthermo.preprocessing._past import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
 REACH = 4  # time constants beyond which records have no weight; they would have 2 % of it
@@ -51,8 +51,8 @@ class ExponentialMeans(PastFeatures):
         Time zone of the stamps.
     first_row_ : ndarray of shape (n_sensors,)
         Earliest record of `fit`: means of records that begin with it have no past, and no warning says so again.
-    reach_ : int
-        How far back means look, in nanoseconds on a DatetimeIndex, else in rows.
+    lookback_ : int or numpy.timedelta64
+        How far back means look: a number of rows, or a time on a DatetimeIndex.
     n_features_in_ : int
         Number of sensors.
     feature_names_in_ : ndarray of str
@@ -71,7 +71,8 @@ class ExponentialMeans(PastFeatures):
 
     Records of `fit` and of `transform` count together, as in `LagFeatures`: for a stamp in both, the values of
     `transform`. Rows may come in any order, which the result keeps. Without a DatetimeIndex rows count as consecutive,
-    and those of `fit` are not used in `transform`.
+    and those of `fit` are not used in `transform`. There is a warning if more than half of the rows have no record that
+    is older than the longest time constant, and do not begin as the records of `fit` do.
 
     Examples
     --------
@@ -136,43 +137,13 @@ class ExponentialMeans(PastFeatures):
         self.first_row_ = values[0 if stamps is None else stamps.argmin()].copy()
         return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Append the means.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius; NaN is allowed.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_sensors + n_means)
-            Columns of X, then the means of all sensors for each time constant. A frame gives a frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If the number or names of sensors, or the kind of index, differ from `fit`.
-
-        Warns
-        -----
-        UserWarning
-            If more than half of the rows have no record that is older than the longest time constant, and do not begin
-            as the records of `fit` do.
-        """
-        check_is_fitted(self)
-        values = self._validated(X, reset=False)
-        stamps = self._stamps_as_in_fit(X)
+    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
             own, records = np.arange(len(values)), values
             times = own
         else:
             own = stamps.as_unit("ns").asi8
-            times, records = self._joined(self._found(own, self.reach_), own, values)
+            times, records = self._joined(self._found(own, REACH * self._longest), own, values)
         order = np.argsort(times, kind="stable")
         sorted_times, sorted_records = times[order], records[np.ix_(order, self.sensors_)]
         back = np.empty(len(order), dtype=np.intp)
@@ -180,25 +151,7 @@ class ExponentialMeans(PastFeatures):
         rows = back[len(order) - len(own) :]
         means = [trailing_means(sorted_times, sorted_records, int(constant))[rows] for constant in self.time_constants_]
         told = self._warn_of_no_past(X, values, own, sorted_times)
-        features = np.hstack([values, *means]).astype(values.dtype, copy=False)
-        names = self._names(getattr(X, "columns", ()))
-        return explain_rows(frame_like(X, features, names), told)
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: those of the sensors, then sensor_mean30D and the like.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Names of the sensors; by default those seen in `fit`.
-
-        Returns
-        -------
-        ndarray of str
-            Names of the columns of `transform`.
-        """
-        check_is_fitted(self)
-        return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
+        return np.hstack([values, *means]).astype(values.dtype, copy=False), told
 
     def lacks_past(self, X: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows follow the first record by less than two time constants: their means lack the weather before.
@@ -219,9 +172,10 @@ class ExponentialMeans(PastFeatures):
         return own - first < PAST * self._longest
 
     @property
-    def reach_(self) -> int:
-        """How far back means look, in nanoseconds on a DatetimeIndex, else in rows."""
-        return REACH * self._longest
+    def lookback_(self) -> int | np.timedelta64:
+        """How far back means look: a number of rows, or a time on a DatetimeIndex."""
+        reach = REACH * self._longest
+        return reach if self.stamps_ is None else np.timedelta64(reach, "ns")
 
     @property
     def _longest(self) -> int:
@@ -253,7 +207,7 @@ class ExponentialMeans(PastFeatures):
         if is_first or 2 * lacking.sum() <= len(own):
             return np.False_
         is_timed = self.stamps_ is not None
-        reach = in_words(np.timedelta64(self._longest, "ns")) if is_timed else f"{self._longest} rows"
+        reach = duration_text(pd.Timedelta(self._longest)) if is_timed else f"{self._longest} rows"
         warn_user(
             f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before: their means are of the few "
             f"records since {X.index.min() if is_timed else 'the first row'}; give those of {REACH} times {reach} "

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._times import has_stamps, row_times
+from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import _num_samples
 from skthermo.preprocessing._stamps import as_duration
 

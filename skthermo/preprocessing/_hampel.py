@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OneToOneFeatureMixin
 
-from skthermo._arrays import NORMAL, Array, as_floats, robust_deviation
-from skthermo._frames import check_positions_are_names, frame_like, positions_of
-from skthermo._times import has_stamps, row_times
+from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
+from skthermo._tables.frames import check_positions_are_names, frame_like, positions_of
+from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import (
     Estimator,
     Interval,

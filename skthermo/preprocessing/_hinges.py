@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import broken_lines
-from skthermo._frames import frame_like, row_weights
+from skthermo._tables.arrays import broken_lines
+from skthermo._tables.frames import frame_like, row_weights
 from skthermo._validation import (
     Estimator,
     Interval,

@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.impute import KNNImputer
 
-from skthermo._arrays import rows_by_pattern
-from skthermo._frames import frame_like, warn_of_markers
+from skthermo._tables.arrays import rows_by_pattern
+from skthermo._tables.frames import frame_like, warn_of_markers
 from skthermo._validation import (
     _check_feature_names_in,
     _get_weights,

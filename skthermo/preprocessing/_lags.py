@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from datetime import timedelta
 from numbers import Integral
-from typing import Any, Literal, overload
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._frames import frame_like
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.text import duration_text
 from skthermo._validation import (
     Interval,
     StrOptions,
-    _check_feature_names_in,
     _fit_context,
-    check_is_fitted,
 )
-from skthermo._warnings import explain_rows, warn_user
-from skthermo.preprocessing._past import PastFeatures, in_words
+from skthermo.preprocessing._past import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
 DEFAULT_TOLERANCE = 6  # times freq
@@ -60,6 +58,8 @@ class LagFeatures(PastFeatures):
         Their stamps, in UTC where they have a time zone.
     time_zone_ : str or None
         Time zone of the stamps.
+    lookback_ : int or numpy.timedelta64
+        How far back the longest lag looks: a number of rows, or a time on a DatetimeIndex, the tolerance included.
     first_rows_ : ndarray
         First records of `fit`, as many as lags reach back and one more: the padding of records that begin with them
         is known from `fit`, and no warning says so again.
@@ -79,6 +79,10 @@ class LagFeatures(PastFeatures):
     values of `transform` count. Rows may come in any order, which the result keeps.
 
     A missing value is NaN in every lag that refers to it.
+
+    Lags that reach before the first row of records without a DatetimeIndex that do not begin as those of `fit` do give
+    a warning; so do, on a DatetimeIndex, lags of more than half of the rows that are before the first record given and
+    find none.
 
     Examples
     --------
@@ -141,38 +145,6 @@ class LagFeatures(PastFeatures):
             not positive or has no fixed length, as a month; if a stamp is missing or occurs twice; if the index holds
             durations, or stamps as text.
         """
-        self._learn(X)
-        return self
-
-    @overload
-    def fit_transform(self, X: pd.DataFrame, y: None = None) -> pd.DataFrame: ...
-    @overload
-    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
-        """`fit` and `transform` of the same records, which are checked once.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_sensors * n_lags)
-            A frame gives a frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            As in `fit`.
-        """
-        return self._lagged(X, *self._learn(X))
-
-    def _learn(self, X: Any) -> tuple[NDArray, pd.DatetimeIndex | None]:
-        """Read the lags, store the records; their values and stamps."""
         values = self._validated(X, reset=True)
         self.lags_ = _read_lags(self.lags, len(values))
         self.freq_ = self.tolerance_ = None
@@ -194,67 +166,20 @@ class LagFeatures(PastFeatures):
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
-        return values, stamps
+        return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Lagged values, one block of columns for each sensor.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_sensors * n_lags)
-            A frame gives a frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If the number or names of sensors, or the kind of index, differ from `fit`.
-
-        Warns
-        -----
-        UserWarning
-            If lags reach before the first row of records without a DatetimeIndex that do not begin as those of `fit`
-            do; if, on a DatetimeIndex, more than half of the rows have lags before the first record that was given and
-            find none.
-        """
-        check_is_fitted(self)
-        values = self._validated(X, reset=False)
-        return self._lagged(X, values, self._stamps_as_in_fit(X))
-
-    def _lagged(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> Any:
-        """Lagged values, as a frame if X is one."""
+    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
-            told = self._warn_of_padding(values)
-            lagged = self._by_row(values, self.lags_)
-        else:
-            lagged, told = self._by_time(stamps, values)
-        return explain_rows(frame_like(X, lagged, self._lag_names(getattr(X, "columns", ()))), told)
+            return self._by_row(values, self.lags_), self._warn_of_padding(values)
+        return self._by_time(stamps, values)
 
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: sensor_lag0, sensor_lag1, ...
+    @property
+    def lookback_(self) -> int | np.timedelta64:
+        """How far back the longest lag looks: a number of rows, or a time, the tolerance included."""
+        longest = max(self.lags_)
+        return longest * self.freq_ + self.tolerance_ if longest and self.freq_ is not None else longest
 
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Names of the sensors; by default those seen in `fit`.
-
-        Returns
-        -------
-        ndarray of str
-            Sensor and lag of each column.
-        """
-        check_is_fitted(self)
-        return np.array(self._lag_names(_check_feature_names_in(self, input_features)), dtype=object)
-
-    def _lag_names(self, sensors: Iterable[Any]) -> list[str]:
+    def _names(self, sensors: Sequence[Any]) -> list[str]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
 
     def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:
@@ -276,7 +201,7 @@ class LagFeatures(PastFeatures):
         rows these are."""
         is_told = bool(2 * unknown.sum() > len(unknown))
         if is_told:
-            reach = in_words(max(self.lags_) * self.freq_)
+            reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
-from skthermo._frames import check_same_rows, column_names, columns_by_sensor
-from skthermo._saved_frames import SavesFrames
-from skthermo._times import has_stamps
+from skthermo._tables.arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
+from skthermo._tables.frames import check_same_rows, column_names, columns_by_sensor
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import DAY_NS, has_stamps
 from skthermo.preprocessing._exponential import PAST, ExponentialMeans, trailing_means
 from skthermo.preprocessing._weather_regression import (
     KNOTS,
@@ -26,7 +26,6 @@ from skthermo.preprocessing._weather_regression import (
 TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
 MOST_CHOSEN = 2  # time constants that are put in
 LEAST_SPANS = 4  # time constants that the records last
-DAY = 86400e9  # nanoseconds
 N_FOLDS = 5  # contiguous ones, so that a season is predicted from others
 LEAST_ROWS = 100
 MOST_ROWS = 3000  # evenly spread, from which errors are computed
@@ -59,17 +58,12 @@ class MemoryFindings(SavesFrames):
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import pandas as pd
-    >>> from skthermo.preprocessing import ExponentialMeans, find_memory
-    >>> random, days = np.random.default_rng(0), pd.date_range("2023-01-01", periods=1000)
-    >>> season = 10 - 10 * np.cos(2 * np.pi * np.arange(1000) / 365.25)
-    >>> air = pd.DataFrame({"air": season + 4 * random.standard_normal(1000)}, days)
-    >>> soil = ExponentialMeans(["40D"]).fit_transform(air)["air_mean40D"]
-    >>> f = pd.DataFrame({"f1": 4 - 0.004 * air["air"] - 0.008 * soil + 0.01 * random.standard_normal(1000)})
-    >>> memory = find_memory(air[270:], f[270:])
-    >>> round(memory.fall, 1)
-    0.7
+    >>> from skthermo.preprocessing import find_memory
+    >>> memory = find_memory([[4.0], [5.0]], [[2.1], [2.0]])
+    >>> print(memory.summary())
+    No memory found: means of earlier temperatures do not explain the frequencies clearly better.
+    >>> memory.fall
+    0.0
     """
 
     table: pd.DataFrame
@@ -152,6 +146,8 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     >>> soil = ExponentialMeans(["40D"]).fit_transform(air)["air_mean40D"]
     >>> f = pd.DataFrame({"f1": 4 - 0.004 * air["air"] - 0.008 * soil + 0.01 * random.standard_normal(1000)})
     >>> memory = find_memory(air[270:], f[270:])
+    >>> round(memory.fall, 1)
+    0.7
     >>> memory.features
     ExponentialMeans(sensors=['air'], time_constants=['40D'])
     """
@@ -221,7 +217,7 @@ class _Candidates:
             inputs,
             values,
             scale,
-            (times[rows] - times[0]) / DAY,
+            (times[rows] - times[0]) / DAY_NS,
             folds,
             grams,
             weather,

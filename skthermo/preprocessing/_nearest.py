@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from skthermo._arrays import Array, rows_by_pattern
+from skthermo._tables.arrays import Array, rows_by_pattern
 
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]

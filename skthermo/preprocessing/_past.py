@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._validation import Estimator, TransformerMixin, validate_data
+from skthermo._estimators.warnings import explain_rows
+from skthermo._tables.frames import frame_like
+from skthermo._validation import (
+    Estimator,
+    TransformerMixin,
+    _check_feature_names_in,
+    check_is_fitted,
+)
 from skthermo.preprocessing._stamps import as_stamps
 
 EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
@@ -21,8 +29,63 @@ class PastFeatures(TransformerMixin, Estimator):
     stamps_: NDArray | None
     time_zone_: str | None
 
-    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Features of every row, from its own values and those of earlier records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius; NaN is allowed.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features)
+            In the columns of `get_feature_names_out`. A frame gives a frame on its own index.
+
+        Raises
+        ------
+        ValueError
+            If the number or names of sensors, or the kind of index, differ from `fit`.
+
+        Warns
+        -----
+        UserWarning
+            If many rows lack records before them, as the notes of the class say.
+        """
+        check_is_fitted(self)
+        values = self._validated(X, reset=False)
+        features, told = self._features(X, values, self._stamps_as_in_fit(X))
+        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), told)
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the columns: of each sensor and lag, or of the sensors and then of their means.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Names of the sensors; by default those seen in `fit`.
+
+        Returns
+        -------
+        ndarray of str
+            Such as ``T1_lag0`` or ``T1_mean30D``.
+        """
+        check_is_fitted(self)
+        return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
+
+    def _features(
+        self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None
+    ) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
+        """The features, and the rows of which a warning has said why they lack some."""
+        raise NotImplementedError
+
+    def _names(self, sensors: Sequence[Any]) -> list[Any]:
+        """Names of the features of some sensors."""
+        raise NotImplementedError
 
     def _remember(self, X: Any, values: NDArray) -> pd.DatetimeIndex | None:
         """Store the records of `fit` where they have stamps, and return these."""
@@ -74,12 +137,6 @@ def stamps_of(X: Any) -> pd.DatetimeIndex | None:
             f"{np.flatnonzero(index.duplicated())[0]}; expected each stamp once"
         )
     return index
-
-
-def in_words(duration: np.timedelta64) -> str:
-    """A duration in hours, or in days from two days on."""
-    hours = duration / np.timedelta64(1, "h")
-    return f"{hours:.3g} h" if hours < 48 else f"{hours / 24:.3g} days"
 
 
 def _time_zone(stamps: pd.DatetimeIndex) -> str | None:

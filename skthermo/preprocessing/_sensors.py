@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._frames import frame_like
+from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     Estimator,
     TransformerMixin,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import is_real
+from skthermo._tables.arrays import is_real
 
 LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
 ZERO = np.timedelta64(0, "ns")

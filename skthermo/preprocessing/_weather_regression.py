@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
 
 MOST_COORDINATES = 3  # principal components of the weather
 EXPLAINED = 0.99  # share of its variance that is enough

@@ -1,23 +1,26 @@
 """Sections of a report on the answer, and on what would be found and what not."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import bounds_text, counted, duration_text, percent, share_text
+from skthermo._tables.text import bounds_text, counted, duration_text, percent, share_text
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding
-from skthermo.reporting._html import Html, bar, bullets, element, figure, joined, paragraphs, section, table
-from skthermo.reporting._waits import how_soon
+from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, joined, paragraphs, section, table
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage
 
 MOST_LISTED = 12  # largest number of scenarios that are listed or drawn
+RELIABLE = 0.95  # share of the cases in which damage is found within the time that is told
+State: TypeAlias = Scenario | ProgressiveDamage | UncertainDamage
+WITHIN = {"1D": "a day", "7D": "a week", "30D": "30 days"}
 
 
-def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -> Html:
+def answer(study: DetectabilityStudy, findings: Sequence[Finding], identified: Sequence[str]) -> Section:
     """The answer in a few sentences, those on identified damage first."""
     rows = study.results_[study.results_["source"] == SIMULATED]
     confidence = percent(study.confidence_)
@@ -39,15 +42,8 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     parts += [element("h3", "How soon damage is found"), how_soon(study)]
     parts += [element("h3", "False alarms"), _false_alarms(rows)]
     if findings:
-        columns = ["Where", "Smallest damage found reliably", "Bounds", "From the curve; with 95 % confidence"]
-        cells = [(f.family, f.cell, f.bounds, f.curve_cell) for f in findings]
-        parts += [
-            element("h3", "Smallest damage that is found reliably, by shares of records"),
-            bullets(
-                element("span", element("strong", f"{found.family}:"), f" {found.sentence()}") for found in findings
-            ),
-            table("Smallest damage found reliably: among the tested severities, and from a curve.", columns, cells),
-        ]
+        items = (element("span", element("strong", f"{one.family}:"), f" {one.sentence()}") for one in findings)
+        parts += [element("h3", "Smallest damage that is found reliably, by shares of records"), bullets(items)]
     unclear = _unclear_families(rows, findings)
     if unclear:
         text = "of damage and strengthening together, or of one severity twice, no smallest damage can be given"
@@ -59,7 +55,49 @@ def answer(study: Any, findings: Sequence[Finding], identified: Sequence[str]) -
     return section("answer", "The answer", *parts)
 
 
-def _expected(study: Any) -> str:
+def how_soon(study: DetectabilityStudy) -> Html:
+    """Sentences on the smallest damage of each family, and a table of all scenarios."""
+    waits = study.time_to_find(level=RELIABLE)
+    is_healthy = dict(zip(study.results_["scenario"], study.results_["measure"] == "PFA", strict=True))
+    told = study.time_to_find(level=RELIABLE, smallest=True)
+    items = [
+        element("span", element("strong", f"{row['scenario']}:"), f" {row['text']}.")
+        for _, row in told.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable").iterrows()
+    ]
+    times = [name for name in waits if f"{name} healthy" in waits and waits[name].notna().any()]
+    meaning = (
+        "Damage may begin on any day of the simulated weather, and is found with the first alarm after that. An alarm "
+        "may also be a false one: the chance that the structure without damage raises one in the same time stands "
+        "beside. The longer the time, the more of both there are."
+    )
+    delayed = float(waits["not_judged"].max())
+    if delayed:
+        meaning += f" In {share_text(delayed)} of the time no record can be judged, which delays what is found."
+    labels = (WITHIN.get(name, f"{name} records" if name.isdigit() else name) for name in times)
+    columns = ["Scenario", *(f"Alarm within {label}" for label in labels), "In half of the cases", "In 95 of 100"]
+    cells = [
+        [row["scenario"], *(_chance(row, name) for name in times), _time(row["median"]), _time(row["reliable"])]
+        for _, row in waits.iterrows()
+    ]
+    caption = (
+        f"Chance of an alarm within a time from the beginning of the damage, with {percent(study.confidence_)} bounds"
+    )
+    return joined(
+        [bullets(items), paragraphs(meaning), table(f"{caption}, and time to the first alarm.", columns, cells)]
+    )
+
+
+def _chance(row: pd.Series, name: str) -> str:
+    if np.isnan(row[name]):
+        return "records too short or too rare"
+    return f"{share_text(row[name])} ({bounds_text(*(row[name + bound] for bound in (' lowest', ' highest')))})"
+
+
+def _time(wait: pd.Timedelta | float) -> str:
+    return "longer than the records" if pd.isna(wait) else duration_text(wait)
+
+
+def _expected(study: DetectabilityStudy) -> str:
     """What a measured campaign should show, where more than the scatter of the measurements was simulated."""
     if study.uncertainty_ is None:
         return ""
@@ -76,7 +114,7 @@ def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[s
     return [name for family in tested["family"].unique() if (name := str(family)) not in found]
 
 
-def _judged(study: Any) -> str:
+def _judged(study: DetectabilityStudy) -> str:
     """How many simulated records the alarm system judged."""
     unjudged = {name: index.isna() for (_, name, source), index in study.indices_.items() if source == SIMULATED}
     number, total = (int(sum(count)) for count in zip(*((u.sum(), len(u)) for u in unjudged.values()), strict=True))
@@ -89,7 +127,7 @@ def _judged(study: Any) -> str:
     )
 
 
-def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
+def found_and_missed(study: DetectabilityStudy, findings: Sequence[Finding]) -> Section:
     """Rates of all scenarios, curves and damage indices."""
     results = study.results_
     scenarios = {scenario.name: scenario for scenario in study.scenarios_}
@@ -122,10 +160,10 @@ def found_and_missed(study: Any, findings: Sequence[Finding]) -> Html:
             "What the alarm system sees",
         ),
     ]
-    return section("found", "What would be found and what not", *(part for part in parts if part))
+    return section("found", "What would be found and what not", *parts, link="What would be found")
 
 
-def _alarms(study: Any, scenarios: Mapping[str, Any]) -> Html:
+def _alarms(study: DetectabilityStudy, scenarios: Mapping[str, State]) -> Html:
     """A row for each scenario and source."""
     has_bands = study.uncertainty_ is not None
     columns = ["Scenario", "What is changed", "Records in alarm", "Bounds"]
@@ -146,13 +184,13 @@ def _alarms(study: Any, scenarios: Mapping[str, Any]) -> Html:
     return table("Alarms in every scenario.", columns, cells)
 
 
-def _share_not_judged(study: Any, row: pd.Series) -> str:
+def _share_not_judged(study: DetectabilityStudy, row: pd.Series) -> str:
     """What share of the records of a scenario was not judged; nothing if all were."""
     share = float(study.indices_[row["detector"], row["scenario"], row["source"]].isna().mean())
     return f" ({share_text(share)} not judged)" if share else ""
 
 
-def _beginning(study: Any) -> str:
+def _beginning(study: DetectabilityStudy) -> str:
     """A sentence that says when the time to the first alarm begins."""
     weather = study.indices_[next(key for key in study.indices_ if key[2] == SIMULATED)].index
     first = f", {_place(weather.min())}" if isinstance(weather, pd.DatetimeIndex) else ""
@@ -162,7 +200,7 @@ def _beginning(study: Any) -> str:
     )
 
 
-def described(scenario: Any) -> str:
+def described(scenario: State | None) -> str:
     """What a scenario changes, in words."""
     if scenario is None:
         return ""
@@ -184,7 +222,7 @@ def described(scenario: Any) -> str:
     return text if end is None else f"{text}, growing until {_place(end)}"
 
 
-def _place(onset: Any) -> str:
+def _place(onset: object) -> str:
     return f"record {onset}" if isinstance(onset, int | np.integer) else f"{pd.Timestamp(onset):%Y-%m-%d %H:%M}"
 
 
@@ -219,7 +257,9 @@ def _missed(rows: pd.DataFrame) -> Html:
     return joined([paragraphs(intro), bullets(items if len(items) <= MOST_LISTED else [*items[:MOST_LISTED], rest])])
 
 
-def _damage_indices(study: Any, findings: Sequence[Finding], scenarios: dict[str, Any]) -> list[Html]:
+def _damage_indices(
+    study: DetectabilityStudy, findings: Sequence[Finding], scenarios: Mapping[str, State]
+) -> list[Html]:
     """One drawing for each family, and for each scenario that belongs to none."""
     detector = study.detector_name()
     if study.thresholds_[detector] is None:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo._formatting import significant
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import significant
 from skthermo.reporting._html import Html, element, joined
 
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 640, 220, 44, 24, 20  # of a chart, and its margins, in units of its view box

@@ -1,37 +1,50 @@
 """Drawings of a report, as SVG within the page."""
 
+from __future__ import annotations
+
 import textwrap
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import as_floats
-from skthermo._formatting import chance_text, counted, percent, printable, share_text, significant
+from skthermo._tables.arrays import as_floats
+from skthermo._tables.text import chance_text, counted, percent, printable, share_text, significant
 from skthermo._validation import import_optional
+from skthermo.fem import Structure
 from skthermo.plotting import (
     DamageIndexDisplay,
-    FrequencyTemperatureDisplay,
-    HistoryDisplay,
     IdentifiedDamageDisplay,
     PODCurveDisplay,
+    PredictionDisplay,
     StructureDisplay,
 )
 from skthermo.reporting._findings import Finding
 from skthermo.reporting._html import Html, image
-from skthermo.studies import PODCurve
+from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class HasFigure(Protocol):
+    """What is drawn has a figure."""
+
+    figure_: Figure
+
 
 WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
+LONGEST_LABEL = 28  # number of letters above which labels of a legend stand below each other
 MANY_POINTS = 1000  # number of points of one line from which on it is drawn as pixels
 SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
 
 
 def draw(
-    make: Callable[[], Any], alt: str, title: str = "", *, height: float | None = HEIGHT, width: float = WIDTH
+    make: Callable[[], HasFigure], alt: str, title: str = "", *, height: float | None = HEIGHT, width: float = WIDTH
 ) -> Html:
     """A display as an image of fixed width, in matplotlib's own style and on white.
 
@@ -45,30 +58,27 @@ def draw(
             own_width, own_height = display.figure_.get_size_inches()
             display.figure_.set_size_inches(width, own_height / own_width * width if height is None else height)
             if title:
-                display.figure_.axes[0].set_title(
-                    textwrap.shorten(printable(title), 50, placeholder=" ..."), fontsize="medium"
-                )
+                text = textwrap.shorten(printable(title), 50, placeholder=" ...")
+                display.figure_.axes[0].set_title(text, fontsize="medium", parse_math=False)
             return image(_svg(display.figure_), alt)
     finally:
         for number in set(plt.get_fignums()) - others:
             plt.close(number)
 
 
-def fold_legend(figure: Any, place: str, n_columns: int) -> None:
+def fold_legend(figure: Figure, place: str, n_columns: int) -> None:
     """Put the legend of a figure into fewer columns, so that it fits a narrow drawing."""
     for legend in list(figure.legends):
-        labels = [textwrap.shorten(text.get_text(), 28, placeholder=" ...") for text in legend.get_texts()]
+        labels = [text.get_text() for text in legend.get_texts()]
         legend.remove()
+        n_columns = n_columns if max(map(len, labels)) <= LONGEST_LABEL else 1
         style = {"ncols": n_columns, "frameon": False, "fontsize": "medium" if n_columns == 2 else "small"}
         figure.legend(legend.legend_handles, labels, loc=place, **style)
 
 
-def _svg(figure: Any) -> bytes:
+def _svg(figure: Figure) -> bytes:
     """A figure as SVG: letters as shapes or, if the font lacks some, as text in fonts of the reader."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
-    parser = import_optional("matplotlib.mathtext", extra="plot").MathTextParser("path")
-    for text in figure.findobj(lambda artist: hasattr(artist, "set_parse_math")):
-        text.set_parse_math("$" in text.get_text() and _is_formula(text.get_text(), parser))
     for line in figure.findobj(lambda artist: hasattr(artist, "get_xdata")):
         line.set_rasterized(len(line.get_xdata()) > MANY_POINTS)
     drawn = b""
@@ -83,15 +93,6 @@ def _svg(figure: Any) -> bytes:
     return drawn
 
 
-def _is_formula(text: str, parser: Any) -> bool:
-    """Whether matplotlib can read a text with dollar signs."""
-    try:
-        parser.parse(text)
-    except ValueError:
-        return False
-    return True
-
-
 def draw_histories(F: pd.DataFrame) -> list[Html]:
     """Measured frequencies over time, one drawing for each mode."""
     drawn = []
@@ -99,7 +100,7 @@ def draw_histories(F: pd.DataFrame) -> list[Html]:
         table = F.iloc[:, [mode]]
         low, high = (significant(value, 4) for value in (table.iloc[:, 0].min(), table.iloc[:, 0].max()))
         alt = f"Measured frequency {F.columns[mode]} over time: between {low} and {high} Hz."
-        drawn.append(draw(partial(HistoryDisplay.from_predictions, table), alt, height=2.2))
+        drawn.append(draw(partial(PredictionDisplay.from_predictions, table), alt, height=2.2))
     return drawn
 
 
@@ -107,12 +108,12 @@ def draw_over_temperature(temperature: pd.Series, measured: pd.DataFrame, predic
     """Measured and predicted frequencies over one temperature, one drawing for each mode."""
     drawn = []
     for mode in range(measured.shape[1]):
-        tables = temperature, measured.iloc[:, [mode]], predicted.iloc[:, [mode]]
+        tables = measured.iloc[:, [mode]], predicted.iloc[:, [mode]]
         alt = (
             f"Frequency {measured.columns[mode]} over the temperature {temperature.name}, measured and predicted by "
             "the model."
         )
-        drawn.append(draw(partial(FrequencyTemperatureDisplay.from_predictions, *tables), alt))
+        drawn.append(draw(partial(PredictionDisplay.from_predictions, *tables, temperature=temperature), alt))
     return drawn
 
 
@@ -138,7 +139,7 @@ def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
     return draw(make, alt, title, height=3.2)
 
 
-def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) -> Html:
+def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series], onset: object = None) -> Html:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
     threshold = study.thresholds_[study.detector_name()]
     above = "; ".join(
@@ -155,7 +156,7 @@ def draw_damage_indices(study: Any, shown: dict[str, Any], onset: Any = None) ->
     return draw(make, f"Damage index over time. {above}.", height=3.4)
 
 
-def draw_groups(structure: Any, families: list[str]) -> Html:
+def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
     """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
@@ -170,7 +171,7 @@ def draw_groups(structure: Any, families: list[str]) -> Html:
     return draw(make, alt, height=None, width=6.5)
 
 
-def draw_identified_damage(identified: Any) -> Html:
+def draw_identified_damage(identified: IdentifiedDamage) -> Html:
     """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]

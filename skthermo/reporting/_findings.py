@@ -2,15 +2,14 @@
 
 import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo._formatting import percent
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import percent
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies import PODCurve
+from skthermo.studies import DetectabilityStudy, PODCurve
 
 SIMULATED, REFERENCE = "data-informed", "reference"
 """Sources of records in the table of a study."""
@@ -46,30 +45,14 @@ class Finding:
         return bool(np.isfinite(self.smallest))
 
     @property
-    def cell(self) -> str:
-        """Smallest severity, for a table."""
-        if not self.is_found:
-            return f"none up to {self.largest}"
-        text = f"{_magnitude(self.smallest)}{' or less' if self.smallest == self.severities[0] else ''}"
-        return text if self.smallest > 0 else f"{text} (strengthening)"
-
-    @property
     def bounds(self) -> str:
-        """Its bounds, for a table."""
+        """Bounds of the smallest severity."""
         if np.isnan(self.lowest):
             return f"above {self.largest}"
         if self.lowest == self.highest:
             return _magnitude(self.lowest)
         upper = _magnitude(self.highest) if np.isfinite(self.highest) else f"above {self.largest}"
         return f"{_magnitude(self.lowest)} to {upper}"
-
-    @property
-    def curve_cell(self) -> str:
-        """Severity at which the curve reaches the level, and with 95 % confidence, for a table."""
-        if self.curve is None or np.isnan(self.curve.slope):
-            return "no curve"
-        doubt = " (doubtful)" if self.curve.n_missed else ""
-        return f"{self._on_curve(self.curve.a90)}; {self._on_curve(self.curve.a90_95)}{doubt}"
 
     def sentence(self) -> str:
         """The smallest severity that is found, and how uncertain it is."""
@@ -120,7 +103,7 @@ def _magnitude(severity: float) -> str:
     return percent(abs(severity))
 
 
-def findings_of(study: Any) -> list[Finding]:
+def findings_of(study: DetectabilityStudy) -> list[Finding]:
     """Findings for all families of simulated records."""
     rows = study.results_
     rows = rows[(rows["measure"] == "POD") & (rows["source"] == SIMULATED) & rows["family"].notna()]
@@ -129,7 +112,7 @@ def findings_of(study: Any) -> list[Finding]:
     return [found for name, some in families if (found := _finding(study, name, some)) is not None]
 
 
-def _finding(study: Any, family: Any, rows: pd.DataFrame) -> Finding | None:
+def _finding(study: DetectabilityStudy, family: object, rows: pd.DataFrame) -> Finding | None:
     rows = rows.iloc[np.argsort(rows["severity"].abs().to_numpy(), kind="stable")]
     severities = rows["severity"].to_numpy(dtype=float)
     try:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+import pandas as pd
 
-from skthermo._formatting import bounds_text, chance_text, share_text
+from skthermo._tables.text import bounds_text, chance_text, share_text
 from skthermo.reporting._figures import draw_identified_damage
-from skthermo.reporting._html import Html, bar, bullets, element, figure, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
+from skthermo.studies import IdentifiedDamage
 
 LEAST = 0.005  # probability from which on an explanation has a row
 UNITS = {
@@ -18,7 +19,7 @@ UNITS = {
 """What the amounts of a cause are, by its kind."""
 
 
-def identified_damage(identified: Any) -> Html:
+def identified_damage(identified: IdentifiedDamage) -> Section:
     """What is most probable, what else could be, how severe, and what cannot be told."""
     parts = [
         paragraphs(
@@ -48,7 +49,7 @@ def identified_damage(identified: Any) -> Html:
     return section("identified", "Identified damage", *parts)
 
 
-def _explanations(identified: Any) -> Html:
+def _explanations(identified: IdentifiedDamage) -> Html:
     """Explanations, the most probable first."""
     told = identified.told[identified.told["probability"] >= LEAST]
     explanations = [
@@ -62,7 +63,7 @@ def _explanations(identified: Any) -> Html:
     )
 
 
-def _shifts(identified: Any) -> Html:
+def _shifts(identified: IdentifiedDamage) -> Html:
     """Shift of each mode, measured and explained."""
     shifts = [
         [
@@ -79,7 +80,7 @@ def _shifts(identified: Any) -> Html:
     )
 
 
-def _row(cause: str, row: Any, is_unseen: bool) -> list[Any]:
+def _row(cause: str, row: pd.Series, is_unseen: bool) -> list[str]:
     """Cells of one cause."""
     if is_unseen:
         return [cause, "cannot be seen", UNITS[row["kind"]], "not known", "", ""]

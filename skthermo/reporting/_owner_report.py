@@ -4,37 +4,52 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
-from skthermo._arguments import check_path, check_size
-from skthermo._formatting import counted
+from skthermo._estimators.arguments import check_path, check_size
 from skthermo._io import write_when_complete
+from skthermo._tables.text import counted
 from skthermo.fem import Structure
+from skthermo.fleet import Fleet
+from skthermo.monitoring import Monitor
 from skthermo.reporting._answer import answer, found_and_missed
 from skthermo.reporting._choice import Choice
 from skthermo.reporting._findings import findings_of
-from skthermo.reporting._html import Html, page, paragraphs
+from skthermo.reporting._html import Html, Section, page, paragraphs
 from skthermo.reporting._identified import identified_damage
 from skthermo.reporting._model import monitored, quality
 from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.fleet import fleet_page
 from skthermo.reporting.service import Standing, monitor_page
-from skthermo.studies import IdentifiedDamage
+from skthermo.studies import DetectabilityStudy, IdentifiedDamage
+
+
+class PageKind(NamedTuple):
+    """A kind of subject: the attributes that tell it from others, what it has with results, and the page's heading."""
+
+    attributes: tuple[str, ...]
+    results: str
+    lacking: str
+    title: str
+
 
 KINDS = {
-    "Fleet": ("chains", "monitors", "discoveries"),
-    "Monitor": ("update", "acknowledge"),
-    "DetectabilityStudy": ("scenarios",),
-}
-"""Subjects, and what tells them from each other."""
-
-TITLES = {
-    "Fleet": "The bridges today",
-    "Monitor": "The structure today",
-    "DetectabilityStudy": "Which damage the monitoring would find",
+    "Fleet": PageKind(("chains", "monitors", "discoveries"), "table", "", "The bridges today"),
+    "Monitor": PageKind(
+        ("update", "acknowledge"),
+        "events_",
+        "the monitor is not fitted yet; expected a call of fit before",
+        "The structure today",
+    ),
+    "DetectabilityStudy": PageKind(
+        ("scenarios",),
+        "results_",
+        "the study has no results yet; expected a call of run before",
+        "Which damage the monitoring would find",
+    ),
 }
 ONLY_FOR = {
     "identified": ("DetectabilityStudy", "Monitor"),
@@ -46,17 +61,17 @@ ONLY_FOR = {
 
 
 def owner_report(
-    subject: Any,
+    subject: DetectabilityStudy | Monitor | Fleet,
     path: str | os.PathLike[str],
     *,
-    identified: Any = None,
+    identified: IdentifiedDamage | None = None,
     title: str | None = None,
-    structure: Any = None,
+    structure: Structure | None = None,
     detector: str | None = None,
     max_false_alarms: float = 0.02,
     drift_limit: float = 0.1,
     false_share: float = 0.1,
-    now: Any = None,
+    now: str | pd.Timestamp | None = None,
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
@@ -136,14 +151,13 @@ def owner_report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
-    kind = next((kind for kind, methods in KINDS.items() if all(hasattr(subject, name) for name in methods)), None)
+    kind = next((kind for kind, one in KINDS.items() if all(hasattr(subject, name) for name in one.attributes)), None)
     if kind is None:
         raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
     if identified is not None and not isinstance(identified, IdentifiedDamage):
         raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
-    if not hasattr(subject, {"DetectabilityStudy": "results_", "Monitor": "events_", "Fleet": "table"}[kind]):
-        text = "the monitor is not fitted" if kind == "Monitor" else "the study has no results"
-        raise NotFittedError(f"{text} yet; expected a call of {'fit' if kind == 'Monitor' else 'run'} before")
+    if not hasattr(subject, KINDS[kind].results):
+        raise NotFittedError(KINDS[kind].lacking)
     if title is not None and not isinstance(title, str):
         raise ValueError(f"title is {title!r:.100}; expected a text")
     if structure is not None and not isinstance(structure, Structure):
@@ -159,66 +173,58 @@ def owner_report(
         )
     if file.is_dir():
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
-    heading = TITLES[kind] if title is None else title
     if kind != "DetectabilityStudy":
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
+    heading = KINDS[kind].title if title is None else title
     if kind == "Fleet":
         check_size(false_share, "false_share", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         introduction, sections = fleet_page(subject, file, heading, now, limit, false_share)
     elif kind == "Monitor":
         introduction, sections = monitor_page(Standing.of(subject, now, limit))
-        if identified is not None:
-            sections["identified"] = ("Identified damage", identified_damage(identified))
-            sections["settings"] = sections.pop("settings")
+        sections[-1:-1] = [] if identified is None else [identified_damage(identified)]
     else:
-        introduction, sections = _study_page(subject, identified, structure, detector, max_false_alarms)
+        introduction, sections = study_page(subject, identified, structure, detector, max_false_alarms)
     written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
     ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
     write_when_complete(file, page(heading, introduction, sections, ending))
     return file
 
 
-def _study_page(
-    study: Any, identified: Any, structure: Any, detector: str | None, max_false_alarms: float
-) -> tuple[Html, dict[str, tuple[str, Html]]]:
-    """What stands above the sections, and these with their titles."""
+def study_page(
+    study: DetectabilityStudy,
+    identified: IdentifiedDamage | None,
+    structure: Structure | None,
+    detector: str | None,
+    max_false_alarms: float,
+) -> tuple[Html, list[Section]]:
+    """What stands above the sections, and these."""
     choice = None
+    n_states = counted(study.results_["scenario"].nunique(), "state")
+    said = [f"The alarm system was tested by simulation, in {n_states} of the structure."]
     if study.results_["detector"].nunique() > 1:
         choice = Choice.of(study, detector, max_false_alarms)
+        n_systems = counted(len(choice.ranking), "alarm system")
+        said = [f"{n_systems} were tested by simulation, in {n_states} of the structure.", choice.sentence()]
+        study = choice.only()
     elif detector is not None:
         study.detector_name(detector)
-    n_states = counted(study.results_["scenario"].nunique(), "state")
-    tested = "The alarm system was" if choice is None else f"{counted(len(choice.ranking), 'alarm system')} were"
-    introduction = [f"{tested} tested by simulation, in {n_states} of the structure."]
-    introduction += [] if choice is None else [choice.sentence()]
-    sections = _sections(study if choice is None else choice.only(), identified, structure, choice)
-    return paragraphs(*introduction), sections
-
-
-def _sections(study: Any, identified: Any, structure: Any, choice: Choice | None) -> dict[str, tuple[str, Html]]:
     findings = findings_of(study)
-    now = [] if identified is None else identified.answer()
-    sections = {"answer": ("The answer", answer(study, findings, now))}
-    if choice is not None:
-        sections["choice"] = ("Which alarm system", choice.section())
-    sections |= {
-        "monitored": ("What was monitored", monitored(study, structure, [found.family for found in findings])),
-        "model": ("How good the model is", quality(study)),
-        "found": ("What would be found", found_and_missed(study, findings)),
-    }
-    if identified is not None:
-        sections["identified"] = ("Identified damage", identified_damage(identified))
-    return sections | {"settings": ("Settings", _settings(study, identified))}
-
-
-def _settings(study: Any, identified: Any) -> Html:
-    """Parameters and warnings of a study."""
-    parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()]}
-    rows = [[f"{part}: {name}", value] for part, estimator in parts.items() for name, value in parameters(estimator)]
-    rows += [
-        [f"study: {name}", value] for name, value in parameters(study) if name not in ("fem", "detectors", "scenarios")
-    ]
+    parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()], "study": study}
     warned = [*getattr(study, "warnings_", [])]
     warned += [f"Identified damage: {text}" for _, text in ([] if identified is None else identified.warnings())]
     caption = "Settings of the model, of the alarm system and of the study."
-    return settings("For the engineer who repeats this study.", caption, rows, warned)
+    sections = [
+        answer(study, findings, [] if identified is None else identified.answer()),
+        None if choice is None else choice.section(),
+        monitored(study, structure, [found.family for found in findings]),
+        quality(study),
+        found_and_missed(study, findings),
+        None if identified is None else identified_damage(identified),
+        settings(
+            "For the engineer who repeats this study.",
+            caption,
+            parameters(parts, but=("study: fem", "study: detectors", "study: scenarios")),
+            warned,
+        ),
+    ]
+    return paragraphs(*said), [one for one in sections if one is not None]

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import Any
 
-from skthermo.reporting._html import Html, bullets, element, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, bullets, element, paragraphs, section, table
 
 LONGEST_VALUE = 400  # number of letters after which the text of a setting is cut
 PACKAGES = ("skthermo", "numpy", "scipy", "pandas", "sklearn", "matplotlib")
 
 
 def settings(
-    introduction: str, caption: str, rows: Iterable[Sequence[Any]], warned: Sequence[str] | None = None
-) -> Html:
+    introduction: str, caption: str, rows: Iterable[Sequence[object]], warned: Sequence[str] | None = None
+) -> Section:
     """Settings by name, versions and, where warnings are known, these."""
     parts = [
         paragraphs(introduction),
@@ -27,13 +26,17 @@ def settings(
     return section("settings", "Settings", *parts)
 
 
-def parameters(estimator: Any) -> Iterator[tuple[str, Html]]:
-    """Parameters by name, as short text; of what has none, nothing."""
-    if not hasattr(estimator, "get_params"):
-        return
-    for name, value in estimator.get_params(deep=False).items():
-        text = " ".join(repr(value).split())
-        yield name, element("code", text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ...")
+def parameters(estimators: Mapping[str, object], but: Sequence[str] = ()) -> list[list[str | Html]]:
+    """Parameters of estimators as short text, by the name of their part; of what has none, nothing."""
+    rows: list[list[str | Html]] = []
+    for part, estimator in estimators.items():
+        found = estimator.get_params(deep=False) if hasattr(estimator, "get_params") else {}
+        for name, value in found.items():
+            text = " ".join(repr(value).split())
+            text = text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ..."
+            label = f"{part}: {name}"
+            rows += [] if label in but else [[label, element("code", text)]]
+    return rows
 
 
 def versions() -> list[list[str]]:

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._arrays import Array
-from skthermo._frames import check_columns, check_temperatures, frame_like, row_weights
-from skthermo._regressors import check_takes_weights
+from skthermo._estimators.regressors import check_takes_weights
+from skthermo._tables.arrays import Array
+from skthermo._tables.frames import check_columns, check_temperatures, frame_like, row_weights
 from skthermo._validation import HasMethods, _fit_context, check_is_fitted, seeded, validate_data
-from skthermo.surrogate._networks import default_lines
-from skthermo.surrogate._regression import MultiplierRegressor
+from skthermo.surrogate._regression import MultiplierRegressor, default_lines
 
 
 class TemperatureMapper(MultiplierRegressor):

@@ -14,8 +14,8 @@ from joblib import Memory
 from sklearn.utils.validation import check_memory
 
 import skthermo
+from skthermo._estimators.warnings import Told, give_again, recorded
 from skthermo._io import lock
-from skthermo._warnings import Told, give_again, recorded
 
 Result = TypeVar("Result")
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._arrays import Array, as_floats, central_differences
+from skthermo._tables.arrays import Array, as_floats, central_differences
 from skthermo.fem import FEModel, LocalModel
 from skthermo.updating._measured import Measured
 

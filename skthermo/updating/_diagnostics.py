@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arguments import seem_rad_per_s
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import seem_rad_per_s
+from skthermo._tables.arrays import Array
 from skthermo.fem import FEModel, ModalModel, share_reordered
 from skthermo.updating._comparison import macs, paired_modes
 from skthermo.updating._measured import Measured

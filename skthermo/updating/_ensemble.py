@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from joblib import delayed
 
-from skthermo._arguments import check_names
-from skthermo._arrays import Array
-from skthermo._frequency_effects import read_groups
+from skthermo._effects.frequencies import read_groups
+from skthermo._estimators.arguments import check_names
 from skthermo._io import run_jobs
+from skthermo._tables.arrays import Array
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._measured import Measured

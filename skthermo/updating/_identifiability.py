@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_model, check_noise
-from skthermo._arrays import HUGE, Array, is_real, real_array
-from skthermo._formatting import SPACE, counted, listed
+from skthermo._estimators.arguments import check_model, check_noise
+from skthermo._tables.arrays import HUGE, Array, is_real, real_array
+from skthermo._tables.text import SPACE, counted, listed
 from skthermo.fem import FEModel, shape_jacobian
 from skthermo.updating._comparison import tangent_derivatives
 from skthermo.updating._sensitivity import sensitivity, theta_or_nominal
@@ -59,9 +59,11 @@ class Identifiability(Bunch):
         shapes = f" with their shapes at {counted(self.n_dofs, 'degree')} of freedom" if self.n_dofs else ""
         yield f"{counted(len(names), 'parameter')}, {counted(self.n_modes, 'mode')}{shapes}."
         if self.rank < len(names):
+            more = "more degrees of freedom" if self.n_dofs else "shapes"
             yield (
                 f"At most {self.rank} of the {len(names)} parameters can be found together. Records in other weather "
-                f"do not help, since weather changes the parameters: expected {self._remedies()}."
+                f"do not help, since weather changes the parameters: expected fewer parameters, more modes, {more}, or "
+                "a prior."
             )
         for group in self.collinear:
             yield f"Cannot be told apart: {listed(group)}."
@@ -71,10 +73,6 @@ class Identifiability(Bunch):
             yield f"Can be found together {within}{others}: {listed(self.recommended)}."
         else:
             yield f"No parameter can be found {within}."
-
-    def _remedies(self) -> str:
-        more = "more degrees of freedom" if self.n_dofs else "shapes"
-        return f"fewer parameters, more modes, {more}, or a prior"
 
 
 def identifiability(

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import by_name, check_dofs
-from skthermo._arrays import Array, real_array, shape_array
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import by_name, check_dofs
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, real_array, shape_array
 
 
 @dataclass

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, least_squares, minimize
 
-from skthermo._arrays import Array
-from skthermo._threads import single_blas_thread
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._tables.arrays import Array
 
 TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
 

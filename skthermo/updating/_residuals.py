@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem import FEModel
 from skthermo.updating._comparison import PairedModes, paired_modes, tangent_derivatives, tangents
 from skthermo.updating._measured import Measured

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_model, check_theta
-from skthermo._arrays import HUGE, Array, central_differences, is_real, real_array
+from skthermo._estimators.arguments import check_model, check_theta
+from skthermo._tables.arrays import HUGE, Array, central_differences, is_real, real_array
 from skthermo.fem import FEModel, evaluate
 
 SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))

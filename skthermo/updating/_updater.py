@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import Literal
@@ -13,10 +12,19 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._arguments import Reduce, check_bounds, check_model, check_prior, check_size, is_auto, tolerance
-from skthermo._arrays import Array, Bounds, as_random_state, real_array
-from skthermo._frames import column_names
+from skthermo._estimators.arguments import (
+    Reduce,
+    check_bounds,
+    check_model,
+    check_prior,
+    check_size,
+    is_auto,
+    tolerance,
+)
+from skthermo._estimators.warnings import warn_each, warn_user
 from skthermo._io import run_jobs
+from skthermo._tables.arrays import Array, Bounds, as_random_state, real_array
+from skthermo._tables.frames import column_names
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -26,7 +34,6 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._warnings import warn_each
 from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (
     doubtful_frequencies,
@@ -255,11 +262,10 @@ class ModelUpdater(Estimator):
         prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
         n_parameters = len(bounds)
         if prior is None and n_parameters > measured.n_residuals:
-            warnings.warn(
+            warn_user(
                 f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
                 "equally well; expected fewer parameters, shapes, or a prior",
-                UserWarning,
-                stacklevel=3,
+                "few residuals",
             )
         model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
         residuals = Residuals(model, measured, prior)
@@ -286,7 +292,7 @@ class ModelUpdater(Estimator):
         else:
             doubts.append(unfinished(best, residuals))
         for message in doubts:
-            warnings.warn(message, UserWarning, stacklevel=3)
+            warn_user(message, f"doubtful optimum: {message}")
         if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
             self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
         return self

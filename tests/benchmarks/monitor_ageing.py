@@ -52,7 +52,7 @@ def followed(follower, T, F, n_first):
     for row, day in enumerate(days):
         if day in of_day.groups:
             records = of_day.get_group(day)
-            corrected.append(follower.corrected(state, None, records))
+            corrected.append(follower.corrected(state, records))
         one = slice(row, row + 1)
         if day > state.day:
             new = DailyMeans(days[one], daily.values[one], daily.counts[one], daily.basis[one])

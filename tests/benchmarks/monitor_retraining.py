@@ -26,6 +26,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining import begun_again, retrained
 from skthermo.preprocessing import HingeFeatures
 from skthermo.surrogate import TemperatureMapper
@@ -36,9 +38,21 @@ DAMAGE = {"bottom": 0.10}
 MOST_REFUSED, LEAST_REFUSED = 0.05, 0.95  # shares of healthy and of changed structures whose refit is refused
 
 
-def limit(detector, baseline=None):
+def limit(detector):
     """The threshold that the share asked for of a baseline's records exceeds."""
     return float(np.nanquantile(detector[-1].baseline_index_, 1 - ASKED))
+
+
+class ByRecords(ActiveDetector):
+    """A detector in charge whose threshold is that of records, so that few years tell rates."""
+
+    @property
+    def threshold(self):
+        return limit(self.detector)
+
+    @classmethod
+    def of(cls, detector, trained):
+        return cls(detector, trained, None, list(detector.feature_names_in_), *[None] * 8)
 
 
 def no_events():
@@ -47,10 +61,11 @@ def no_events():
 
 
 def in_service(detector, baseline, kept, targets):
-    """What a retraining reads of a monitor; thresholds by records, so that few years tell rates."""
+    """What a retraining reads of a monitor."""
     fitted = clone(detector).fit(baseline)
-    threshold = limit(fitted)
+    active = ByRecords.of(fitted, baseline)
     return SimpleNamespace(
+        active_=active,
         detector=detector,
         detector_=fitted,
         trained_=baseline,
@@ -60,7 +75,8 @@ def in_service(detector, baseline, kept, targets):
         events_=no_events(),
         faults_=None,
         targets_=targets,
-        threshold_=threshold,
+        threshold_=active.threshold,
+        memory_=Memory.of(fitted),
         random_state=0,
     )
 
@@ -98,7 +114,7 @@ def refit(seeds):
         targets = list(make_truss_campaign(n_years=1, samples_per_year=20, random_state=0).frequencies)
         for kind, records in kinds.items():
             monitor = in_service(lines(targets), records[:182], records[182:365], targets)
-            found = retrained(monitor, limit=limit)
+            found = retrained(monitor, None, ByRecords.of)
             threshold = limit(found.detector)
             row = {"kind": kind, "refused": 100 * (not found.accepted)}
             for name, detector, level in (
@@ -140,7 +156,7 @@ def after_intervention(detector, before, after, damaged, targets, days=DAYS):
         end = after.index[0] + pd.Timedelta(days=n_days)
         own, healthy, bad = after[after.index < end], after[after.index >= end], damaged[damaged.index >= end]
         monitor = in_service(detector, before, own, targets)
-        found = begun_again(monitor, own.index[0], limit=limit)
+        found = begun_again(monitor, own.index[0], ByRecords.of)
         threshold = limit(found.detector) if found.detector is not None else np.nan
         row = {"days": n_days}
         if found.accepted:

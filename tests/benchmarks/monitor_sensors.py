@@ -32,11 +32,11 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo._weather import SensorRegression
 from skthermo.datasets import load_z24, make_kw51_campaign, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring.sensors import SensorWatch
+from skthermo.residuals.weather import SensorRegression
 
 WEEK = pd.Timedelta(days=7)
 PATIENCE = 91

@@ -29,7 +29,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from slow_soil import slow_soil
 
-from skthermo._arrays import robust_deviation
+from skthermo._tables.arrays import robust_deviation
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.preprocessing import HampelFilter

@@ -17,7 +17,8 @@ import pandas as pd
 from scipy.special import ndtri
 from sklearn.utils import Bunch
 
-from skthermo.datasets.fleet._climate import Climate, drawn_by_hour, memory, persistent, stream
+from skthermo.datasets._kw51_weather import memory
+from skthermo.datasets.fleet._climate import SiteClimate, drawn_by_hour, persistent, stream
 from skthermo.datasets.fleet._laws import Law
 from skthermo.fem import Beam, Spring, Structure
 
@@ -32,7 +33,7 @@ DAMAGES = [{"span 2": 0.2}, {"bearings": 0.2}, {"soil 1": 0.2}, {"soil 2": 0.2}]
 MODEL_ERROR = (0.03, 0.08)  # of each parameter of the user's model
 N_MODES = 7
 
-CLIMATE = Climate(latitude=47.0, mean=10.0, season=10.0, swing=3.5, scatter=3.5, memory_hours=72.0)
+CLIMATE = SiteClimate(latitude=47.0, mean=10.0, season=10.0, swing=3.5, scatter=3.5, memory_hours=72.0)
 CONCRETE_LAW = Law(slope=-1.5e-3, hours=12.0, sun=4.0)
 SOIL_LAW = Law(slope=-8e-3)
 LAWS = {

@@ -28,6 +28,7 @@ def unchanged():
     return make_kw51_campaign(retrofit=False, random_state=0)
 
 
+@pytest.mark.nightly
 def test_records_are_those_of_the_bridge(campaign):
     index = pd.date_range("2018-10-01", periods=11328, freq="h", name="time")
     for name, columns in {
@@ -47,6 +48,7 @@ def test_records_are_those_of_the_bridge(campaign):
     assert "shapes" not in campaign
 
 
+@pytest.mark.nightly
 def test_one_seed_gives_one_campaign(campaign, unchanged):
     again = make_kw51_campaign(n_hours=500, random_state=0)
     changed = make_kw51_campaign(n_hours=500, noise=0.0, damage={"braces": 0.2}, random_state=0)
@@ -69,6 +71,7 @@ def test_longer_weather_begins_as_a_shorter_one():
     assert_array_equal(missing[0], missing[1][:50])
 
 
+@pytest.mark.nightly
 def test_truth_model_reproduces_the_clean_frequencies(campaign):
     """Before, after and in the course of the retrofit, by the full model."""
     model, rows = campaign.model, np.random.RandomState(0).choice(5424, 20)
@@ -82,6 +85,7 @@ def test_truth_model_reproduces_the_clean_frequencies(campaign):
     assert_allclose(half.frequencies(theta[august]), clean[august], rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_retrofit_shifts_are_the_measured_ones(campaign, unchanged):
     after = campaign.state == "after"
     shifts = 100 * (campaign.clean_frequencies / unchanged.clean_frequencies - 1)
@@ -94,6 +98,7 @@ def test_retrofit_shifts_are_the_measured_ones(campaign, unchanged):
     assert unchanged.state.unique().tolist() == ["before"]
 
 
+@pytest.mark.nightly
 def test_retrofit_serves_the_models_of_the_bridge(campaign):
     model = make_kw51(updated=True)
     retrofitted = model.damaged(campaign.retrofit["damage"]).with_added(mass=campaign.retrofit["mass"])
@@ -103,6 +108,7 @@ def test_retrofit_serves_the_models_of_the_bridge(campaign):
     assert campaign.retrofit["mass"].sum() == pytest.approx(3 * 32 * (353 + 837))
 
 
+@pytest.mark.nightly
 def test_damage_begins_when_it_is_said_to(unchanged):
     options = {"retrofit": False, "n_hours": 1500, "noise": 0.0, "gaps": False, "random_state": 0}
     damaged = make_kw51_campaign(damage={"braces": 0.2}, damage_from="2018-11-20", **options)
@@ -130,6 +136,7 @@ def test_drift_and_damage_multiply():
     assert_allclose(campaign.clean_frequencies.iloc[[-1]], expected, rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_noise_is_relative(campaign):
     ratio = make_kw51_campaign(n_hours=3000, noise=[0.0, *[0.01] * 5], gaps=False, random_state=5)
     error = ratio.frequencies / ratio.clean_frequencies - 1
@@ -139,14 +146,7 @@ def test_noise_is_relative(campaign):
     assert_allclose((campaign.frequencies / campaign.clean_frequencies - 1).std(), stated, rtol=0.05)
 
 
-def test_lasting_noise_is_as_wide_as_brief_noise(unchanged):
-    lasting = make_kw51_campaign(n_hours=3000, retrofit=False, correlation=0.9, random_state=0)
-    assert_frame_equal(lasting.clean_frequencies, unchanged.clean_frequencies[:3000], check_exact=True)
-    noise = lasting.frequencies / lasting.clean_frequencies - 1
-    assert_allclose(noise.std(), [0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015], rtol=0.2)
-    assert_allclose([noise[mode].autocorr() for mode in noise], 0.9, atol=0.05)
-
-
+@pytest.mark.nightly
 def test_correlations_before_the_retrofit(campaign):
     before = campaign.state == "before"
     found = campaign.frequencies[before].corrwith(campaign.temperatures["tBD31A"][before])
@@ -154,6 +154,7 @@ def test_correlations_before_the_retrofit(campaign):
     assert found["f6"] < -0.5
 
 
+@pytest.mark.nightly
 def test_frost_lifts_the_vertical_modes(unchanged):
     """The coldest hours are above the line of the warmer ones, in mode 6 most."""
     temperature, clean = unchanged.temperatures["tBD31A"], unchanged.clean_frequencies
@@ -241,19 +242,13 @@ def test_weather_stays_within_the_bounds_of_reduction():
     [
         ({"n_hours": 0}, "n_hours is 0; expected a positive integer"),
         ({"noise": [0.1, 0.2]}, "6 modes"),
-        ({"noise": -0.1}, "expected a relative standard deviation"),
-        ({"correlation": -1}, "correlation is -1; expected a number between -1 and 1"),
         ({"damage": {"brace": 0.1}}, "damage is .*'brace'.*expected a mapping whose keys are some of .*'braces'"),
-        ({"damage": ["braces"]}, "expected a mapping"),
         ({"damage": {"braces": 1.0}}, "damage of group 'braces' takes away 1 of its stiffness"),
         ({"damage": {"braces": "much"}}, "'much'; expected a finite number"),
-        ({"drift": {"E_bot": 0.1}}, "drift is .*expected a mapping whose keys"),
         ({"drift": {"arch": np.nan}}, "nan; expected a finite number"),
         ({"drift": {"arch": 1000.0}, "n_hours": 48}, "drift of group 'arch' takes away"),
-        ({"damage_from": "2018-09-30"}, "damage_from is '2018-09-30'; expected a time from 2018-10-01"),
         ({"damage_from": "tomorrow morning"}, "damage_from is 'tomorrow morning'; expected a time"),
         ({"damage_from": pd.Timestamp("2018-10-01 05:00", tz="UTC")}, "without time zone"),
-        ({"random_state": "seed"}, "random_state is 'seed'"),
     ],
 )
 def test_impossible_campaigns_are_refused(options, message):

@@ -88,17 +88,14 @@ LINES = csv_text().splitlines()
         ("", r"the header has the fields \[\]; expected \['record'"),
         (LINES[0], "no rows below the header"),
         ("\n".join(LINES).replace("Tair", "Tsea"), r"expected \['Tair'\] once"),
-        ("\n".join(LINES)[:-20], r"row 11 has 1\d fields; expected 13|field 'state', row 11"),
         ("\n".join(LINES)[:-3], "field 'state', row 11 is 'dama'"),
         ("\n".join(LINES).replace("undamaged", "fine", 1), "field 'state', row 0 is 'fine'"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "5,2"), "row 3 has 14 fields"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "5.2x"), "field 'f2', row 3 is '5.2x'"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "-5.2"), "field 'f2', row 3 is -5.2; expected 0.1 to 100"),
-        ("\n".join(LINES).replace(str(F["f2"][3]), "inf"), "field 'f2', row 3 is inf"),
         ("\n".join(LINES).replace(str(T["TS"][7]), "999"), "field 'TS', row 7 is 999.0; expected -60 to 80"),
         ("\n".join(LINES).replace("\n5,", "\n2,"), "field 'record', row 3 repeats 2"),
         ("\n".join(LINES).replace("\n5,", "\n5.5,"), "field 'record', row 3 is 5.5"),
-        ("\n".join(LINES).replace("\n5,", "\n,"), "field 'record', row 3 is nan"),
     ],
 )
 def test_bad_csv_names_file_and_field(tmp_path, text, message):
@@ -111,14 +108,11 @@ def test_bad_csv_names_file_and_field(tmp_path, text, message):
     ("changes", "message"),
     [
         ({"data": None}, "no field 'data'; found"),
-        ({"Z24_TWC": None}, "no field 'Z24_TWC'"),
         ({"data": np.ones((N, 3))}, r"field 'data' has shape \(12, 3\)"),
         ({"Z24_TS": np.ones((N - 1, 1))}, r"field 'Z24_TS' has shape \(11, 1\); expected \(12, 1\)"),
         ({"Z24_TS": "warm"}, "field 'Z24_TS' is not a full matrix of real numbers"),
         ({"idx": np.ones(40)}, "field 'idx' marks 40 of 40 hours"),
-        ({"idx": RECORDS}, "field 'idx' marks"),
         ({"nc": 13}, r"field 'nc' is \[\[13.0\]\]"),
-        ({"nc": [1, 2]}, "field 'nc' is"),
     ],
 )
 def test_bad_matlab_names_file_and_field(tmp_path, changes, message):
@@ -134,7 +128,7 @@ def test_a_table_far_too_large_is_refused(tmp_path):
         load_z24(tmp_path / "large.csv")
 
 
-FUZZ = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def outcome(file, content):
@@ -171,6 +165,7 @@ def test_damaged_and_truncated_tables_never_become_nonsense(csv_file, cut, posit
     check_damaged(csv_file, cut, position, byte)
 
 
+@pytest.mark.nightly
 @IN_A_CHILD
 @settings(FUZZ, max_examples=2)
 @given(cut=st.integers(0, 10_000), position=st.integers(0, 10_000), byte=st.integers(0, 255))

@@ -18,7 +18,7 @@ from skthermo.datasets._z24_model import (
     SPANS,
     z24_structure,
 )
-from skthermo.fem import sample, share_reordered
+from skthermo.fem import share_reordered
 from skthermo.updating import sensitivity
 
 TOOL = Path(__file__).parents[2] / "tools" / "fit_z24_constants.py"
@@ -158,11 +158,6 @@ def test_modes_swap_within_thirty_percent_so_that_columns_follow_shapes(box):
     assert (np.diff(MODEL.frequencies(box)[:, 2:], axis=1) < 0).any()
 
 
-def test_samples_are_the_models():
-    drawn = sample(MODEL, 0.3, 5, random_state=0)
-    np.testing.assert_allclose(drawn.frequencies, MODEL.frequencies(drawn.theta), rtol=1e-9)
-
-
 @pytest.mark.parametrize("sensors", [slice(None), ["Tair"]], ids=["all sensors", "air"])
 def test_frequencies_are_within_one_percent_of_the_measured_ones(monitoring, sensors):
     warm = (monitoring.temperatures.loc[:, sensors] > 5).all(axis=1) & (monitoring.state == "undamaged")
@@ -179,13 +174,3 @@ def test_the_fit_finds_constants_that_are_known():
     """From the frequencies of another bridge, of which the starts know nothing."""
     truth = FIT.frequencies(FIT.with_multipliers([1.1, 0.9, 1.2, 0.75]))
     np.testing.assert_allclose(FIT.frequencies(FIT.fit(truth)), truth, rtol=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"), [([], "required: DATA_FILE"), (["no.csv"], "no.csv is not a file; expected the Z24 data")]
-)
-def test_the_fit_says_what_it_needs(arguments, message, monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", [str(TOOL), *arguments])
-    with pytest.raises(SystemExit):
-        FIT.main()
-    assert message in capsys.readouterr().err

@@ -11,7 +11,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
-from skthermo._warnings import checked_once, findings_of, told_around
+from skthermo._estimators.warnings import checked_once, findings_of, told_around
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import FusedDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures, check_records
@@ -33,7 +33,7 @@ def chain():
 @pytest.fixture
 def n_checks(monkeypatch):
     """Number of checks so far, of compensators and chains."""
-    from skthermo.detection.compensation import _compensator
+    from skthermo.detection import _compensator
     from skthermo.surrogate.chain import _parts
 
     given = []
@@ -67,6 +67,7 @@ def without(rows, columns, records=LATER):
 
 
 class TestChecks:
+    @pytest.mark.nightly
     @pytest.mark.parametrize(
         "estimator",
         [
@@ -125,6 +126,7 @@ class TestChecks:
         assert n_checks() == before + 1
         assert any("'T1' is 20 in 40 rows" in text for text in texts)
 
+    @pytest.mark.nightly
     @pytest.mark.parametrize("backend", ["loky", "threading"])
     def test_folds_in_workers_check_nothing(self, backend, n_checks):
         alone, _ = said(detector(chain()).fit, STUCK)
@@ -143,6 +145,7 @@ class TestChecks:
 
 
 class TestRows:
+    @pytest.mark.nightly
     @pytest.mark.parametrize("estimator", [chain(), LinearRegression()], ids=["chain", "lines"])
     @pytest.mark.parametrize("data", [lambda table: table, lambda table: table.to_numpy()], ids=["frame", "array"])
     def test_a_day_without_temperatures_gives_one_warning(self, estimator, data):
@@ -212,6 +215,7 @@ class TestRows:
         assert len(texts) == 1
         assert alarms[3] != 0
 
+    @pytest.mark.nightly
     @pytest.mark.parametrize(
         ("change", "message"),
         [

@@ -112,6 +112,7 @@ def winter_year():
     return records
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:lags reach 2 rows back")  # before the first row of a fold
 def test_lags_inside_an_estimator_keep_rows_without_stamps_together():
     mapper = make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression()))
@@ -148,7 +149,7 @@ def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
 
 
 @pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows cannot be predicted")
-@pytest.mark.filterwarnings("ignore:lags reach 24 h back; the first record given is")
+@pytest.mark.filterwarnings("ignore:lags reach 1 day back; the first record given is")
 def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -162,10 +163,10 @@ def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
 def test_a_day_alone_says_what_lags_lack(service):
     detector, later = service
     said = (
-        "lags reach 24 h back; the first record given is 2026-03-04 00:00:00, and 8 of 8 rows have a lag before it "
-        "that finds no record; give the 24 h before, too"
+        "lags reach 1 day back; the first record given is 2026-03-04 00:00:00, and 8 of 8 rows have a lag before it "
+        "that finds no record; give the 1 day before, too"
     )
-    with pytest.warns(UserWarning, match="give the 24 h before") as given:
+    with pytest.warns(UserWarning, match="give the 1 day before") as given:
         residuals = detector[0].transform(later.loc["2026-03-04"])
     assert [str(warning.message) for warning in given] == [said]
     assert residuals.isna().all(axis=None)

@@ -14,8 +14,8 @@ from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from skthermo._weather import SensorRegression
 from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
+from skthermo.residuals.weather import SensorRegression
 from skthermo.surrogate import TemperatureMapper
 from tests.detection.compensated import (
     LAGGED,
@@ -64,6 +64,7 @@ def test_lags_within_go_by_time():
     assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:lags reach 2 rows back")  # before the first row of a fold, without stamps
 @pytest.mark.parametrize("bare", [True, False])
 def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(bare):
@@ -106,6 +107,7 @@ def test_targets_that_are_never_there_together_are_compensated():
 EMPTY = r"ignore:[0-9]+ of [0-9]+ rows cannot be predicted and are NaN"
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(EMPTY)
 @pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
 @pytest.mark.parametrize("estimator", [KNeighborsRegressor(3), RandomForestRegressor(5, random_state=0)], ids=str)
@@ -128,6 +130,7 @@ def test_a_fold_without_a_temperature_is_missing():
     assert residuals.drop(index=residuals.index[40:80]).notna().all(axis=None)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled from the other")
 @pytest.mark.parametrize(
     "estimator",

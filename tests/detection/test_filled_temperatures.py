@@ -7,7 +7,6 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.preprocessing import LagFeatures
 
 MODES = ["f1", "f2"]
 EFFECT = np.array([[-0.02, 0.01], [-0.03, -0.04], [0.0, -0.02]])
@@ -90,20 +89,6 @@ def test_the_error_of_a_linear_regression_is_its_slope_times_what_is_not_known()
     residual = record[MODES].to_numpy()[0] - compensator.estimator_.predict(filled)[0]
     centred = residual - compensator.spread_.overall.mean
     assert white @ white == pytest.approx(centred @ np.linalg.solve(covariance, centred), rel=1e-6)
-
-
-@FILLED
-@pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows cannot be predicted")
-def test_lags_of_a_filled_temperature_count_too():
-    lagged = make_pipeline(LagFeatures([0, 3], freq="1h", padding="nan"), LinearRegression())
-    compensator = TemperatureCompensator(lagged, targets=MODES, scale="global").fit(BASELINE)
-    holed = LATER[:100].copy()
-    holed.index = BASELINE.index[-1] + pd.to_timedelta(np.arange(1, 101), "h")
-    whole = compensator.transform(holed)
-    holed.iloc[50, 1] = np.nan
-    changed = ~np.isclose(compensator.transform(holed), whole, rtol=0, atol=1e-12).all(axis=1)
-    assert set(np.flatnonzero(changed)) <= {50, 53}
-    assert changed[50]
 
 
 def test_one_warning_names_sensors_and_counts():

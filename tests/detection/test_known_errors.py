@@ -6,9 +6,9 @@ import pytest
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.pipeline import make_pipeline
 
-from skthermo._gaussian import Gaussian
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
+from skthermo.residuals.gaussian import Gaussian
 from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
 
 MODES = ["f1", "f2", "f3"]

@@ -90,6 +90,7 @@ def test_volumes_reach_the_detector_in_arrays_and_frames(scale, output):
     assert arrays.score(NEW.to_numpy()) == pytest.approx(own, abs=1e-3)  # of all detectors of residuals near normal
 
 
+@pytest.mark.nightly
 def test_a_covariance_by_weather_is_likelier_where_residuals_scatter_more_in_frost():
     def frosty(seed):
         random = np.random.default_rng(seed)
@@ -113,6 +114,7 @@ def test_a_covariance_by_weather_is_likelier_where_residuals_scatter_more_in_fro
     assert of_local - of_global > 0.2
 
 
+@pytest.mark.nightly
 def test_a_search_without_damage_chooses_what_predicts_best():
     grid = {"temperaturecompensator__estimator__n_neighbors": [1, 15]}
     search = GridSearchCV(pipeline(KNeighborsRegressor()), grid, cv=BlockedKFold(3)).fit(X)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from skthermo._gaussian import Gaussian
-from skthermo.detection.compensation._local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
+from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
 from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 
 

@@ -8,7 +8,6 @@ from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.covariance import EllipticEnvelope, MinCovDet
 from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -51,14 +50,6 @@ def test_index_is_minus_the_score_and_the_threshold_its_quantile_or_order_statis
     assert detector.threshold_ == expected
 
 
-def test_scores_form_one_chain():
-    detector = OutlierDetector(FromZero(), 0.05, threshold="quantile").fit(ROWS)
-    assert detector.offset_ == -95
-    np.testing.assert_array_equal(detector.score_samples([[-96.0]]), [-96])
-    np.testing.assert_array_equal(detector.decision_function([[-96.0], [90.0]]), [-1, 5])
-    np.testing.assert_array_equal(detector.predict([[95.0], [-96.0]]), [1, -1])
-
-
 class AsInPyOD(BaseEstimator):
     """Scores by the distance of the first column from zero: higher is more abnormal."""
 
@@ -86,6 +77,7 @@ def test_any_outlier_detector_serves(estimator):
     assert not [name for name in vars(estimator) if name.endswith("_")]
 
 
+@pytest.mark.nightly
 def test_the_estimators_own_threshold_is_not_used():
     own, other = (IsolationForest(random_state=0, contamination=share) for share in (0.01, 0.4))
     assert OutlierDetector(own).fit(F).threshold_ == OutlierDetector(other).fit(F).threshold_
@@ -98,6 +90,7 @@ def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance()
     np.testing.assert_array_equal(envelope.predict(F), robust.predict(F))
 
 
+@pytest.mark.nightly
 def test_rows_with_missing_modes_are_not_judged():
     holed = DAMAGED.copy()
     holed.iloc[[3, 7], 1] = np.nan
@@ -192,14 +185,6 @@ def test_residuals_of_a_compensator_are_scored_in_a_pipeline():
     residuals = StandardScaler().fit_transform(compensator.fit_transform(healthy))
     assert pipeline[-1].threshold_ == OutlierDetector(OneClassSVM()).fit(residuals).threshold_
     assert (pipeline.predict(damaged) == -1).mean() > 0.95
-
-
-def test_parameters_of_the_estimator_can_be_searched():
-    def distance_of_damage(detector, records, y=None):
-        return float(detector.decision_function(records).mean() - detector.decision_function(records - 1).mean())
-
-    search = GridSearchCV(OutlierDetector(OneClassSVM()), {"estimator__nu": [0.01, 0.5]}, scoring=distance_of_damage)
-    assert search.fit(F).best_params_ == {"estimator__nu": 0.5}  # its score is a sum over support vectors
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,15 @@
 """Residuals in standard deviations: one covariance, or that of similar weather."""
 
-import pickle
-
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
-from sklearn.ensemble import HistGradientBoostingRegressor, IsolationForest
+from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import TimeSeriesSplit
 from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
-from skthermo.detection.compensation._local_covariance import Smoothing
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.residuals.local_covariance import Smoothing
 
 MODES = ["f1", "f2"]
 FROZEN = 0.1 * np.array([[2.0, 0.0], [1.0, 1.0]])
@@ -36,7 +33,7 @@ def compensator(scale="local", estimator=None, **options):
 
 X, LATER = campaign(), campaign(3000, 1)
 LOCAL = compensator().fit(X)
-SOURCE = "skthermo.detection.compensation._local_covariance"
+SOURCE = "skthermo.residuals.local_covariance"
 
 
 @pytest.fixture(autouse=True)
@@ -127,7 +124,7 @@ def test_a_baseline_of_equal_spread_loses_nothing():
 
 
 def test_some_of_a_long_baseline_tell_the_spread_of_all(monkeypatch):
-    monkeypatch.setattr("skthermo.detection.compensation._whitening.MOST_PLACES", 600)
+    monkeypatch.setattr("skthermo.residuals.spread.MOST_PLACES", 600)
     fitted = compensator()
     white = fitted.fit_transform(X)
     assert len(fitted.spread_.places) == 600
@@ -224,31 +221,10 @@ def test_fit_and_fit_transform_teach_the_same():
     assert fitted.spread_.smoothing == by_transform.spread_.smoothing
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_pickles_clones_and_set_output(scale):
-    fitted = compensator(scale, cv="contiguous").fit(X)
-    expected = fitted.transform(LATER)
-    pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(fitted)).transform(LATER), expected)
-    twin = clone(fitted)
-    assert twin.scale == scale
-    assert not hasattr(twin, "spread_")
-    as_frame = compensator(scale, targets=[2, 3], cv="contiguous").set_output(transform="pandas").fit(X.to_numpy())
-    np.testing.assert_allclose(as_frame.transform(LATER.to_numpy()), expected, rtol=1e-9, atol=1e-11)
-
-
-def test_any_detector_follows():
-    damaged = LATER.assign(f1=LATER["f1"] - 2)
-    forest = OutlierDetector(IsolationForest(random_state=0))
-    pipeline = make_pipeline(compensator(), forest).fit(X)
-    assert (pipeline.predict(LATER) == -1).mean() < 0.05
-    assert (pipeline.predict(damaged) == -1).mean() > 0.9
-
-
 def test_the_size_of_chunks_does_not_matter(monkeypatch):
     holed = X.mask(np.random.default_rng(0).random(X.shape) < [0, 0, 0.3, 0.3])
     expected = compensator().fit_transform(holed), compensator().fit(holed).transform(LATER)
-    for module in (SOURCE, "skthermo.detection.compensation._whitening"):
-        monkeypatch.setattr(f"{module}.NUMBERS_AT_ONCE", 100_000)
+    monkeypatch.setattr("skthermo.residuals.weather.NUMBERS_AT_ONCE", 100_000)
     found = compensator().fit_transform(holed), compensator().fit(holed).transform(LATER)
     for white, whole in zip(found, expected, strict=True):
         np.testing.assert_allclose(white, whole, rtol=1e-9, atol=1e-12)
@@ -287,11 +263,6 @@ def test_a_mode_without_out_of_fold_residuals_is_named(scale):
     early.iloc[200:, 3] = np.nan
     with pytest.raises(ValueError, match="f2"):
         compensator(scale, cv=TimeSeriesSplit(5)).fit(early)
-
-
-def test_other_scales_are_named():
-    with pytest.raises(ValueError, match="'scale' parameter of TemperatureCompensator must be"):
-        compensator("regional").fit(X)
 
 
 def test_deviations_are_those_by_which_single_modes_are_divided():

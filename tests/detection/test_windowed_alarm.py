@@ -1,6 +1,5 @@
 """Alarms raised by several records in a row."""
 
-import pickle
 from functools import cache
 
 import numpy as np
@@ -10,11 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import binom, chi
-from sklearn.base import clone
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
-from skthermo.detection.windows._laws import CountLaw, MeanLaw
-from skthermo.detection.windows._windows import Windows
+from skthermo.detection._laws import CountLaw, MeanLaw
+from skthermo.detection._windows import Windows
 from skthermo.metrics import time_to_detection
 
 RULES = ["mean", "m-of-n"]
@@ -243,7 +241,7 @@ def test_the_order_of_modes_and_their_units_do_not_matter(rule):
 def test_the_size_of_chunks_does_not_matter(rule, monkeypatch):
     alarm = fitted(rule)
     whole = alarm.damage_index(HOLED)
-    monkeypatch.setattr("skthermo.detection.windows._windows.NUMBERS_AT_ONCE", 100)
+    monkeypatch.setattr("skthermo.residuals.weather.NUMBERS_AT_ONCE", 100)
     np.testing.assert_allclose(alarm.damage_index(HOLED), whole, rtol=1e-10)
 
 
@@ -293,16 +291,6 @@ def test_a_baseline_with_gaps_teaches_nearly_the_same(rule):
 
 
 # As an estimator, and what is refused
-
-
-@each_rule
-def test_pickles_clones_and_arrays(rule):
-    alarm = fitted(rule)
-    expected = alarm.damage_index(HOLED)
-    pd.testing.assert_series_equal(pickle.loads(pickle.dumps(alarm)).damage_index(HOLED), expected)
-    assert not hasattr(clone(alarm), "law_")
-    plain = WindowedAlarm(12, rule=rule).fit(X.to_numpy())
-    np.testing.assert_array_equal(plain.damage_index(HOLED.to_numpy()), expected)
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,7 @@ def test_mapie(folder):
     assert 0.85 < ((interval[:, 0] <= later) & (later <= interval[:, 1])).mean() < 0.97
 
 
+@pytest.mark.nightly
 def test_stacking():
     recipe = run_recipe(PAGE, "recipe-records", "recipe-stacking")
     later = recipe["later"].clean_frequencies["f1"].to_numpy()

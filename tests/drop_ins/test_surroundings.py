@@ -33,6 +33,7 @@ def assert_same_bits(recipe):
     np.testing.assert_array_equal(recipe["drawn"].frequencies, expected.frequencies)
 
 
+@pytest.mark.nightly
 def test_dask():
     pytest.importorskip("distributed")
     assert_same_bits(run_recipe(PAGE, "recipe-records", "recipe-dask"))

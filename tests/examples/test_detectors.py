@@ -55,6 +55,7 @@ def test_there_are_many_with_and_without_temperatures(targets):
     assert "raw, less 2 components" not in few
 
 
+@pytest.mark.nightly
 def test_every_rate_of_false_alarms_is_the_one_asked_for(fitted, baseline, later):
     """The rate after a baseline of n independent records has a beta distribution, alarms a beta-binomial one."""
     n, asked = len(baseline), 0.02
@@ -65,6 +66,7 @@ def test_every_rate_of_false_alarms_is_the_one_asked_for(fitted, baseline, later
     assert not {name: n for name, n in alarms.items() if not lowest <= n <= highest}
 
 
+@pytest.mark.nightly
 def test_every_detector_finds_much_damage(fitted):
     damaged = make_truss_campaign(damage={"bottom": 0.4}, random_state=2)
     records = damaged.temperatures.join(damaged.frequencies)
@@ -72,6 +74,7 @@ def test_every_detector_finds_much_damage(fitted):
     assert not {name: share for name, share in found.items() if share < 0.9}
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(r"ignore:\d of \d rows (have no temperature|cannot be predicted|are not judged)")
 def test_gaps_are_not_judged_by_those_that_need_complete_rows(fitted, later, targets):
     gaps = later[:6].copy()

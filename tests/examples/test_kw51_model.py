@@ -5,6 +5,8 @@ import pytest
 
 from tests.examples.pages import run
 
+pytestmark = pytest.mark.nightly
+
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):

@@ -35,6 +35,7 @@ def records():
     )
 
 
+@pytest.mark.nightly
 def test_a_campaign_in_the_format_of_the_file_is_read_back_equal(tmp_path):
     campaign = make_kw51_campaign(n_hours=200, shapes=True, random_state=0)
     padded = [table.reindex(columns=[*table, *range(8)]) for table in (campaign.frequencies, campaign.damping)]

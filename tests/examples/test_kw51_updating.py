@@ -8,6 +8,8 @@ from tests.examples.pages import recipes
 
 EXAMPLE = recipes("kw51_appendix")
 
+pytestmark = pytest.mark.nightly
+
 
 @pytest.fixture(scope="module")
 def tracked():

@@ -2,7 +2,11 @@
 
 import re
 
+import pytest
+
 from tests.examples.pages import run
+
+pytestmark = pytest.mark.nightly
 
 
 def test_the_report_names_the_damaged_group(tmp_path):

@@ -40,6 +40,7 @@ def campaign():
     return EXAMPLE.truss_campaign(0, SIZE)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["truss", "KW51", "Z24"])
 def test_refining_makes_every_inverse_exact(models, name):
     table = EXAMPLE.inverse_results(*models[name], noise=0.0, seed=0, size=SIZE)
@@ -80,6 +81,7 @@ def test_trees_stay_at_their_last_value_and_lines_go_on(campaign):
     assert changes["random forest"] < 2 < changes["broken lines"]
 
 
+@pytest.mark.nightly
 def test_mappers_have_complete_tables(models, tmp_path, monkeypatch):
     """Of all regressors on Z24, of two on KW51."""
     path = tmp_path / "z24_monitoring.csv"

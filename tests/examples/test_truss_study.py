@@ -11,6 +11,8 @@ GROUPS = ["bottom", "top", "diagonal"]
 
 EXAMPLE = recipes("truss")
 
+pytestmark = pytest.mark.nightly
+
 
 @pytest.fixture(scope="module")
 def realisations():

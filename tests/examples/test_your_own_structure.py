@@ -6,6 +6,8 @@ import pytest
 
 from tests.examples.pages import run
 
+pytestmark = pytest.mark.nightly
+
 SAID = {
     "rad/s instead of Hz": "rad/s instead of Hz?",
     "frequencies 1.5 times too high": "'f1' by +50 %",

@@ -60,6 +60,7 @@ def judged(frozen, few):
     return found, BENCH.bench(frozen, fem, found.scenario(BENCH.DAMAGED), few, n_repeats=4)
 
 
+@pytest.mark.nightly
 def test_the_damage_is_identified(judged):
     found, _ = judged
     assert found.p_value < 0.01
@@ -70,6 +71,7 @@ def test_the_damage_is_identified(judged):
     assert unexplained.abs().max() < 2
 
 
+@pytest.mark.nightly
 def test_its_alarms_are_foretold(judged):
     table = BENCH.side_by_side(judged[1])
     assert list(table.index) == list(FEW)
@@ -78,6 +80,7 @@ def test_its_alarms_are_foretold(judged):
     assert BENCH.agreement(table).loc["damage found", "rank correlation"] > 0.7
 
 
+@pytest.mark.nightly
 def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, judged):
     records = Z24.Records.of(frozen)
     table = BENCH.measured_table(records, few)
@@ -89,6 +92,7 @@ def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, judge
         assert rates[state, "measured"].tolist() == pytest.approx(table[column].tolist())
 
 
+@pytest.mark.nightly
 def test_the_chain_predicts_nearly_as_well_as_a_direct_regression(frozen):
     """Within a tenth, in weather that neither has seen."""
     ratio = Z24.hold_out_table(frozen, [(True, 0.5), (False, 0.5)])["ratio"]
@@ -113,6 +117,7 @@ def test_the_parameter_that_was_damaged_falls(frozen):
     assert fall.drop("piers_soil").abs().max() < 5
 
 
+@pytest.mark.nightly
 def test_a_choice_sees_training_rows_only(frozen, few, monkeypatch):
     monkeypatch.setattr(BENCH, "bridge_model", small_model)
     monkeypatch.setattr(BENCH, "sweep", lambda fem: sweep(fem, (0.1, 0.3), groups=["piers", "soil"]))

@@ -14,11 +14,8 @@ from skthermo.fem import (
     PointMass,
     Spring,
     Structure,
-    add_noise,
     evaluate,
     linearise,
-    match_modes,
-    probe,
     sample,
 )
 
@@ -110,10 +107,9 @@ def test_assembly_names_what_is_wrong(arguments, message):
         ([[1, 1, 0, 1]], "row 0, parameter 'diagonal' is 0"),
     ],
 )
-@pytest.mark.parametrize("method", ["frequencies", "modes", "jacobian", "matrices"])
-def test_theta_is_checked_everywhere(method, theta, message):
+def test_theta_is_checked(theta, message):
     with pytest.raises(ValueError, match=message):
-        getattr(make_truss(), method)(theta)
+        make_truss().frequencies(theta)
 
 
 def test_theta_frame_is_read_by_its_columns():
@@ -125,21 +121,6 @@ def test_theta_frame_is_read_by_its_columns():
     np.testing.assert_array_equal(truss.frequencies(frame[frame.columns[::-1]]), truss.frequencies(frame.to_numpy()))
     with pytest.raises(ValueError, match="theta: \\['deck'\\] are unknown; expected each of the parameters"):
         truss.frequencies(frame.rename(columns={"top": "deck"}))
-
-
-@pytest.mark.parametrize(
-    ("damage", "message"),
-    [
-        ({"deck": 0.1}, "unknown damage group 'deck'; expected one of"),
-        ({"top": 1.0}, "damage of group 'top' has severity 1.0; expected a number below 1"),
-        ({"top": float("nan")}, "damage of group 'top' has severity nan"),
-        ({"top": "half"}, "damage of group 'top' has severity 'half'"),
-        (0.5, "damage is 0.5; expected a mapping"),
-    ],
-)
-def test_damage_is_checked(damage, message):
-    with pytest.raises(ValueError, match=message):
-        make_truss().damaged(damage)
 
 
 I2 = np.eye(2)
@@ -171,24 +152,6 @@ I2 = np.eye(2)
 def test_affine_model_names_what_is_wrong(arguments, message):
     with pytest.raises(ValueError, match=message):
         AffineModel(**({"stiffness": {("k",): I2}, "mass": I2, "n_modes": 1} | arguments))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"bounds": 1.0}, "bounds is 1.0; expected a half-width between 0 and 1"),
-        ({"bounds": [[0.8, 1.2]] * 3}, r"bounds has shape \(3, 2\)"),
-        ({"bounds": [[0.8, 1.2]] * 3 + [[1.2, 0.8]]}, r"bounds of parameter 'vertical' are \[1.2, 0.8\]"),
-        ({"bounds": [[0.0, 1.2]] * 4}, "bounds of parameter 'bottom'"),
-        ({"bounds": [[0.8, np.nan]] * 4}, "bounds of parameter 'bottom'"),
-        ({"n_samples": 0}, "n_samples is 0"),
-        ({"n_samples": 10.0}, "n_samples is 10.0; expected a positive integer"),
-        ({"method": "grid"}, "method is 'grid'; expected one of"),
-    ],
-)
-def test_sampling_names_what_is_wrong(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        sample(make_truss(), **({"bounds": 0.2, "n_samples": 4} | arguments))
 
 
 def test_too_few_names_of_degrees_of_freedom_are_counted():
@@ -232,35 +195,6 @@ def test_callable_models_of_complex_numbers_are_refused():
         CallableModel(lambda row: np.array([1 + 1j]), ["E"], 1).frequencies([[1.0]])
 
 
-@pytest.mark.parametrize(
-    "solve",
-    [sample, lambda model: evaluate(model, [[1.0]]), lambda model: linearise(model, [[1.0]])]
-    + [lambda model: match_modes(model, [1.0])],
-)
-@pytest.mark.parametrize("model", [None, make_truss, CallableModel])
-def test_what_is_no_model_is_said(solve, model):
-    with pytest.raises(ValueError, match=r"model is .*; expected an FE model, an object with parameter_names"):
-        solve(model)
-
-
-@pytest.mark.parametrize("n_jobs", ["2", 0, 1.5, True])
-def test_n_jobs_is_an_integer(n_jobs):
-    with pytest.raises(ValueError, match=f"n_jobs is {n_jobs!r}; expected an integer"):
-        evaluate(make_truss(), np.ones((2, 4)), n_jobs=n_jobs)
-
-
-@pytest.mark.parametrize("seed", [np.random.default_rng(0), "0", 1.5])
-def test_seeds_are_named(seed):
-    for use in (
-        lambda: sample(make_truss(), 0.2, 4, random_state=seed),
-        lambda: add_noise([[1.0]], 0.01, random_state=seed),
-        lambda: probe(lambda theta: (theta[0] * np.eye(2), np.eye(2)), ["k"], n_modes=1, random_state=seed),
-        lambda: make_truss().reduced(0.2, random_state=seed),
-    ):
-        with pytest.raises(ValueError, match=r"random_state is .*; expected None, an integer from 0"):
-            use()
-
-
 @pytest.mark.filterwarnings("error")
 def test_numpy_integers_are_integers():
     model = make_z24(np.int8(40))
@@ -273,12 +207,6 @@ def test_numpy_integers_are_integers():
     np.testing.assert_array_equal(drawn.frequencies, expected.frequencies)
     campaign = make_truss_campaign(np.int8(2), samples_per_year=np.int16(365), samples_per_day=np.int8(1))
     assert len(campaign.temperatures) == 730
-
-
-def test_callable_model_names_the_shape_it_got():
-    model = CallableModel(lambda row: row[:2], ["a", "b", "c"], 3)
-    with pytest.raises(ValueError, match=r"function returned shape \(2,\); expected \(3,\) for one row"):
-        model.frequencies([[1.0, 2.0, 3.0]])
 
 
 @pytest.mark.parametrize(

@@ -148,6 +148,7 @@ def test_bad_matrix_market_files_are_refused(tmp_path, text, message):
         load_affine(tmp_path)
 
 
+@pytest.mark.nightly
 @IN_A_CHILD
 @FUZZ
 @given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())

@@ -175,7 +175,7 @@ def test_rows_from_guesses_do_not_depend_on_each_other():
     np.testing.assert_array_equal(together, alone)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(share=st.floats(0.03, 0.5), n_modes=st.integers(1, 5), guards=st.integers(0, 3), n=st.sampled_from([120, 300]))
 def test_a_mode_of_a_part_that_neither_guesses_nor_nominal_modes_move_is_found(share, n_modes, guards, n):
     """Two chains that nothing joins; the second is stiff at theta = 1, and soft where modes are sought."""

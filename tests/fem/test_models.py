@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
-from skthermo._arguments import check_noise
+from skthermo._estimators.arguments import check_noise
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, mac, sample
 

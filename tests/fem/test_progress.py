@@ -154,6 +154,7 @@ def until(condition, seconds=60.0):
     return condition()
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to look for processes")
 @pytest.mark.parametrize("everyone", [False, True], ids=["the process", "Ctrl-C reaches the workers too"])
 def test_an_interrupt_ends_the_work_and_leaves_no_process(tmp_path, everyone):

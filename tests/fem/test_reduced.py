@@ -93,6 +93,7 @@ def test_tracked_columns_are_the_full_models():
     np.testing.assert_allclose(TRACKED.reduced(0.7, random_state=0).frequencies(wide), full, rtol=1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("damage", [{"columns": 0.9}, {"soil": 0.99}, {"beams": -0.15, "columns": 0.2}, {}])
 def test_damage_beyond_the_box_grows_the_basis(damage):
     reduced = REDUCED.damaged(damage)

@@ -55,6 +55,7 @@ def test_chances_fall_with_height_and_grow_with_time():
     assert 0 < chances[0, -1] < 1e-20
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("common", [0.0, 0.5])
 def test_of_called_bridges_no_more_are_false_than_asked_for(common):
     random, false, found = np.random.default_rng(2), [], []

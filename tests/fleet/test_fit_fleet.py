@@ -1,6 +1,7 @@
 """Many bridges side by side: each fails alone, killed processes lose no others, and all have the same bits."""
 
 import os
+import pickle
 import signal
 import threading
 import warnings
@@ -17,8 +18,9 @@ from sklearn.linear_model import LinearRegression
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet import Fleet, fit_fleet
 from skthermo.fleet._bridge import by_value
 from skthermo.monitoring import Monitor
@@ -95,7 +97,7 @@ def fleet():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         made = fit_fleet(makers, records, monitor=watch)
-    made.caught = [str(one.message) for one in caught if one.category is UserWarning]
+    made.caught = [str(one.message) for one in caught if issubclass(one.category, SkthermoWarning)]
     return made
 
 
@@ -131,6 +133,7 @@ def test_nothing_known_is_never_healthy(fleet):
     assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not judged)"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("backend", ["loky", "threading"])
 def test_other_processes_of_which_one_is_killed_and_other_bridges_give_the_same_bits(fleet, backend, tmp_path):
     lost = partial(lose_process, tmp_path / "flag") if backend == "loky" else LinearRegression
@@ -153,6 +156,7 @@ def test_a_seed_depends_on_the_name_alone():
     assert network.random_state is None
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("n_workers", [1, 2, 5])
 def test_a_bridge_that_always_kills_its_process_loses_no_other(fleet, monkeypatch, n_workers):
     """The back end is one of this process, that ends all work of so many workers at once."""
@@ -194,6 +198,7 @@ def test_a_back_end_that_does_not_work_is_an_error(monkeypatch):
         fit_fleet(*asked())
 
 
+@pytest.mark.nightly
 def test_a_second_call_fits_only_what_has_changed(tmp_path, fleet):
     makers, records = asked(killed=(Warns(), missing_file))
     first = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
@@ -255,7 +260,7 @@ def test_functions_of_a_notebook_count_with_their_code():
 
 
 def test_monitors_judge_new_records_each_alone(fleet):
-    made = joblib.load(_dumped(fleet))  # also a pickled fleet goes on
+    made = pickle.loads(pickle.dumps(fleet))  # also a pickled fleet goes on
     new = {"a": year(31, 60, "2026-01-01"), "b": partial(year, 32, 60, "2026-01-01", step=0.05), "c": missing_file}
     answers = made.update(new | {"d": year(33, 60, "2026-01-01")[1]})
     states = answers.groupby(["bridge", "state"]).size().to_dict()
@@ -278,15 +283,6 @@ def test_monitors_judge_new_records_each_alone(fleet):
     assert found.promised_false_per_year == 5.0
 
 
-def _dumped(fleet):
-    import io
-
-    stream = io.BytesIO()
-    joblib.dump(fleet, stream)
-    stream.seek(0)
-    return stream
-
-
 def test_wrong_arguments_are_named(fleet, tmp_path):
     makers, records = asked()
     with pytest.raises(ValueError, match=r"1 bridges have no records \(\['e'\]\) and 0 have no maker"):
@@ -304,6 +300,7 @@ def test_wrong_arguments_are_named(fleet, tmp_path):
     assert len(fit_fleet({"a": LinearRegression()}, {"a": ([[1.0]], 2, 3)}).errors) == 1
 
 
+@pytest.mark.nightly
 def test_a_monitor_that_is_replaced_is_kept_beside_and_told(tmp_path):
     makers, records = asked()
     fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01")})

@@ -39,6 +39,7 @@ def test_damage_is_softening_and_its_opposite_stiffening(group, baseline, window
     assert (direction.of_rows(records(-0.1, 1, group))[7:] == -1).all()
 
 
+@pytest.mark.nightly
 def test_it_does_not_depend_on_how_residuals_are_scaled(baseline):
     later = records(0.03, 2)
     signs = [

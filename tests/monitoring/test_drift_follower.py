@@ -59,13 +59,13 @@ def with_drift(follower, lost, error):
 
 
 def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
-    T, F = steady.temperatures[-5:], steady.frequencies[-5:]
+    F = steady.frequencies[-5:]
     clear, doubtful = (with_drift(follower, 0.03, error) for error in (1e-5, 0.03))
     shift = follower.filter.slopes[:, 0] * np.log(0.97)
-    pd.testing.assert_frame_equal(follower.corrected(clear, T, F), F * np.exp(-shift), rtol=1e-9)
-    pd.testing.assert_frame_equal(follower.corrected(doubtful, T, F), F)
+    pd.testing.assert_frame_equal(follower.corrected(clear, F), F * np.exp(-shift), rtol=1e-9)
+    pd.testing.assert_frame_equal(follower.corrected(doubtful, F), F)
     swapped = F.iloc[:, ::-1]
-    pd.testing.assert_frame_equal(follower.corrected(clear, T, swapped), (F * np.exp(-shift)).iloc[:, ::-1], rtol=1e-9)
+    pd.testing.assert_frame_equal(follower.corrected(clear, swapped), (F * np.exp(-shift)).iloc[:, ::-1], rtol=1e-9)
     errors = np.geomspace(1e-4, 0.1, 50)
     shares = [follower.share(with_drift(follower, 0.03, error)) for error in errors]
     assert (np.diff(shares) <= 0).all()

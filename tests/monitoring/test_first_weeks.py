@@ -50,6 +50,7 @@ def test_any_batches_give_the_decisions_of_one_pass(scale):
     pd.testing.assert_frame_equal(whole.events_, parts.events_)
 
 
+@pytest.mark.nightly
 def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
     events, unaware, found = [], [], []
     for seed in range(6):

@@ -23,7 +23,7 @@ from skthermo.detection import (
     WindowedAlarm,
 )
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._judge import Judge
+from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._promise import find_events
 from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
 
@@ -134,6 +134,7 @@ def assert_same_course(monitor, answers, after, parts):
     assert monitor.state() == after.state()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", DETECTORS)
 @settings(SETTINGS)
 @given(data=st.data())
@@ -153,6 +154,7 @@ def test_any_division_into_batches_gives_the_course_of_one_pass(name, data):
     assert monitor.counts_["n_too_late"] == 0
 
 
+@pytest.mark.nightly
 def test_hour_by_hour_and_day_by_day():
     for batches in ([SERVICE.iloc[[n]] for n in range(24)], [day for _, day in SERVICE[:24].resample("D") if len(day)]):
         monitor, answers, _ = fitted("whitened, mean by time")
@@ -161,6 +163,7 @@ def test_hour_by_hour_and_day_by_day():
         assert not any(part["revised"].any() for part in parts)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "m of n by time", "fused"])
 def test_indices_are_those_of_the_detector_on_all_records(name):
     monitor, _, _ = fitted(name, sensors=False)
@@ -177,7 +180,7 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
 def test_memory_is_what_lags_and_windows_need(name):
     monitor, _, _ = fitted(name)
     assert str(monitor.memory_) == DETECTORS[name][1]
-    judge, times = monitor.bench_.judge, ALL.index.asi8
+    judge, times = monitor.active_, ALL.index.asi8
     rows = range(N_BASELINE, N_BASELINE + 3)
     alone = [judge.alone(ALL, times, row) for row in rows]
     np.testing.assert_allclose(judge.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
@@ -185,7 +188,7 @@ def test_memory_is_what_lags_and_windows_need(name):
 
 def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch):
     monitor, _, _ = fitted("lags")
-    judge, exact = monitor.bench_.judge, Judge._exact
+    judge, exact = monitor.active_, ActiveDetector._exact
     edge = 3.0000005
     bits = iter([edge - 1e-12, edge + 1e-12])
 
@@ -193,9 +196,9 @@ def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch
         """As if a call with many records moved the last bits."""
         return np.full(len(records), edge + 1e-12 if len(records) < 10 else next(bits))
 
-    monkeypatch.setattr(Judge, "_exact", at_an_edge)
+    monkeypatch.setattr(ActiveDetector, "_exact", at_an_edge)
     first, second = (judge.index(ALL[: N_BASELINE + 20], N_BASELINE) for _ in range(2))
-    monkeypatch.setattr(Judge, "_exact", exact)
+    monkeypatch.setattr(ActiveDetector, "_exact", exact)
     np.testing.assert_array_equal(first, second)
     assert first[0] == 3.000001
 
@@ -357,6 +360,7 @@ class RunningMean(TransformerMixin, BaseEstimator):
         return X.rolling(self.records, min_periods=1).mean()
 
 
+@pytest.mark.nightly
 def test_memory_of_steps_that_are_not_known_is_asked_for():
     detector = make_pipeline(compensator().set_output(transform="pandas"), RunningMean(), MahalanobisDetector())
     with pytest.raises(ValueError, match=r"looks at later records, or farther back; expected .* memory='48h'"):
@@ -376,6 +380,7 @@ def test_frequency_columns_have_to_be_known():
     assert Monitor(DETECTORS["lags"][0], sensors=False).fit(BASELINE).targets_ == MODES
 
 
+@pytest.mark.nightly
 def test_state_does_not_grow_with_history():
     monitor = Monitor(DETECTORS["lags"][0], keep="20D").fit(BASELINE)
     sizes = []
@@ -405,6 +410,7 @@ def test_what_the_owner_says_of_an_event_stays_with_it():
         monitor.acknowledge(99, harmless=True)
 
 
+@pytest.mark.nightly
 def test_stiffening_is_no_damage_where_softening_is_asked_for():
     stiffer = ALL[N_BASELINE:].copy()
     stiffer.iloc[60:, 3:] *= [1.03, 1.02, 1.02]
@@ -440,6 +446,7 @@ def test_a_monitor_is_cloned_and_has_parameters():
         Monitor(MahalanobisDetector(), targets=MODES, keep="5D").fit(BASELINE)
 
 
+@pytest.mark.nightly
 def test_calendar_days_of_a_time_zone_with_summer_time():
     records = campaign(N_BASELINE + 40, 3, "2024-06-06").tz_localize("UTC").tz_convert("Europe/Zurich")
     monitor = Monitor(DETECTORS["lags"][0], targets=MODES).fit(records[:N_BASELINE])

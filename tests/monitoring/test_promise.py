@@ -82,6 +82,7 @@ def test_events_keep_the_time_zone():
     assert events["start"].dt.tz == events["end"].dt.tz == times.tz
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("per_year", [0.5, 1.0, 12.0])
 def test_a_healthy_year_has_as_many_events_as_promised_on_average(per_year):
     random, n, counts, promises = np.random.default_rng(0), 365, [], []
@@ -94,6 +95,7 @@ def test_a_healthy_year_has_as_many_events_as_promised_on_average(per_year):
     assert promises[0][0] <= per_year <= promises[0][1]
 
 
+@pytest.mark.nightly
 def test_the_range_of_a_year_holds_nine_years_in_ten():
     random, n, within = np.random.default_rng(1), 365, []
     for _ in range(100):

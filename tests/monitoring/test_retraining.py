@@ -10,14 +10,15 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
+from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining._harvest import Harvest, margin_of
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.03}, "repaired": {"diagonal": -0.15}}
 SAME = {"check_freq": False, "check_index_type": False}
-WEEK = pd.Timedelta("7D")
+WEEK, DAY = pd.Timedelta("7D"), pd.Timedelta("1D").value
 
 
 def joined(campaign):
@@ -73,6 +74,7 @@ def renewed(fitted, records):
     return monitor, quietly(monitor.begin_again, new.index[0])
 
 
+@pytest.mark.nightly
 def test_a_healthy_year_joins_the_baseline(monitor, records):
     healthy = records["healthy"]
     quietly(monitor.update, healthy[YEAR : 2 * YEAR])
@@ -95,6 +97,7 @@ def test_nothing_new_changes_nothing(monitor, records):
     assert monitor.detector_ is detector
 
 
+@pytest.mark.nightly
 def test_rows_of_an_event_never_train(with_event):
     monitor = deepcopy(with_event)
     event = monitor.events_.loc[1]
@@ -124,11 +127,9 @@ def test_nothing_trains_after_an_open_event(with_event):
     assert "still open" in found.excluded["reason"][0]
 
 
-def test_the_margin_before_an_event_holds_a_window(records):
-    healthy = records["healthy"]
-    assert margin_of(make_pipeline(MahalanobisDetector()), healthy) == WEEK
-    assert margin_of(make_pipeline(WindowedAlarm("12D")), healthy) == pd.Timedelta("12D")
-    assert margin_of(make_pipeline(WindowedAlarm(20)), healthy) == pd.Timedelta("20D")
+@pytest.mark.parametrize(("path", "margin"), [((), "7D"), (((0, 12 * DAY),), "12D"), (((19, 0), (0, DAY)), "20D")])
+def test_the_margin_before_an_event_holds_what_the_detector_looks_back_on(path, margin, records):
+    assert margin_of(Memory((path,)), records["healthy"]) == pd.Timedelta(margin)
 
 
 def test_values_of_a_faulty_sensor_do_not_train(fitted, records):
@@ -147,6 +148,7 @@ def test_values_of_a_faulty_sensor_do_not_train(fitted, records):
     assert found.excluded[["columns", "n_records"]].to_numpy().tolist() == [["T1", 20]]
 
 
+@pytest.mark.nightly
 def test_a_change_without_an_alarm_is_not_learned(monitor, records):
     changed = records["small"]
     quietly(monitor.update, pd.concat([records["healthy"][YEAR:500], changed[500:720]]))
@@ -187,6 +189,7 @@ def test_late_records_after_a_new_baseline(renewed, records):
     assert monitor.state() == "healthy"
 
 
+@pytest.mark.nightly
 def test_a_refit_goes_on_with_a_new_baseline_and_old_weeks_fade(renewed, records):
     monitor, start = deepcopy(renewed[0]), renewed[1].since
     counts = [renewed[1].baseline.index]
@@ -201,6 +204,7 @@ def test_a_refit_goes_on_with_a_new_baseline_and_old_weeks_fade(renewed, records
     assert monitor.prior_ is None
 
 
+@pytest.mark.nightly
 def test_a_second_intervention_begins_from_the_first(renewed, records):
     monitor = deepcopy(renewed[0])
     both = joined(make_truss_campaign(2, damage={"diagonal": -0.15, "bottom": -0.2}, random_state=0))

@@ -5,12 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo.plotting import (
-    DamageIndexDisplay,
-    FrequencyTemperatureDisplay,
-    HistoryDisplay,
-    PredictionDisplay,
-)
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 
 THRESHOLD = 4.0
 
@@ -52,7 +47,7 @@ def test_a_group_of_high_indices_is_no_outlier(index, n_damaged):
 def test_every_point_is_in_view_or_counted(index):
     random = np.random.default_rng(1)
     for heavy in (random.standard_cauchy(500), np.exp(2 * random.normal(size=500)), np.r_[np.full(499, 2.0), 9.0]):
-        display = HistoryDisplay.from_predictions(heavy)
+        display = PredictionDisplay.from_predictions(heavy)
         low, high = display.axes_[0].get_ylim()
         n_beyond = ((heavy < low) | (heavy > high)).sum()
         assert sum(int(text.split()[0]) for text in texts(display.axes_[0])) == n_beyond
@@ -63,21 +58,17 @@ def test_every_point_is_in_view_or_counted(index):
 def test_records_without_an_index_are_grey_ticks_with_their_number(index):
     index.iloc[[3, 4, 5, 300]] = np.nan
     panels = {"first": {"healthy": index}, "second": {"healthy": index, "damaged": index[:3]}}
-    display = DamageIndexDisplay.from_scenarios(panels, THRESHOLD)
+    display = DamageIndexDisplay.from_predictions(panels, THRESHOLD)
     assert [texts(ax) for ax in display.axes_] == [["4 not judged"], ["healthy: 4 not judged"]]
     (ticks,) = (line for line in display.ax_.lines if line.get_gid() == "not judged")
     np.testing.assert_array_equal(ticks.get_xdata(), index.index[[3, 4, 5, 300]])
     assert ticks.get_color() == "#555555"
-
-
-def test_an_index_of_which_nothing_is_judged_says_so(index):
-    display = DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD)
-    assert texts(display.ax_) == ["365 not judged"]
+    assert texts(DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD).ax_) == ["365 not judged"]
 
 
 def test_one_legend_names_the_labels_of_all_panels_which_keep_their_colours(index):
     panels = {"first": {"healthy": index}, "second": {"damaged": index, "healthy": index}}
-    display = DamageIndexDisplay.from_scenarios(panels, THRESHOLD)
+    display = DamageIndexDisplay.from_predictions(panels, THRESHOLD)
     (legend,) = display.figure_.legends
     assert [text.get_text() for text in legend.get_texts()] == ["healthy", "threshold", "damaged"]
     assert not any(ax.get_legend() for ax in display.axes_)
@@ -88,7 +79,7 @@ def test_one_legend_names_the_labels_of_all_panels_which_keep_their_colours(inde
 def test_sensor_failures_do_not_stretch_the_temperatures(later):
     T, F = later.temperatures["T1"].copy(), later.frequencies.copy()
     T.iloc[7], F.iloc[9, 0] = -999.0, 0.0
-    display = FrequencyTemperatureDisplay.from_predictions(T, F)
+    display = PredictionDisplay.from_predictions(F, temperature=T)
     for ax in display.axes_:
         assert ax.get_xlim()[0] > T.drop(T.index[7]).min() - 5
         assert "1 beyond, down to -999" in texts(ax)
@@ -112,6 +103,6 @@ def test_drawing_again_counts_anew(later):
     F = later.frequencies.copy()
     F.iloc[3, 0] = 1e3
     for _ in range(2):
-        HistoryDisplay.from_predictions(F, ax=axes)
+        PredictionDisplay.from_predictions(F, ax=axes)
     assert texts(axes.ravel()[0]) == ["2 beyond, up to 1000"]
     assert plt.get_fignums() == [figure.number]

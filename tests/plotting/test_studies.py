@@ -2,7 +2,6 @@
 
 from types import SimpleNamespace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,11 +11,9 @@ from sklearn.ensemble import IsolationForest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay, SensitivityDisplay
+from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay
 from skthermo.studies import pod_curve
-from skthermo.updating import sensitivity
 
 
 @pytest.fixture(scope="module")
@@ -54,14 +51,18 @@ def test_any_outlier_detector_and_pipelines(later):
 
 def test_a_panel_for_each_scenario():
     index = np.array([1.0, np.nan, 3.0])
-    scenarios = {"SH-0": {"true": index, "simulated": index + 1}, "SB-20": {"true": 2 * index}, "SB-30": 3 * index}
-    display = DamageIndexDisplay.from_scenarios(scenarios, {"SH-0": 2.0, "SB-20": 3.0, "SB-30": 4.0}, n_columns=2)
+    scenarios = {
+        "SH-0": {"true": index, "simulated": index + 1},
+        "SB-20": {"true": 2 * index},
+        "SB-30": {"records": 3 * index},
+    }
+    display = DamageIndexDisplay.from_predictions(scenarios, {"SH-0": 2.0, "SB-20": 3.0, "SB-30": 4.0}, n_columns=2)
     assert [ax.get_title() for ax in display.axes_] == list(scenarios)
     assert [line.get_ydata()[0] for line in display.threshold_lines_] == [2.0, 3.0, 4.0]
     np.testing.assert_array_equal(display.points_["SH-0"][1].get_ydata(), index + 1)
     np.testing.assert_array_equal(display.points_["SB-30"][0].get_ydata(), 3 * index)
     assert display.axes_[0].get_ylim()[0] == 0
-    for ax in DamageIndexDisplay.from_scenarios(scenarios, 2.0, log=True, colours={"true": "#555555"}).axes_:
+    for ax in DamageIndexDisplay.from_predictions(scenarios, 2.0, log=True, colours={"true": "#555555"}).axes_:
         assert ax.get_yscale() == "log"
         assert ax.lines[0].get_color() in ("#555555", "#009E73")  # of "true" and, the third label, "records"
 
@@ -71,19 +72,12 @@ def test_a_panel_for_each_scenario():
     [
         (np.ones((3, 2)), 1.0, "'records' has 2 columns; expected one"),
         ([1.0], None, "threshold is None; expected a number"),
-        ({}, 1.0, "damage index is empty"),
+        ({}, 1.0, "expected one or more by label"),
     ],
 )
 def test_wrong_indices_are_named(index, threshold, message):
     with pytest.raises(ValueError, match=message):
         DamageIndexDisplay.from_predictions(index, threshold)
-
-
-def test_what_is_no_detector_is_named(later):
-    with pytest.raises(ValueError, match="has no method 'score_samples'"):
-        DamageIndexDisplay.from_estimator(StandardScaler(), later.frequencies)
-    with pytest.raises(ValueError, match="threshold of 'b' is None"):
-        DamageIndexDisplay.from_scenarios({"a": [1.0], "b": [1.0]}, {"a": 1.0})
 
 
 class Curve:
@@ -142,25 +136,6 @@ def test_curves_of_strengthenings_and_of_records_without_a_slope():
     assert PODCurveDisplay.from_predictions(missed).marks_["bracket"].get_label() == "$a_{90}$ beyond 20.0 %"
 
 
-def test_sensitivities_as_a_map_with_numbers():
-    model = make_truss()
-    theta = [1.1, 0.9, 1.0, 1.0]
-    ax = plt.figure().add_subplot()
-    display = SensitivityDisplay.from_model(model, theta, ax=ax)
-    table = sensitivity(model, theta)
-    assert display.ax_ is ax
-    np.testing.assert_allclose(display.image_.get_array(), table.T)
-    assert [tick.get_text() for tick in ax.get_yticklabels()] == list(table.columns)
-    shown = {(t.get_position()): t.get_text() for t in ax.texts}
-    assert shown[0, 0] == f"{table.iloc[0, 0]:.2f}"
-    assert (0, 3) not in shown  # 0.001 is below the smallest number shown
-    low, high = display.image_.get_clim()
-    assert -low == high == pytest.approx(np.abs(table.to_numpy()).max())
-    assert display.colorbar_.ax.get_ylabel() == "normalised sensitivity"
-    with pytest.raises(ValueError, match="sensitivity is a ndarray of shape"):
-        SensitivityDisplay.from_predictions(table.to_numpy())
-
-
 def given(n_groups=3, **changed):
     """An identification by hand: the last group is not seen."""
     groups = ["deck", "piers", "soil", *(f"E_{number}" for number in range(4, n_groups + 1))][:n_groups]
@@ -217,7 +192,7 @@ def test_shifts_are_drawn_in_percent_with_two_standard_errors():
     assert display.axes_[2].get_ylabel() == "shift (%)"
 
 
-@pytest.mark.parametrize("n_groups", [1, 3, 14])
+@pytest.mark.parametrize("n_groups", [1, 14])
 def test_nothing_that_is_written_overlaps_in_a_figure_of_its_own(n_groups):
     long = "Rebar of the upper floors in the eastern wing"
     found = given(n_groups, unseen=[])

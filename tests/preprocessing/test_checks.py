@@ -32,6 +32,7 @@ def exchanged(rows):
 
 
 class TestHealthyRecords:
+    @pytest.mark.nightly
     @pytest.mark.parametrize("seed", range(4))
     def test_they_have_no_finding(self, seed):
         random, year = np.random.default_rng(seed), make_truss_campaign(random_state=seed)
@@ -40,6 +41,7 @@ class TestHealthyRecords:
         for tables in ((temperatures, frequencies), gaps, (temperatures.round(0), frequencies.round(1))):
             assert check_records(*tables).table.empty
 
+    @pytest.mark.nightly
     def test_neither_has_a_bridge_by_the_hour(self):
         campaign = make_kw51_campaign(retrofit=False, random_state=0)
         findings = check_records(campaign.temperatures, campaign.frequencies)

@@ -50,6 +50,7 @@ def scattered(share):
     return np.where(rng.random(full.shape) < share, np.nan, full), new[~np.isnan(new).all(axis=1)]
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("trees")
 @pytest.mark.parametrize("share", [0.1, 0.5])
 @pytest.mark.parametrize("n_neighbors", [1, 10, 300])

@@ -100,11 +100,6 @@ def test_history_is_a_copy():
     assert lags.transform(T[["T1"]].iloc[[6]])["T1_lag1"].item() == 5
 
 
-def test_old_names_of_units_still_serve():
-    assert LagFeatures(freq="2D").fit(T).freq_ == pd.Timedelta("2D")
-    assert LagFeatures(freq="1 days 2 hours").fit(T).freq_ == pd.Timedelta("26h")
-
-
 def test_a_new_value_at_a_known_stamp_replaces_the_old_one():
     lags = LagFeatures(2, freq="1h").fit(T)
     corrected = T.iloc[[4, 5]] + 100
@@ -128,6 +123,8 @@ def test_gaps_are_bridged_up_to_the_tolerance():
 
 
 def test_durations_come_in_every_form():
+    assert LagFeatures(freq="2D").fit(T).freq_ == pd.Timedelta("2D")
+    assert LagFeatures(freq="1 days 2 hours").fit(T).freq_ == pd.Timedelta("26h")
     expected = LagFeatures(3, freq="1h", tolerance="0h").fit_transform(T)
     for hour in ("h", "60min", timedelta(hours=1), np.timedelta64(1, "h"), pd.Timedelta("1h"), pd.offsets.Hour()):
         pd.testing.assert_frame_equal(LagFeatures(3, freq=hour, tolerance="0h").fit_transform(T), expected)
@@ -211,27 +208,20 @@ def test_columns_named_by_integers_keep_their_names():
         ({"freq": "soon"}, T, "freq is 'soon'; expected a duration"),
         ({"freq": "-1h"}, T, "freq is '-1h'; expected a positive duration"),
         ({"freq": "24"}, T, "freq is '24'; expected a positive duration with its unit"),
-        ({"freq": "0h"}, T, "freq is '0h'; expected a positive duration"),
         ({"lags": [0, 0]}, T, r"lags is \[0, 0\]; expected"),
         ({"lags": [-1]}, T, r"lags is \[-1\]"),
-        ({"lags": []}, T, r"lags is \[\]"),
         ({"lags": 0}, T, "lags"),
         ({}, pd.concat([T, T.iloc[[3]]]), "1 duplicate stamps, the first 2025-01-01 03:00:00 in row 30"),
         ({}, T.set_axis([pd.NaT, *T.index[1:]]), r"missing stamp \(NaT\) in row 0"),
         ({"freq": "MS"}, T, "freq is 'MS'; expected a duration of fixed length with its unit, such as '10min'"),
-        ({"freq": "M"}, T, "freq is 'M'; expected a duration of fixed length"),
-        ({"freq": "2YE"}, T, "freq is '2YE'; expected a duration of fixed length"),
         ({"freq": pd.offsets.MonthBegin()}, T, "freq is <MonthBegin>; expected a duration of fixed length"),
         ({"freq": np.timedelta64(1, "M")}, T, "expected a duration of fixed length"),
         ({"freq": np.timedelta64("NaT")}, T, "freq is .*NaT.*; expected a .*duration"),
-        ({"tolerance": "MS"}, T, "tolerance is 'MS'; expected a duration of fixed length"),
         ({"lags": 10**9}, T, "lags are 1000000000 for 30 rows; expected at most 10000, or as many as there are rows"),
-        ({"lags": range(10**6)}, T, "lags are 1000000 for 30 rows"),
         ({"lags": [0, 10**6]}, T, "lags reach back 1000000 times 0 days 01:00:00; expected at most 100 years"),
         ({"lags": [True, False]}, T, "expected a positive number or different non-negative integers"),
         ({}, T.set_axis(HOURS - HOURS[0]), "X has an index of durations, the first 0 days 00:00:00; expected a Date"),
         ({}, T.set_axis(HOURS.strftime("%Y-%m-%d %H:%M")), "stamps as text, the first '2025-01-01 00:00'; expected"),
-        ({}, T.set_index(HOURS.strftime("%d.%m.%Y %H:%M").astype(object)), "stamps as text"),
         ({}, T.set_index([np.zeros(30), HOURS]), "stamps on one of the index levels"),
         ({}, T.set_axis(OFFSETS), "stamps with several offsets from UTC .*utc=True"),
         ({}, T.set_axis(pd.Index([None, *HOURS[1:].to_pydatetime()], dtype=object)), "missing stamp .NaT. in row 0"),
@@ -270,7 +260,7 @@ def test_a_batch_without_its_past_says_so():
     lags = LagFeatures([0, 6], freq="1h", tolerance="0h").fit(training)
     day = T[24:]
     with pytest.warns(
-        UserWarning, match=r"lags reach 6 h back; the first record given is 2025-01-02 00:00:00, and 6 of 6"
+        UserWarning, match=r"lags reach 6 hours back; the first record given is 2025-01-02 00:00:00, and 6 of 6"
     ):
         assert lags.transform(day)["T1_lag6"].isna().all()
     assert lags.transform(T[18:])["T1_lag6"].notna().sum() == 6  # given the 6 hours before

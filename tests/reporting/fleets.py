@@ -1,8 +1,9 @@
 """A fleet whose bridges are given, with the attributes of a fitted one."""
 
-from types import SimpleNamespace
-
+import numpy as np
 import pandas as pd
+
+from skthermo.fleet._discoveries import Discoveries
 
 
 class FakeFleet:
@@ -27,7 +28,6 @@ class FakeFleet:
             for number in monitor.events_.index[monitor.events_["kind"] == "damage"]
         ]
         table = pd.DataFrame(rows, columns=["bridge", "event", "is_called"]).astype({"is_called": bool})
-        n = len(self.monitors)
-        numbers = {"promised_false_per_year": float(n), "expected_false_per_year": 0.5, "n_judged": n}
-        called = table.loc[table["is_called"], "bridge"].unique().tolist()
-        return SimpleNamespace(table=table, share=share, called=called, **numbers)
+        table["p_value"] = np.linspace(0, 1, len(table))
+        p_values = pd.Series(1.0, list(self.monitors))
+        return Discoveries(share, table, p_values, [], 0.5, float(len(self.monitors)))

@@ -47,13 +47,13 @@ def run_study(fem, T, scenarios, **options):
 
 
 class Page(HTMLParser):
-    """A page that was read: an error if tags are not balanced."""
+    """A page or a section that was read: an error if tags are not balanced."""
 
     def __init__(self, text):
         super().__init__()
         self.open, self.tags, self.text, self.cells, self.heads, self.paragraphs = [], [], "", [], [], []
         self.link_texts = []
-        self.feed(text)
+        self.feed(getattr(text, "html", text))
         self.close()
         assert self.open == []
 

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo._formatting import duration_text, percent, probability_text, share_text
+from skthermo._tables.text import duration_text, percent, probability_text, share_text
 from skthermo.reporting._findings import SIMULATED, findings_of
 from skthermo.reporting._html import Html, element
 from skthermo.studies import DetectabilityStudy
+from skthermo.studies.detectability._findings import StudyFindings
 
 
 @pytest.mark.parametrize("share", [0, 1e-6, 0.00042, 0.0274, 0.099, 0.1, 0.5, 0.936, 0.9949, 0.996, 0.9994, 1])
@@ -26,17 +27,7 @@ def test_shares_that_are_nearly_1_or_not_known():
 
 
 def test_times_are_said_in_fitting_units():
-    waits = [
-        pd.Timedelta(0),
-        pd.Timedelta("20min"),
-        pd.Timedelta("5h"),
-        pd.Timedelta("1h"),
-        pd.Timedelta("24h"),
-        pd.Timedelta("93.5D"),
-        pd.NaT,
-        12.0,
-        np.nan,
-    ]
+    waits = [*map(pd.Timedelta, ("0D", "20min", "5h", "1h", "24h", "93.5D")), pd.NaT, 12.0, np.nan]
     said = ["first record", "20 minutes", "5 hours", "1 hour", "1 day", "94 days", "no alarm", "12 records", "no alarm"]
     assert [duration_text(wait) for wait in waits] == said
 
@@ -51,29 +42,19 @@ def test_only_html_is_not_escaped():
 def finding(severities, rates, n_records=200, false_alarms=np.nan):
     """The finding for one family with given rates, with Wald bounds."""
     error = 2 * np.sqrt(np.multiply(rates, np.subtract(1, rates)) / n_records)
-    rows = {
+    common = {"detector": "one", "source": SIMULATED, "error": ""}
+    rows = common | {
         "family": "deck",
         "severity": severities,
-        "detector": "one",
-        "error": "",
-        "source": SIMULATED,
         "measure": "POD",
         "rate": rates,
         "lowest": np.clip(rates - error, 0, 1),
         "highest": np.clip(rates + error, 0, 1),
         "n_effective": n_records,
     }
-    healthy = {
-        "detector": "one",
-        "source": SIMULATED,
-        "error": "",
-        "measure": "PFA",
-        "rate": false_alarms,
-        "highest": false_alarms + 0.01,
-    }
+    healthy = common | {"measure": "PFA", "rate": false_alarms, "highest": false_alarms + 0.01}
     study = DetectabilityStudy(None, None, [])
-    study.results_ = pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True)
-    study.confidence_, study.worlds_ = 0.95, None
+    study.findings_ = StudyFindings(pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True))
     return findings_of(study)
 
 
@@ -84,7 +65,6 @@ def test_a_curve_says_more_than_the_severities_that_were_tested():
     assert "this limit is 20\xa0% to 30\xa0%" in said
     numbers = [float(number) for number in re.findall(r"at ([\d.]+)", said)]
     assert numbers == pytest.approx([100 * found.curve.a90, 100 * found.curve.a90_95], abs=0.06)
-    assert found.cell == "30\xa0%"
 
 
 def test_a_limit_beyond_the_tested_severities_is_not_extrapolated():
@@ -92,7 +72,7 @@ def test_a_limit_beyond_the_tested_severities_is_not_extrapolated():
     assert found.sentence().startswith("no tested damage is found reliably; the largest was 30\xa0%.")
     assert found.curve.a90 > 0.3
     assert "at more than 30\xa0%" in found.sentence()
-    assert (found.cell, found.bounds) == ("none up to 30\xa0%", "above 30\xa0%")
+    assert found.bounds == "above 30\xa0%"
     (found,) = finding([0.2, 0.3], [0.93, 0.99])
     assert "less was not tested" in found.sentence()
     assert "at less than 20\xa0%" in found.sentence()
@@ -101,9 +81,10 @@ def test_a_limit_beyond_the_tested_severities_is_not_extrapolated():
 def test_severities_that_determine_no_curve():
     (separated,) = finding([0.1, 0.2, 0.3], [0.0, 1.0, 1.0])
     assert "between 10\xa0% and 20\xa0%; nothing in between was tested" in separated.sentence()
-    assert separated.curve_cell == "no curve"
     (single,) = finding([0.2], [0.95])
     assert "Only one severity" in single.sentence()
+    (strengthened,) = finding([-0.1, -0.2, -0.4], [0.2, 0.7, 0.96])
+    assert strengthened.sentence().startswith("strengthening of 40\xa0% or more")
     (falling,) = finding([0.1, 0.2, 0.3], [0.5, 0.4, 0.3])
     assert "does not increase with severity" in falling.sentence()
 
@@ -112,25 +93,16 @@ def test_a_curve_beside_its_points_is_doubtful():
     (found,) = finding([0.02, 0.05, 0.1, 0.3], [0.05, 0.6, 0.65, 0.97], 2000)
     assert found.curve.n_missed == 2
     assert "doubtful, because the curve lies outside the bounds of 2 of 4 tested severities" in found.sentence()
-    assert found.curve_cell.endswith("(doubtful)")
     (found,) = finding([0.1, 0.2, 0.3], [0.3, 0.88, 0.99])
-    assert "doubtful" not in found.sentence() + found.curve_cell
+    assert "doubtful" not in found.sentence()
 
 
-@pytest.mark.parametrize("rates", [[0.0, 0.0, 0.0], [0.01, 0.01, 0.01], [0.0, 0.01, 0.02]])
-def test_a_detector_that_sees_no_damage_is_called_so(rates):
-    (blind,) = finding([0.1, 0.2, 0.3], rates, false_alarms=0.01)
+def test_a_detector_that_sees_no_damage_is_called_so():
+    (blind,) = finding([0.1, 0.2, 0.3], [0.0, 0.01, 0.02], false_alarms=0.01)
     assert "Alarms are as rare as for the healthy structure" in blind.sentence()
-    assert blind.curve_cell == "no curve"
+    assert blind.curve is None
     (seeing,) = finding([0.1, 0.2, 0.3], [0.01, 0.01, 0.3], false_alarms=0.01)
     assert "as rare as" not in seeing.sentence()
-
-
-def test_strengthening_is_called_so():
-    (found,) = finding([-0.1, -0.2, -0.4], [0.2, 0.7, 0.96])
-    assert found.sentence().startswith("strengthening of 40\xa0% or more")
-    assert found.cell == "40\xa0% (strengthening)"
-    assert "-" not in found.sentence()
 
 
 def test_damage_and_strengthening_in_one_family_have_no_limit():

@@ -5,7 +5,7 @@ import pandas as pd
 
 from skthermo.studies import DamagePrior
 from skthermo.studies.identification import IdentifiedDamage
-from skthermo.studies.identification.measured._compared import ComparedRecords
+from skthermo.studies.identification._observe import ComparedRecords
 
 BAND = 1.645  # standard deviations on either side that hold 90 %
 

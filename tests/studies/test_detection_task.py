@@ -118,6 +118,7 @@ def test_states_have_stamps_of_their_own(fem, n_repeats):
         assert (np.abs(days / 365.2425 - np.round(days / 365.2425)) * 365.2425 <= 1).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("window", ["5D", 5])
 def test_no_lag_and_no_window_reaches_from_one_state_into_another(fem, task, window):
     detector = task.refit(with_memory(window))
@@ -157,6 +158,7 @@ def test_rows_are_judged_in_order_of_time(task):
     assert task.scoring(detector, task.X.iloc[shuffled], task.y.iloc[shuffled]) == ordered
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("own", "expected"), [(0.005, 0.005), (0.02, 0.02), (0.2, 0.02)])
 def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
     task = task_of(fem, n_repeats=40, columns=MODES)
@@ -184,6 +186,7 @@ def test_a_raised_threshold_keeps_the_limit(fem):
     assert strict.raised(0.05) == 0  # a threshold that keeps the limit is left alone
 
 
+@pytest.mark.nightly
 def test_more_false_alarms_do_not_pay(task):
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
     grid = {"mahalanobisdetector__contamination": [0.02, 0.1]}
@@ -208,6 +211,7 @@ def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
         task.scoring(noted(task, values), task.X[365:], task.y[365:])
 
 
+@pytest.mark.nightly
 def test_a_search_finds_what_each_setting_scores(task):
     detector = with_memory("1D")
     few, many = ({"windowedalarm__window": [w], f"{LAGS}__lags": [n]} for w, n in (("1D", 1), ("7D", 3)))

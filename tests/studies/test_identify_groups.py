@@ -150,7 +150,6 @@ def test_a_mode_of_which_all_training_records_are_of_one_period():
     ("change", "message"),
     [
         ({"groups": ["bottom", "deck"]}, r"unknown damage groups \['deck'\]; expected some of \['bottom', "),
-        ({"groups": []}, r"groups is \[\]; expected one or more of"),
         ({"groups": {"chords": []}}, r"expected one or more of"),
         ({"noise": "gaussian"}, "noise is 'gaussian'; expected \"fitted\" or relative standard deviations"),
         ({"noise": 0.0}, "noise is 0.0; expected standard deviations above 0"),
@@ -159,12 +158,8 @@ def test_a_mode_of_which_all_training_records_are_of_one_period():
         ({"prior": 0.5}, "prior is 0.5; expected a DamagePrior"),
         ({"shapes": (np.ones((2, 6)), np.ones((2, 6)))}, "shapes came without dofs"),
         ({"dofs": [0, 1]}, "dofs came without shapes"),
-        ({"shapes": np.ones((2, 2, 6)), "dofs": [0, 1]}, "shapes is not a pair"),
-        ({"shapes": (np.ones((2, 6)), np.ones((3, 6))), "dofs": [0, 1]}, r"the damaged shapes have shape \(3, 6\)"),
-        ({"shapes": (np.ones((2, 6)), np.zeros((2, 6))), "dofs": [0, 1]}, "the damaged shape of mode 0 is zero"),
         ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0, 99]}, "dofs reach from 0 to 99; expected 0 to 22"),
         ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0.5, 1]}, "expected the degree of freedom of each sensor"),
-        ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0, 1], "shape_noise": 0}, "shape_noise is 0; expected"),
     ],
 )
 def test_bad_options(fem, change, message):
@@ -212,16 +207,11 @@ def test_a_model_that_cannot_be_damaged(fem):
     ("options", "message"),
     [
         ({"numbers": (0.5, 0.6)}, "expected probabilities of none, one, two and at most three causes"),
-        ({"numbers": (1.0,)}, "numbers is"),
         ({"numbers": (0.2,) * 5}, "numbers is"),
-        ({"numbers": "none"}, "numbers is 'none'; expected numbers"),
         ({"numbers": {0: 0.5, 1: 0.5}}, "numbers is {0: 0.5, 1: 0.5}; expected numbers"),
         ({"law": np.array(["uniform", "uniform"])}, "expected 'half-normal' or 'uniform'"),
         ({"severity": 0}, "severity is 0; expected a number between 0 and 1"),
-        ({"severity": float("nan")}, "severity is nan"),
-        ({"law": "normal"}, "law is 'normal'; expected 'half-normal' or 'uniform'"),
         ({"something_else": 1.5}, "something_else is 1.5"),
-        ({"model_error": "3 %"}, "model_error is '3 %'"),
     ],
 )
 def test_bad_priors(options, message):

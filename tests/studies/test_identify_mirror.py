@@ -21,6 +21,7 @@ def bridge():
     return Structure(nodes, members, supports, groups).assemble(["deck", "pier_1", "pier_2"], n_modes=4)
 
 
+@pytest.mark.nightly
 def test_mirror_images_are_named_and_share_the_probability():
     model = bridge()
     T = 10 + 10 * np.random.default_rng(0).uniform(-1, 1, (300, 1))

@@ -32,6 +32,7 @@ def later():
     return campaign.temperatures, campaign.frequencies
 
 
+@pytest.mark.nightly
 def test_models_like_the_chains_own_change_nothing_and_jobs_neither(fem, later):
     alone = identify_damage(fem, *later, GROUPS, random_state=0).table
     same = identify_damage(fem, *later, GROUPS, models=[TRUSS, TRUSS], random_state=0).table
@@ -42,6 +43,7 @@ def test_models_like_the_chains_own_change_nothing_and_jobs_neither(fem, later):
     np.testing.assert_array_equal(same, again)
 
 
+@pytest.mark.nightly
 def test_severities_are_averages_over_models_and_bands_hold_what_each_says(fem, later):
     stiff, soft = (TRUSS.with_added(stiffness=factor * of_diagonal()) for factor in (0.3, -0.2))
     found = [identify_damage(fem, *later, GROUPS, models=models, random_state=0) for models in ([stiff], [soft])]

@@ -3,38 +3,15 @@
 import numpy as np
 import pytest
 
-from skthermo._changes import Changes
-from skthermo._frequency_effects import FrequencyEffects, read_groups
+from skthermo._effects.frequencies import read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.studies.identification._curves import Part, ShiftComparison
 from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
-from skthermo.studies.identification.measured._shift import measured_shift, outlying, record_shifts
-from skthermo.studies.identification.weighing._comparison import Comparison, Part
+from skthermo.studies.identification._shift import measured_shift, outlying, record_shifts
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures[::12]
 GROUPS = ["bottom", "top", "diagonal"]
-AT = np.array([0.1, 0.35, 0.0])
-
-
-def differences(function, at, step=1e-4):
-    steps = step * np.eye(len(at))
-    return np.column_stack([(function(at + h) - function(at - h)) / (2 * step) for h in steps])
-
-
-def test_effects_are_the_changes_of_simulated_records(fem):
-    F = fem.simulate(WEATHER).to_numpy(copy=True)
-    F[::2, 1], F[:, 4] = np.nan, np.nan
-    effects = FrequencyEffects.of(
-        fem, fem.predict_parameters(WEATHER).to_numpy(), F, Changes.of_damage(fem.model, GROUPS)
-    )
-    change, slopes = effects(AT)
-    damaged = fem.simulate(WEATHER, damage=dict(zip(GROUPS, AT, strict=True))).to_numpy()
-    ratios = np.log(damaged / fem.simulate(WEATHER).to_numpy())
-    expected = np.where(np.isnan(F), np.nan, ratios)
-    expected[:, 4] = ratios[:, 4]  # a mode that was not measured counts in all rows
-    np.testing.assert_allclose(change, np.nanmean(expected, axis=0), atol=5e-5)  # a mean over a few typical rows
-    np.testing.assert_allclose(slopes, differences(lambda at: effects(at)[0], AT), rtol=1e-5, atol=1e-7)
-    np.testing.assert_allclose(effects(np.zeros(3))[0], 0, atol=1e-12)
 
 
 def test_parts_are_independent_and_modes_without_measurement_left_out():
@@ -43,7 +20,7 @@ def test_parts_are_independent_and_modes_without_measurement_left_out():
     covariance, measured = root @ root.T, random.standard_normal(7)
     measured[2] = np.nan
     linear = Part(lambda amounts: (amounts @ effects.T, effects), measured, covariance, 20.0)
-    comparison = Comparison([linear, Part(linear.effects, np.ones(7), np.eye(7))])
+    comparison = ShiftComparison([linear, Part(linear.effects, np.ones(7), np.eye(7))])
     known, observed = [0, 1, 3, 4, 5, 6], comparison.observed()
     inner = np.linalg.inv(covariance[np.ix_(known, known)])
     np.testing.assert_allclose((observed.rotation.T @ observed.rotation)[:6, :6], inner, rtol=1e-6)
@@ -106,9 +83,8 @@ def test_as_many_records_as_the_weights_say(fem):
     residuals = fem.residuals_
     inputs = residuals.weather[::9]
     number = residuals.n_expected(inputs)
-    rows = np.ones(len(residuals.own), dtype=bool)
-    noise = np.random.RandomState(0).standard_normal((len(rows), 600))
-    means = residuals._similar_mean(noise, inputs, rows).mean(axis=0)
+    noise = np.random.RandomState(0).standard_normal((len(residuals.own), 600))
+    means = residuals._similar_mean(noise, inputs).mean(axis=0)
     assert means.var() == pytest.approx(1 / number[0], rel=0.15)
 
 

@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
-from skthermo._formatting import SPACE, chance_text
+from skthermo._tables.text import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_damage
-from skthermo.studies.identification._sentences import explanation_text
-from skthermo.studies.identification.measured._compared import ComparedRecords
+from skthermo.studies.identification._identified import explanation_text
+from skthermo.studies.identification._observe import ComparedRecords
 from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")
@@ -108,15 +108,6 @@ def test_groups_that_look_alike_are_said_together_with_the_sum_of_their_probabil
     assert apart.told["probability"].iloc[0] == pytest.approx(0.44)
 
 
-def test_alike_groups_of_other_effect_have_each_their_own_severity():
-    weak = PIERS | {"pier_2": (0.40, {"pier_2": (0.3, 0.04)})}
-    (first, *_) = said(identified(weak, alike=[("pier_1", "pier_2")]))
-    assert first == (
-        "Most probable: a loss of 12 % of stiffness in pier_1 (between 9 and 15 %) or of 30 % in pier_2 (between 23 "
-        "and 37 %), which these modes cannot tell apart, probability 90 %."
-    )
-
-
 def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
     found = identified(PIERS, confused=[("pier_1", "pier_2", "deck")])
     assert found.told["probability"].iloc[0] == pytest.approx(0.44)
@@ -189,15 +180,6 @@ def test_strengthening_that_was_sought_is_not_named_as_a_cause():
     assert "strengthening" not in sought.summary()
 
 
-def test_three_causes_are_listed():
-    three = {"a": (0.1, 0.006), "b": (0.05, 0.006), "c": (0.03, 0.006)}
-    (first, *_) = said(identified({"a + b + c + something else": (0.95, three), "no damage": (0.05, {})}))
-    assert first == (
-        "Most probable: a loss of 10.0 % of stiffness in a (between 9.0 and 11.0 %), of 5.0 % in b (between 4.0 and "
-        "6.0 %), of 3.0 % in c (between 2.0 and 4.0 %) and something else, probability 95 %."
-    )
-
-
 def test_what_the_most_probable_explanation_leaves_is_told():
     found = identified(CLEAR, misfit_p_value=0.004, shifts=shifts([-0.02, -0.001, -0.012, 0.0], -0.001))
     (misfit,) = (line for line in said(found) if "unexplained" in line)
@@ -217,7 +199,7 @@ def test_explanations_that_are_not_listed_are_counted():
 @pytest.mark.parametrize("name", CASES)
 def test_report_summary_and_drawing_say_the_same(name):
     found = CASES[name]
-    page = identified_damage(found)
+    page = identified_damage(found).html
     assert isinstance(page, Html)
     for sentence in (*found.answer(), *found.limits(), *found.records.sentences()):
         assert sentence.replace(SPACE, " ") in found.summary()

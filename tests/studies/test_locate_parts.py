@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from skthermo.fem import Bar, Beam, Spring, Structure
-from skthermo.studies.location._curves import Curves
-from skthermo.studies.location._division import WHOLE, Division
-from skthermo.studies.location._lines import lines_of
-from skthermo.studies.location._located import fewest
-from skthermo.studies.location._places import Places
+from skthermo.studies.location._curves import StretchCurves
+from skthermo.studies.location._division import WHOLE, Division, lines_of
+from skthermo.studies.location._located import Places, fewest
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
 BEAM = STEEL | {"G": 81e9, "I_yy": 1e-4, "I_zz": 1e-4, "J": 1e-4}
@@ -91,7 +89,7 @@ def test_curves_are_the_effects_of_single_causes():
         return -0.5 * np.log(sums)[:, np.newaxis], -0.5 * slopes[:, np.newaxis]
 
     incidence = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1], [0, 0, 1]], dtype=bool)
-    curves = Curves.of(effects, incidence, np.array([[2.0]]))
+    curves = StretchCurves.of(effects, incidence, np.array([[2.0]]))
     for severity in (0.0, 0.05, 0.2, 0.45, 0.75, 0.9):
         exact, slopes = effects(severity * incidence)
         found, found_slopes = curves.single(np.arange(4), np.full(4, severity))

@@ -114,6 +114,7 @@ def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study,
         assert table.loc[name, "pod_equal"] == pytest.approx(pod)
 
 
+@pytest.mark.nightly
 def test_a_moved_threshold_gives_the_asked_rate_on_fresh_records(fem, study):
     for name in ("raw", "loud", "dice"):
         calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
@@ -325,6 +326,7 @@ def judged(random, names, pods, n_repeats=10, n_records=50, share=0.02):
     return records, pd.DataFrame([one.summary(0.95) for one in records])
 
 
+@pytest.mark.nightly
 def test_the_best_is_seldom_called_clearly_behind():
     random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
     n = 40

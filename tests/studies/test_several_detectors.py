@@ -104,6 +104,7 @@ def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
         np.testing.assert_array_equal(decisions, study.calibration_[name, source])
 
 
+@pytest.mark.nightly
 def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
     backwards = dict(reversed(detectors().items()))
     other = DetectabilityStudy(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2, random_state=0, uncertainty="noise")
@@ -205,6 +206,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     assert (few.loc[few["detector"] == "raw", "error"] == "").all()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("trouble", "message"),
     [
@@ -250,6 +252,7 @@ def test_what_is_asked_of_one_of_several_detectors(study):
     pd.testing.assert_frame_equal(one, smallest.loc["lines"])
 
 
+@pytest.mark.nightly
 def test_what_to_add_asks_for_a_detector_of_several(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
     several = DetectabilityStudy(

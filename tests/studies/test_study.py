@@ -233,6 +233,7 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
     assert (results["rate"] > 0.2).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "detector",
     [
@@ -293,6 +294,7 @@ def test_damage_between_two_severities_is_bracketed(fem):
     assert (found["lowest"], found["highest"]) == (0.1, 0.5)
 
 
+@pytest.mark.nightly
 def test_records_that_cannot_be_judged_do_not_count():
     frequencies = YEAR.frequencies.copy()
     frequencies.iloc[::3, :3] = np.nan

@@ -68,6 +68,7 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
     assert best["lowest"] < np.mean(gains) < best["highest"]
 
 
+@pytest.mark.nightly
 def test_the_noisier_the_mode_the_less_it_gains(study):
     few = clone(study).set_params(n_repeats=2)
     few.run(WEATHER)
@@ -88,6 +89,7 @@ def test_same_bits_whatever_the_jobs(study):
     pd.testing.assert_frame_equal(what_to_add(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
 
 
+@pytest.mark.nightly
 def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays):
     by_name, by_position = (
         make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
@@ -105,6 +107,7 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
     assert tables[0]["gain"][0] > 0
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:frequencies follow the weather of weeks")
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
@@ -191,6 +194,7 @@ def test_sensors_must_have_the_training_rows_and_new_names(fem):
         what_to_add(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]][:99])
 
 
+@pytest.mark.nightly
 def test_a_model_without_other_modes_has_only_longer_baselines(fem):
     truss = make_truss()
     model = CallableModel(truss.frequencies, truss.parameter_names, 6)

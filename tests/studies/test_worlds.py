@@ -12,7 +12,7 @@ from sklearn.base import clone
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
-from skthermo.studies.detectability._world_rates import Spread, WorldRates
+from skthermo.studies.detectability._world_rates import WorldRates, WorldSpread
 from skthermo.studies.worlds import PARTS, Worlds
 from skthermo.studies.worlds._weather import other_years, resampled_days
 
@@ -101,6 +101,7 @@ def test_repeats_do_not_depend_on_the_worlds(fem, study):
     assert (row["band_lowest"], row["band_highest"]) == (rates.min(), rates.max())
 
 
+@pytest.mark.nightly
 def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
     study = study_of(fem, ("noise", "baseline", "weather"))
     twin = clone(study).set_params(n_jobs=2)
@@ -196,7 +197,7 @@ def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(p
 
 
 def test_all_worlds_alike_have_no_spread():
-    found = Spread.of(np.full((5, 3), 0.25))
+    found = WorldSpread.of(np.full((5, 3), 0.25))
     assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
 
 
@@ -283,6 +284,7 @@ def test_uncertain_damage_differs_from_world_to_world(fem):
     assert len(np.unique(rates.round(2))) > 3
 
 
+@pytest.mark.nightly
 def test_other_training_records_change_a_chain_as_its_error(fem):
     year, chains = YEAR.temperatures, [fem.resampled(seed) for seed in range(4)]
     predicted = fem.predict(year)

@@ -24,6 +24,7 @@ def test_simulated_noise_is_relative_and_seeded():
     assert np.std(noisy[0].to_numpy() / FITTED.predict(T).to_numpy() - 1) == pytest.approx(0.01, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
     grid = {"mapper__lagfeatures__lags": [1, 2], "inverse__noise": [0.0, 0.01]}
     quarter = T[::4], F[::4]
@@ -35,6 +36,7 @@ def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
     np.testing.assert_array_equal(*(search.predict(T) for search in searches))
 
 
+@pytest.mark.nightly
 def test_processes_that_search_together_simulate_once(tmp_path):
     model = Logged(tmp_path / "solved.txt")
     air = np.linspace(0, 30, 60)[:, np.newaxis]
@@ -48,6 +50,7 @@ def test_processes_that_search_together_simulate_once(tmp_path):
     assert len(solved) > 12  # predictions go through the model too
 
 
+@pytest.mark.nightly
 def test_large_models_are_recognised_in_worker_processes(tmp_path):
     n = 380
     chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
@@ -61,6 +64,7 @@ def test_large_models_are_recognised_in_worker_processes(tmp_path):
     assert len(list(tmp_path.glob("simulations-*.lock"))) == 1
 
 
+@pytest.mark.nightly
 def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
     trees = ExtraTreesRegressor(3)
     parts = {
@@ -71,6 +75,7 @@ def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
     pd.testing.assert_frame_equal(first, second)
 
 
+@pytest.mark.nightly
 def test_same_seed_same_bits():
     model = DataInformedFEM(TRUSS, inverse=InverseSurrogate(bounds=0.2, noise=0.01, n_samples=300), random_state=0)
     alone = clone(model).fit(T, F).predict(T)

@@ -83,6 +83,7 @@ def test_an_inverse_of_given_parameters_needs_targets():
     assert learned.score(given.frequencies, given.theta) > 0.5
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside")
 def test_a_search_over_what_refining_makes_inert_says_so():
     chain = DataInformedFEM(make_truss(), inverse=inverse(refine=None, model=None, noise=0.01), random_state=0)

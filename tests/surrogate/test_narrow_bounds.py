@@ -8,7 +8,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss
-from skthermo.fem import CallableModel
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 TRUSS = make_truss()
@@ -62,28 +61,6 @@ class TestNarrowBounds:
     def test_it_needs_records(self, records):
         with pytest.raises(ValueError, match=r"fit got [01] records with all modes; expected at least 2"):
             inverse(narrow_bounds=True).fit(records)
-
-    def test_both_simulations_are_remembered(self, tmp_path):
-        solved = []
-
-        def frequencies(theta):
-            solved.append(len(theta))
-            return TRUSS.frequencies(theta)
-
-        model = CountedTruss(frequencies)
-        for _ in range(3):
-            InverseSurrogate(model, QUADRATIC, memory=str(tmp_path), narrow_bounds=True, **SETTINGS).fit(MEASURED)
-        assert sum(solved) == 800
-
-
-class CountedTruss(CallableModel):
-    """A truss that notes how many rows it solves, and is the same model for a memory."""
-
-    def __init__(self, function):
-        super().__init__(function, TRUSS.parameter_names, TRUSS.n_modes, vectorized=True)
-
-    def __getstate__(self):
-        return {"name": "truss"}
 
 
 class TestRoundTrip:

@@ -37,6 +37,7 @@ def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
     pd.testing.assert_frame_equal(FITTED.simulate(T), TABLE.simulate(T))
 
 
+@pytest.mark.nightly
 def test_scores_take_vectors_and_tables():
     assert FITTED.score(T, F["f1"]) == FITTED.score(T, F[["f1"]]) == TABLE.score(T, F["f1"])
     scores = [cross_val_score(CHAIN, T, y, cv=KFold(3)) for y in (F["f1"], F["f1"].to_numpy(), F[["f1"]])]
@@ -49,6 +50,7 @@ def test_names_come_from_the_series():
     assert clone(CHAIN).fit(T, F["f1"].rename("bending")).mode_names_ == ["bending"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("ensemble", [StackingRegressor, VotingRegressor])
 @pytest.mark.parametrize("weights", [None, np.linspace(0.5, 1.5, len(T))])
 def test_scikit_learns_ensembles_of_regressors(ensemble, weights):

@@ -59,6 +59,7 @@ def fitted(**options):
         return chain(**options).fit(T[:30], F[:30]), T, F
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("options", [{}, {"reduce": True}, {"aligner": BiasAligner(MODEL, method="scale")}])
 def test_covariance_is_that_of_the_mappers_posterior_behind_the_model(options):
     T, F = bridge(0, 200)

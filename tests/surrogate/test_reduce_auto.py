@@ -34,6 +34,7 @@ def predictions(fem, T):
     return np.hstack([fem.predict_parameters(T), fem.predict(T), fem.simulate(T, damage=damage)])
 
 
+@pytest.mark.nightly
 def test_a_large_model_is_reduced_and_nothing_changes_but_the_time():
     T, F = records(LARGE)
     auto, reduced, full = (chain(LARGE, reduce=reduce).fit(T, F) for reduce in ("auto", True, False))
@@ -79,6 +80,7 @@ def test_few_rows_do_not_pay_for_a_basis():
     assert fem.report_.solved == "Solved by the full model: a reduced model would save no time."
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:12 complete rows")
 def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
     T, F = records(LARGE, 12)
@@ -89,6 +91,7 @@ def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
     assert own.simulator_.reduced is not None
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("error:.*reduced model")
 def test_without_an_accurate_basis_the_full_model_solves_without_a_warning(monkeypatch):
     def fails(*args, **options):
@@ -104,6 +107,7 @@ def test_without_an_accurate_basis_the_full_model_solves_without_a_warning(monke
         chain(LARGE, reduce=True).fit(T, F)
 
 
+@pytest.mark.nightly
 def test_clones_memory_and_refits_decide_alike(tmp_path):
     T, F = records(LARGE)
     fem = chain(LARGE).fit(T, F)

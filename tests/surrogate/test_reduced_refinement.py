@@ -80,6 +80,7 @@ def test_one_reduced_model_serves_the_inverse_and_predictions(made):
     assert fem.report_.n_full_solves == 0
 
 
+@pytest.mark.nightly
 def test_the_box_is_widened_once_to_where_records_are(made):
     F = records(0.7, 0.95)[1]
     reduced, full = inverse(reduce=True).fit(F), inverse().fit(F)
@@ -109,6 +110,7 @@ def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted(
     assert f"the full one was solved {count} times" in told
 
 
+@pytest.mark.nightly
 def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     T, F = records(0.7, 0.95)
     with pytest.warns(UserWarning, match="(?s).*") as said:

@@ -8,12 +8,11 @@ from sklearn.dummy import DummyRegressor
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.neighbors import KNeighborsRegressor
 
-from skthermo.datasets import make_truss_campaign, make_z24
+from skthermo.datasets import make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-from skthermo.surrogate.refinement._levenberg_marquardt import SMALL_STEP
-from skthermo.surrogate.refinement._posterior import Local, Prior
+from skthermo.surrogate.refinement._posterior import SMALL_STEP, Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 
@@ -79,15 +78,6 @@ def test_tracked_modes_that_swap_come_back():
     solved = model.frequencies(theta)
     assert 0.2 < (solved[:, 0] > solved[:, 1]).mean() < 0.8
     np.testing.assert_allclose(surrogate(model, DummyRegressor()).transform(solved), theta, rtol=1e-7)
-
-
-def test_tracked_bridge_comes_back():
-    model, theta = make_z24(), drawn(40, lowest=0.85, highest=1.15)
-    solved = model.frequencies(theta)
-    assert (np.diff(solved, axis=1) < 0).any()
-    found = surrogate(model, bounds=0.2).invert(solved)
-    np.testing.assert_allclose(found.theta[found.converged], theta[found.converged], rtol=1e-5)
-    assert found.converged.mean() >= 0.95
 
 
 @pytest.mark.filterwarnings("ignore:modes change their order")
@@ -257,6 +247,7 @@ def test_weight_of_a_parameter_without_its_mode_is_that_of_the_prior():
     np.testing.assert_allclose(found.weight, (1 + width**-2 / precision) / 2, rtol=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:only .* of 365 rows trained")
 def test_years_with_gaps_teach():
     """A year that lacks three of ten values leaves errors as one with half of the records would."""
@@ -310,11 +301,6 @@ def test_rows_out_of_steps_are_counted():
         surrogate(regressor=DummyRegressor(), refine=1, n_samples=20).transform(TRUSS.frequencies(drawn(20)))
 
 
-def test_refining_wants_a_model():
-    with pytest.raises(ValueError, match="refine is 3 without a model; expected an FE model"):
-        InverseSurrogate(regressor=Ridge(), refine=3).fit(F.to_numpy(), drawn(365))
-
-
 def test_standard_deviations_are_frames_for_frames():
     measured = pd.DataFrame(noisy(drawn(5), 0.01), index=list("abcde"), columns=F.columns)
     inverse = InverseSurrogate(TRUSS, Ridge(), n_samples=50, noise=0.01, random_state=0).fit(measured)
@@ -326,6 +312,7 @@ def test_standard_deviations_are_frames_for_frames():
     assert (std > 0).all()
 
 
+@pytest.mark.nightly
 def test_scatter_is_the_noise_given_or_what_the_model_leaves():
     def scatter(model, frequencies, noise=0.0):
         options = {"bounds": 0.2, "n_samples": 100, "noise": noise, "random_state": 0}

@@ -86,12 +86,6 @@ def test_standard_deviations_come_as_frames_and_are_nan_where_an_input_is():
     assert vector.shape == vector_std.shape == (60,)
 
 
-def test_a_regressor_without_standard_deviations_says_so():
-    mapper = TemperatureMapper(Ridge()).fit(T, THETA)
-    with pytest.raises(ValueError, match=r"Ridge\(\) gives no standard deviations; expected a regressor whose predict"):
-        mapper.predict(T, return_std=True)
-
-
 YEAR = make_truss_campaign(random_state=0)
 
 

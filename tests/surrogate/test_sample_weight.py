@@ -38,6 +38,7 @@ def chain(mapper=None, inverse=PLAIN):
     return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
 
 
+@pytest.mark.nightly
 @ROUTING
 @pytest.mark.parametrize(
     "wrapped",
@@ -118,6 +119,7 @@ def test_a_mapper_alone_names_a_regressor_that_takes_no_weights():
         TemperatureMapper(KNeighborsRegressor()).fit(T, np.ones((120, 4)), sample_weight=WEIGHTS)
 
 
+@pytest.mark.nightly
 @ROUTING
 def test_cross_validation_and_search_hand_weights_on(routing):
     with config_context(enable_metadata_routing=routing):

@@ -169,6 +169,7 @@ def test_complete_records_have_no_gaps_and_the_same_noise(flawless):
     assert not np.hstack(flawless.draw_gaps(T, random_state=0)).any()
 
 
+@pytest.mark.nightly
 def test_what_cleaning_took_comes_back(spoiled):
     temperatures, raw = spoiled
     cleaned = HampelFilter(targets=list(raw)).fit(temperatures.join(raw)).transform(temperatures.join(raw))[list(raw)]

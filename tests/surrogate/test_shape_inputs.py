@@ -98,6 +98,7 @@ def test_errors_are_those_that_cramer_rao_allows():
     assert known["vertical"] < 0.6 * alone["vertical"]
 
 
+@pytest.mark.nightly
 def test_intervals_hold_the_parameters_and_errors_are_smaller_than_without_shapes():
     found = INVERSE.invert(columns(*MEASURED))
     alone = surrogate(dofs=None).invert(MEASURED[0])
@@ -247,6 +248,7 @@ WEATHER = YEAR.temperatures
 LAW = np.exp(-0.002 * (WEATHER.to_numpy()[:, [0, 1, 2, 1]] - 20))
 
 
+@pytest.mark.nightly
 def test_the_chain_learns_weak_parameters_from_shapes():
     F, shapes = measured(LAW, seed=3)
     F = pd.DataFrame(F, index=WEATHER.index, columns=list(YEAR.frequencies))
@@ -308,6 +310,7 @@ def test_right_shapes_of_any_scale_and_phase_give_no_warning():
     assert chain_of(lambda shapes: 3 * shapes * turned)[1] == []
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "change",
     [
@@ -328,6 +331,7 @@ def test_a_failed_sensor_is_counted():
 
 
 # The parameters are random: no weather moves them.
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:the temperatures explain nothing")
 def test_modes_may_have_numbers_as_names():
     frequencies, shapes = MEASURED

@@ -13,12 +13,12 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
 
-from skthermo._times import correlation_time
-from skthermo._weather import order_statistic
+from skthermo._tables.times import correlation_time
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
+from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.weather import order_statistic
 from skthermo.surrogate import TemperatureMapper
-from skthermo.surrogate.chain._records import WeatherResiduals
 from tests.surrogate.chains import F, T, as_measured, inverse
 from tests.surrogate.chains import chain as any_chain
 
@@ -39,7 +39,7 @@ FITTED = chain().fit(T, F)
 def residuals(weather, values, n_folds=5):
     folds = np.arange(len(values)) * n_folds // len(values)
     values = np.reshape(values, (len(values), -1))
-    return WeatherResiduals(np.reshape(weather, (len(values), -1)), values, values, folds)
+    return BaselineResiduals(np.reshape(weather, (len(values), -1)), values, values, folds)
 
 
 def autoregressive(n_records, rho, seed=0):
@@ -58,18 +58,6 @@ def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, 
     scores = np.array(scores)
     enough = [score for score in scores if (scores <= score).sum() >= (len(scores) + 1) * confidence]
     assert order_statistic(scores, confidence) == min(enough, default=np.inf)
-
-
-def test_order_statistic_holds_a_new_score_with_its_probability():
-    drawn = np.random.default_rng(0).exponential(size=(4000, 20))
-    held = [order_statistic(scores[:19], 0.9) >= scores[19] for scores in drawn]
-    assert np.mean(held) == pytest.approx(0.9, abs=0.015)
-
-
-def test_few_scores_cannot_tell():
-    assert order_statistic(np.arange(9.0), 0.9) == 8
-    assert order_statistic(np.arange(8.0), 0.9) == np.inf
-    assert order_statistic(np.array([]), 0.5) == np.inf
 
 
 @pytest.mark.parametrize("share_missing", [0.0, 0.3])
@@ -195,6 +183,7 @@ def test_noise_is_not_bounded_by_the_largest_residual_and_keeps_its_covariance()
     np.testing.assert_allclose(np.cov(drawn.T), np.cov(found.values.T), rtol=0.1)
 
 
+@pytest.mark.nightly
 def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
@@ -214,11 +203,6 @@ def test_noise_of_shuffled_records_is_that_of_records_in_order_of_time():
     pd.testing.assert_frame_equal(
         FITTED.simulate(shuffled, noise="fitted", random_state=0).sort_index(), expected, check_freq=False
     )
-
-
-def test_noise_is_fitted_or_a_number():
-    with pytest.raises(ValueError, match="noise is 'measured'; expected \"fitted\""):
-        FITTED.simulate(T, noise="measured")
 
 
 # Residuals of the chain
@@ -266,17 +250,13 @@ def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     assert min(blocks[1]) > 20
 
 
-def test_any_folds_may_be_asked_for():
-    kept = FITTED.records_.out_of_fold(FITTED.mapper_, FITTED._frequencies, FITTED.discrepancy_, folds=KFold(5))
-    np.testing.assert_array_equal(kept.folds, np.arange(365) // 73)
-
-
 def test_folds_in_unseen_weather_are_named():
     short = chain().fit(T[:150], F[:150])
     with pytest.warns(UserWarning, match=r"\d+ of 30 records of fold \d of 5 are in weather that the other folds"):
-        short.records_.out_of_fold(short.mapper_, short._frequencies, short.discrepancy_, folds=KFold(5))
+        short.records_.out_of_fold(short.mapper_, short.thermal_.frequencies, short.discrepancy_, folds=KFold(5))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
 def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
     order = np.random.default_rng(0).permutation(len(T))
@@ -285,6 +265,7 @@ def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
     np.testing.assert_allclose(shuffled.residuals_.weather, sorted_rows.residuals_.weather)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "mapper",
     [
@@ -300,12 +281,6 @@ def test_any_mapper_has_residuals(mapper):
     with pytest.warns(UserWarning, match="1 of 365 rows cannot be predicted") if lagged else nullcontext():
         std = fem.predict(T, return_std=True)[1]
     np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
-
-
-def test_chain_at_the_end_of_a_pipeline_has_intervals():
-    lags = make_pipeline(LagFeatures(2), chain()).fit(T, F)
-    lowest, highest = lags[-1].predict_interval(lags[:-1].transform(T))
-    assert 0.85 < ((lowest < F) & (highest > F)).to_numpy().mean() < 0.97
 
 
 def test_few_records_have_no_residuals():
@@ -414,13 +389,6 @@ def test_intervals_hold_their_share_where_a_sensor_died_after_training(sensor):
 
 
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled")
-def test_intervals_that_do_not_count_the_filled_sensor_hold_too_little():
-    predicted, margin = FITTED.predict(without("T3")), FITTED.predict_interval(LATER.temperatures)
-    half = (margin[1] - margin[0]) / 2
-    assert ((predicted - LATER.frequencies).abs() < half).to_numpy().mean() < 0.85
-
-
-@pytest.mark.filterwarnings("ignore:missing temperatures were filled")
 @pytest.mark.filterwarnings("ignore:'T.' departs from what the other sensors foretell")  # as it is moved
 def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadrature():
     weather = without("T2")
@@ -467,8 +435,8 @@ def test_few_of_many_records_tell_as_much(monkeypatch):
     found = residuals(weather, values)
     expected, spread = found.expected(wanted), found.spread(wanted)
     assert found.n_expected(wanted).max() <= 5000
-    monkeypatch.setattr("skthermo.surrogate.chain._records.MOST_PLACES", 2000)
-    monkeypatch.setattr("skthermo.surrogate.chain._records.MOST_SIMILAR", 200)
+    monkeypatch.setattr("skthermo.residuals.baseline.MOST_PLACES", 2000)
+    monkeypatch.setattr("skthermo.residuals.baseline.MOST_SIMILAR", 200)
     few = residuals(weather, values)
     np.testing.assert_allclose(few.expected(wanted), expected, atol=0.003)
     np.testing.assert_allclose(few.spread(wanted), spread, atol=0.004)
@@ -486,6 +454,6 @@ def test_results_do_not_depend_on_how_many_rows_are_held_in_memory(monkeypatch, 
         return np.hstack([found.expected(wanted), found.spread(wanted), drawn]), found.n_expected(wanted)
 
     whole = results()
-    monkeypatch.setattr("skthermo._weather.NUMBERS_AT_ONCE", numbers)
+    monkeypatch.setattr("skthermo.residuals.weather.NUMBERS_AT_ONCE", numbers)
     for one, other in zip(results(), whole, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)

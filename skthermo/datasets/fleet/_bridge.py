@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_noise
-from skthermo._arrays import Array, as_random_state, is_real, positive_integer
+from skthermo._estimators.arguments import check_noise
+from skthermo._tables.arrays import Array, as_random_state, is_real, positive_integer
 from skthermo.datasets._results import FleetRecords
-from skthermo.datasets.fleet._climate import Climate, drawn_by_hour, stream
+from skthermo.datasets.fleet._climate import SiteClimate, drawn_by_hour, stream
 from skthermo.datasets.fleet._laws import Law, draw_law
 from skthermo.datasets.fleet._measuring import Thermometer, columns_for, draw_thermometers, measured, readings
 from skthermo.datasets.fleet._structures import KINDS, Design, Kind
@@ -93,9 +93,9 @@ class FleetBridge:
         }
 
     @cached_property
-    def climate(self) -> Climate:
+    def climate(self) -> SiteClimate:
         """Climate of its place: latitude, mean, seasonal and daily cycle in C, and how its weather varies."""
-        return Climate.draw(self._random("climate"))
+        return SiteClimate.draw(self._random("climate"))
 
     @property
     def groups(self) -> tuple[str, ...]:

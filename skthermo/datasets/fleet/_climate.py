@@ -8,7 +8,7 @@ import pandas as pd
 import scipy  # which loads scipy.signal once it is used
 from scipy.stats import norm
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 COLDEST_DAY = 20.0
 WARMEST_HOUR = 15.0
@@ -23,7 +23,7 @@ def stream(*key: int) -> np.random.RandomState:
 
 
 @dataclass(frozen=True)
-class Climate:
+class SiteClimate:
     """Climate of a place.
 
     Attributes
@@ -50,7 +50,7 @@ class Climate:
     memory_hours: float
 
     @classmethod
-    def draw(cls, random: np.random.RandomState) -> "Climate":
+    def draw(cls, random: np.random.RandomState) -> "SiteClimate":
         """Climate of a place between 43 and 60 degrees, near the sea or far from it."""
         latitude = random.uniform(43, 60)
         continental = random.uniform()
@@ -105,11 +105,3 @@ def persistent(noise: Array, hours: float) -> Array:
     decay = np.exp(-1 / hours)
     noise = np.concatenate([noise[:1], np.sqrt(1 - decay**2) * noise[1:]])
     return scipy.signal.lfilter([1.0], [1.0, -decay], noise, axis=0)
-
-
-def memory(values: Array, hours: float) -> Array:
-    """Exponentially weighted mean of the past, which starts settled at the first value."""
-    if hours == 0:
-        return values
-    decay = np.exp(-1 / hours)
-    return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=decay * values[:1])[0]

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import as_random_state, is_real, positive_integer
+from skthermo._tables.arrays import as_random_state, is_real, positive_integer
 from skthermo.datasets.fleet._bridge import FleetBridge
 from skthermo.datasets.fleet._climate import stream
 from skthermo.datasets.fleet._laws import ALIENS

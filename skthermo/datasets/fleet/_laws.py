@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo.datasets.fleet._climate import memory
+from skthermo._tables.arrays import Array
+from skthermo.datasets._kw51_weather import memory
 
 REFERENCE = 10.0  # C, where the logarithm of the multiplier of a family's law is about 0
 ELSEWHERE = 14.0  # K, how far the knee of an alien law is moved

@@ -8,8 +8,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from skthermo._arrays import Array
-from skthermo.datasets.fleet._climate import memory, persistent
+from skthermo._tables.arrays import Array
+from skthermo.datasets._kw51_weather import memory
+from skthermo.datasets.fleet._climate import persistent
 
 STYLES = ("T{i}", "TH-{i:02d}", "{role}_{i}", "temperature {i}")
 OFFSET, READING_NOISE = 0.7, (0.1, 0.4)  # C

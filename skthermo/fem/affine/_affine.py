@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag, check_theta
-from skthermo._arrays import Array, Bounds, MatrixLike, RandomState
+from skthermo._estimators.arguments import check_flag, check_theta
+from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._base import AffineBase, Content

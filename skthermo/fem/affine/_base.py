@@ -12,10 +12,10 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs, check_flag, check_theta
-from skthermo._arrays import Array, MatrixLike, real_array, shape_array
-from skthermo._threads import map_on_blas_threads
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import check_dofs, check_flag, check_theta
+from skthermo._estimators.threads import map_on_blas_threads
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, MatrixLike, real_array, shape_array
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore

@@ -9,8 +9,8 @@ import scipy.linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
-from skthermo._arrays import Array, RandomState, as_random_state
-from skthermo._threads import map_on_blas_threads
+from skthermo._estimators.threads import map_on_blas_threads
+from skthermo._tables.arrays import Array, RandomState, as_random_state
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.modal import GuidedSolver, ShiftInvertSolver, factorise, may_be_missed, pair_modes

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, Matrix
+from skthermo._tables.arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal import (

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._arguments import as_mapping, integer_row
-from skthermo._arrays import Matrix, MatrixLike, is_real, positive_integer, real_array
+from skthermo._estimators.arguments import as_mapping, integer_row
+from skthermo._tables.arrays import Matrix, MatrixLike, is_real, positive_integer, real_array
 
 Key = tuple[str, ...]
 

@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_bounds, check_theta
-from skthermo._arrays import Array, Bounds, RandomState
+from skthermo._estimators.arguments import check_bounds, check_theta
+from skthermo._tables.arrays import Array, Bounds, RandomState
 from skthermo.fem.affine._base import AffineBase
 from skthermo.fem.affine._basis import Basis, grow_basis
 from skthermo.fem.affine._core import AffineCore

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import Array, real_array
+from skthermo._tables.arrays import Array, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element, check_matrices

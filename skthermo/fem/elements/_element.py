@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from skthermo._arrays import Array, is_real
+from skthermo._tables.arrays import Array, is_real
 
 Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]

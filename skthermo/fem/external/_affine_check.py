@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse
 from scipy.optimize import brentq
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._theta import by_name, failures_named
 from skthermo.fem.affine import read_terms
 

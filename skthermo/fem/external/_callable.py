@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag, check_theta
-from skthermo._arrays import Array, real_array
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import check_flag, check_theta
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, real_array
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
@@ -37,8 +37,8 @@ class CallableModel:
     vectorized : bool, default=False
         Whether the function takes many rows at once.
     cache : str or path-like, optional
-        A file that stores every solved row of theta, so that no row is solved twice, neither after a crash nor in a
-        later process.
+        A file, an SQLite database, that stores every solved row of theta, so that no row is solved twice, neither
+        after a crash nor in a later process.
 
     Attributes
     ----------
@@ -51,12 +51,6 @@ class CallableModel:
         If a name repeats, ``n_modes`` is not a positive integer, or the cache is a folder or belongs to
         other parameters or another number of modes.
 
-    Warns
-    -----
-    UserWarning
-        If records of the cache are damaged: these rows are solved again, and the next row that is
-        written replaces the records.
-
     See Also
     --------
     probe : For programs that return matrices.
@@ -66,8 +60,7 @@ class CallableModel:
     A row is recognised by the exact bits of its theta and is written as soon as it is solved; with
     ``vectorized=True``, all rows of a call are written together. Several processes may share a cache, but a row that
     one process is still solving may be solved by another too. A cache cannot know whether the function is still the
-    same: delete the file when the function changes. On Windows the file is not locked, so let only one process at a
-    time write it.
+    same: delete the file when the function changes.
 
     Examples
     --------
@@ -96,8 +89,6 @@ class CallableModel:
         self.vectorized = check_flag(vectorized, "vectorized")
         self._is_quiet = False
         self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
-        if self._samples is not None:
-            self._samples.read()
 
     @property
     def cache(self) -> Path | None:
@@ -139,7 +130,7 @@ class CallableModel:
         """
         rows = check_theta(theta, self.parameter_names)
         keys = [row.tobytes() for row in rows.astype("<f8")]
-        known = {} if self._samples is None else self._samples.read()
+        known = {} if self._samples is None else self._samples.read(keys)
         missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
         batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
         solved: dict[bytes, Array] = {}
@@ -155,10 +146,10 @@ class CallableModel:
                 continue
             impossible = self._impossible(asked, frequencies)
             failures |= {batch[row]: failure for row, failure in impossible.items()}
-            good = [row for row in range(len(batch)) if row not in impossible]
+            good = {key: frequencies[row] for row, key in enumerate(batch) if row not in impossible}
             if self._samples is not None and good:
-                self._samples.append(asked[good], frequencies[good])
-            solved |= {batch[row]: frequencies[row] for row in good}
+                self._samples.add(good)
+            solved |= good
         if failures:
             first = next(iter(failures.values()))
             everywhere = whole_batch_fails or len(failures) == len(set(keys))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import reduce
 from operator import add
@@ -13,9 +12,10 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._arguments import check_names, check_path
-from skthermo._arrays import Matrix
+from skthermo._estimators.arguments import check_names, check_path
+from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_named_matrices
+from skthermo._tables.arrays import Matrix
 from skthermo.fem.affine import AffineModel
 
 Key = tuple[str, ...]
@@ -214,10 +214,10 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
         sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
         if len(sums) == 1:
             del springs[sums[0]], found[sums[0]]
-            warnings.warn(
+            warn_user(
                 f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
                 f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
-                stacklevel=3,
+                "doubtful matrices",
             )
     if len(springs) > 1 and has_pattern:
         whole = reduce(add, springs.values())
@@ -225,9 +225,9 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
             if ratio := _ratio(term, whole - term):
                 similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
     for name, what in similar.items():
-        warnings.warn(
+        warn_user(
             f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
-            stacklevel=3,
+            "doubtful matrices",
         )
     return list(found)
 
@@ -298,9 +298,9 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
             "total"
         )
     if not is_meant:
-        warnings.warn(
+        warn_user(
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
             "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
-            stacklevel=3,
+            "doubtful matrices",
         )
     return rest

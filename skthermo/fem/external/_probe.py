@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
-from skthermo._arrays import Array, RandomState, as_random_state
+from skthermo._tables.arrays import Array, RandomState, as_random_state
 from skthermo.fem.affine import AffineModel, check_different
 from skthermo.fem.external._affine_check import Program, Terms, check_affine, relative
 

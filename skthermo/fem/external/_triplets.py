@@ -7,7 +7,7 @@ from os import PathLike
 import numpy as np
 import scipy.sparse
 
-from skthermo._arguments import check_path
+from skthermo._estimators.arguments import check_path
 from skthermo._io import read_half
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from skthermo._arrays import Array, Matrix
+from skthermo._tables.arrays import Array, Matrix
 
 CONVERGED = 1e-5
 """Residual, as a share of the derivative, at which the iteration stops. The error of the result is smaller."""

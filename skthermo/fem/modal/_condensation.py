@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._terms import DenseTerms
 from skthermo.fem.modal._dense import EigenSolver
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._terms import DenseTerms
 
 WIDEST_SPECTRUM = 1e6

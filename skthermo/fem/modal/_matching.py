@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._arguments import check_model
-from skthermo._arrays import Array, real_array, shape_array
+from skthermo._estimators.arguments import check_model
+from skthermo._tables.arrays import Array, real_array, shape_array
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._theta import nominal_theta
 from skthermo.fem.modal._mac import mac

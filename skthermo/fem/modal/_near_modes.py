@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.sparse
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._factors import Factors
 
 MAX_STEPS = 6

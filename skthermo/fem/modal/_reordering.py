@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_model, check_theta
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import check_model, check_theta
+from skthermo._tables.arrays import Array
 from skthermo.fem._protocol import ModalModel
 from skthermo.fem.modal._mac import mac
 from skthermo.fem.modal._tracking import pair_modes

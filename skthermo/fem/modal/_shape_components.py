@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, real_array, shape_array, without_mask
+from skthermo._tables.arrays import Array, real_array, shape_array, without_mask
 
 
 def shape_components(shapes: ArrayLike, reference: ArrayLike) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._terms import DenseTerms
 
 NUDGE = 1e-9  # share of the stiffness that is added where a repeated eigenvalue makes the equations singular

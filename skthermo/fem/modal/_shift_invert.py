@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem._factors import Factors
 from skthermo.fem._terms import SparseTerms
 from skthermo.fem._theta import nominal_theta

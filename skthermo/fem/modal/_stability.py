@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, Matrix, as_dense
+from skthermo._tables.arrays import Array, Matrix, as_dense
 from skthermo.fem._factors import factorise
 from skthermo.fem.modal._shift_invert import seeded_start
 

@@ -9,10 +9,10 @@ import numpy as np
 from joblib import delayed, effective_n_jobs
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_jobs, check_model, check_theta
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import check_jobs, check_model, check_theta
+from skthermo._estimators.threads import map_on_blas_threads, single_blas_thread
 from skthermo._io import as_they_come, with_progress
-from skthermo._threads import map_on_blas_threads, single_blas_thread
+from skthermo._tables.arrays import Array
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 
 Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]

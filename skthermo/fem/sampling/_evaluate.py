@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_dofs
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import check_dofs
+from skthermo._tables.arrays import Array
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 

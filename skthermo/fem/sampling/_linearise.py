@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_flag
-from skthermo._arrays import Array, central_differences, is_real
+from skthermo._estimators.arguments import check_flag
+from skthermo._tables.arrays import Array, central_differences, is_real
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._chunks import checked_rows, solve_rows
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes

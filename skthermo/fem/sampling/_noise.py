@@ -6,8 +6,8 @@ import numpy as np
 import scipy  # which loads scipy.signal once it is used
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import check_noise, check_size
-from skthermo._arrays import RandomState, as_random_state, real_array
+from skthermo._estimators.arguments import check_noise, check_size
+from skthermo._tables.arrays import RandomState, as_random_state, real_array
 
 
 def add_noise(

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from skthermo._arguments import check_bounds, check_flag, check_model
-from skthermo._arrays import Array, Bounds, RandomState, as_random_state, positive_integer
+from skthermo._estimators.arguments import check_bounds, check_flag, check_model
+from skthermo._tables.arrays import Array, Bounds, RandomState, as_random_state, positive_integer
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem.sampling._evaluate import evaluate, evaluate_modes
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, broken_lines, real_array, spread_evenly
-from skthermo._weather import TrainingRange
+from skthermo._tables.arrays import Array, broken_lines, real_array, spread_evenly
+from skthermo.residuals.weather import TrainingRange
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
 SMALLEST = 1e-5  # share of the variance of the inputs that a principal component needs
@@ -25,7 +25,7 @@ class FleetBasis:
     None where they have none.
     """
 
-    names: Sequence[Any] | None
+    names: Sequence[Hashable] | None
     middle: Array
     components: Array
     knots: Array
@@ -35,7 +35,7 @@ class FleetBasis:
     reach: TrainingRange
 
     @classmethod
-    def of(cls, tables: Sequence[Array], n_knots: int, names: Sequence[Any] | None = None) -> FleetBasis:
+    def of(cls, tables: Sequence[Array], n_knots: int, names: Sequence[Hashable] | None = None) -> FleetBasis:
         """The basis for the weather of some bridges, each (n_samples, n_inputs) without gaps."""
         pooled = np.concatenate([table[spread_evenly(np.arange(len(table)), ROWS_EACH)] for table in tables])
         middle, deviations = pooled.mean(axis=0), pooled.std(axis=0)
@@ -82,7 +82,7 @@ class FleetBasis:
 
 
 def steady_changes(
-    basis: FleetBasis, temperatures: Any, reference: float | None, reach: TrainingRange
+    basis: FleetBasis, temperatures: ArrayLike, reference: float | None, reach: TrainingRange
 ) -> tuple[Array, Array]:
     """Temperatures, and the functions there less those at a reference, by default the middle of some weather."""
     values = np.ravel(real_array(temperatures, "temperatures"))

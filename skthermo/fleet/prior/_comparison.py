@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from skthermo._arrays import Array
-from skthermo.fleet.prior._families import Family, Member, expect, learn_families
+from skthermo._tables.arrays import Array
+from skthermo.fleet.prior._families import CoefficientFamily, Member, expect, learn_families
 from skthermo.fleet.prior._posterior import ALIENS, Mixture, follow_chance, mixture, posterior
 
 LEAST_BRIDGES = 3
@@ -34,7 +34,7 @@ def left_out(
     members: Sequence[Member],
     names: Sequence[Hashable],
     follows: Mapping[tuple[int, Hashable], float],
-    families: Mapping[Hashable, Family],
+    families: Mapping[Hashable, CoefficientFamily],
     probabilities: Mapping[Hashable, float],
 ) -> list[Mixture]:
     """Every bridge's posterior by families that are learned without it."""
@@ -55,10 +55,10 @@ def left_out(
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PoolingComparison:
     """Families, the probability of following each, tables by family and by bridge, and the bridges' coefficients."""
 
-    families: dict[Hashable, Family]
+    families: dict[Hashable, CoefficientFamily]
     probabilities: dict[Hashable, float]
     by_family: pd.DataFrame
     by_bridge: pd.DataFrame
@@ -67,7 +67,7 @@ class Comparison:
     @classmethod
     def of(
         cls, members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
-    ) -> Comparison:
+    ) -> PoolingComparison:
         """Learn families, leave bridges out, and learn again without the weight of aliens."""
         probabilities = dict.fromkeys(names, 1 - ALIENS)
         several = [name for name in names if sum(name in member.families for member in members) > 1]

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import block_diag
 
-from skthermo._arrays import Array, is_real
+from skthermo._tables.arrays import Array, is_real
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Covariates:
     shares: Mapping[Hashable, Mapping[Any, float]]
 
     @classmethod
-    def of(cls, table: pd.DataFrame | None, bridges: Sequence[Any]) -> tuple[Covariates, Array, list[Array]]:
+    def of(cls, table: pd.DataFrame | None, bridges: Sequence[Hashable]) -> tuple[Covariates, Array, list[Array]]:
         """The encoding, the rows of the bridges, and the covariances of what is unknown of them."""
         numbers, shares = {}, {}
         if table is not None:
@@ -77,9 +78,4 @@ class Covariates:
                 raise ValueError(f"covariate {name!r} is {value!r}; expected one of {list(shares)}, or None if unknown")
             values = [*values, *(np.array([value == known for known in shares], dtype=float) - share)]
             covariances.append(np.zeros((len(share), len(share))))
-        size = len(values)
-        covariance, start = np.zeros((size, size)), 0
-        for part in covariances:
-            covariance[start : start + len(part), start : start + len(part)] = part
-            start += len(part)
-        return np.array(values), covariance
+        return np.array(values), block_diag(*covariances)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fleet.prior._information import Information
 from skthermo.fleet.prior._posterior import CoefficientPrior, posterior
 
@@ -19,7 +19,7 @@ TOLERANCE = 0.01  # relative change of the mean variance that ends the iteration
 
 
 @dataclass(frozen=True)
-class Family:
+class CoefficientFamily:
     """Coefficients of a bridge of covariates z are N(M'z, Sigma), of ``n_draws`` that were seen.
 
     ``precision`` is Z'Z + penalty, the precision of M in units of Sigma.
@@ -56,7 +56,7 @@ class Member:
     unknown: Array
     own: CoefficientPrior
 
-    def prior(self, families: Mapping[Hashable, Family], *, predictive: bool = False) -> CoefficientPrior:
+    def prior(self, families: Mapping[Hashable, CoefficientFamily], *, predictive: bool = False) -> CoefficientPrior:
         """What the fleet says of its coefficients; of outputs that no family says anything about, its own prior."""
         mean, root = self.own.mean.copy(), self.own.root.copy()
         moments = {}
@@ -84,7 +84,7 @@ def learn_families(
     follows: Mapping[tuple[int, Hashable], float],
     start: Moments | None = None,
     n_steps: int = STEPS,
-) -> dict[Hashable, Family]:
+) -> dict[Hashable, CoefficientFamily]:
     """Expectation maximisation on the bridges' information, each weighed by its probability of following a family.
 
     It starts from moments of their coefficients, by default those that each learns on its own.
@@ -101,7 +101,7 @@ def learn_families(
     return families
 
 
-def expect(members: Sequence[Member], families: Mapping[Hashable, Family]) -> Moments:
+def expect(members: Sequence[Member], families: Mapping[Hashable, CoefficientFamily]) -> Moments:
     """Posterior moments of the bridges' coefficients, given the families."""
     return [posterior(one.information.J, one.information.h, *one.prior(families))[1:] for one in members]
 
@@ -111,7 +111,7 @@ def maximise(
     names: Sequence[Hashable],
     follows: Mapping[tuple[int, Hashable], float],
     found: Moments,
-) -> dict[Hashable, Family]:
+) -> dict[Hashable, CoefficientFamily]:
     """The most likely families given posterior moments of the bridges' coefficients."""
     families = {}
     for name in names:
@@ -136,5 +136,5 @@ def maximise(
         n_draws = float(r.sum())
         round_variance = np.trace(scatter) / len(scatter) / n_draws
         Sigma = (scatter + ROUND_COUNT * round_variance * np.eye(len(scatter))) / (n_draws + ROUND_COUNT)
-        families[name] = Family(M, (Sigma + Sigma.T) / 2, precision, n_draws)
+        families[name] = CoefficientFamily(M, (Sigma + Sigma.T) / 2, precision, n_draws)
     return families

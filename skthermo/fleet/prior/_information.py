@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
-from skthermo._arrays import Array, rows_by_pattern
-from skthermo._gaussian import Gaussian
-from skthermo._times import correlation_time
+from skthermo._tables.arrays import Array, rows_by_pattern
+from skthermo._tables.times import correlation_time
 from skthermo.fleet.prior._basis import FleetBasis
 from skthermo.fleet.prior._posterior import OwnPrior, posterior
 from skthermo.fleet.prior._records import BridgeRecords
 from skthermo.preprocessing import HampelFilter
+from skthermo.residuals.gaussian import Gaussian
 
 ROUNDS = 4  # of noise and coefficients in turn
 USUAL = 0.99  # share of the records, if normal, that count in full; others the less the farther away they are
@@ -34,35 +33,31 @@ class FleetNoise:
     ``misfits`` are variances, by family, of what no function of the basis can follow, less their standard errors.
     """
 
-    variances: Mapping[Any, float] = field(default_factory=dict)
-    misfits: Mapping[Any, float] = field(default_factory=dict)
+    variances: Mapping[Hashable, float] = field(default_factory=dict)
+    misfits: Mapping[Hashable, float] = field(default_factory=dict)
     memory: float = 1.0
 
     @classmethod
-    def of(cls, found: Sequence[Information], families: Sequence[Sequence[Any]]) -> FleetNoise:
+    def of(cls, found: Sequence[Information], families: Sequence[Sequence[Hashable]]) -> FleetNoise:
         """Medians over bridges."""
-        by_family: dict[Any, list[float]] = {}
-        misfits: dict[Any, list[float]] = {}
+        variances: dict[Hashable, list[float]] = {}
+        misfits: dict[Hashable, list[float]] = {}
         for one, of_output in zip(found, families, strict=True):
-            variances = np.diag(one.noise.scatter)
-            for family, misfit in zip(of_output, one.misfit, strict=True):
+            for family, variance, misfit in zip(of_output, np.diag(one.noise.scatter), one.misfit, strict=True):
+                variances.setdefault(family, []).append(float(variance))
                 misfits.setdefault(family, []).append(float(misfit))
-            for family, variance in zip(of_output, variances, strict=True):
-                by_family.setdefault(family, []).append(float(variance))
-        medians = {family: float(np.median(values)) for family, values in by_family.items()}
-        slow = {
-            family: float(np.median(values) - np.std(values) / np.sqrt(len(values)))
-            for family, values in misfits.items()
-        }
-        memory = float(np.median([one.noise.memory for one in found]))
-        return cls(medians, slow, memory)
+        return cls(
+            {family: float(np.median(some)) for family, some in variances.items()},
+            {family: float(np.median(some) - np.std(some) / np.sqrt(len(some))) for family, some in misfits.items()},
+            float(np.median([one.noise.memory for one in found])),
+        )
 
-    def misfit(self, found: Information, families: Sequence[Any]) -> Array:
+    def misfit(self, found: Information, families: Sequence[Hashable]) -> Array:
         """Variances of what a bridge does that the basis cannot follow, from the fleet where it has the family."""
         expected = [self.misfits.get(family, own) for family, own in zip(families, found.misfit, strict=True)]
         return np.maximum(expected, 0.0)
 
-    def scatter(self, families: Sequence[Any]) -> Array | None:
+    def scatter(self, families: Sequence[Hashable]) -> Array | None:
         """Expected covariance of a bridge's ln y; None where the fleet does not tell."""
         if not self.variances:
             return None

@@ -1,8 +1,9 @@
-"""A regressor whose prior a fleet gives."""
+"""A regressor whose prior a fleet gives, and what a fleet knows."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,20 +11,55 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._arguments import check_flag
-from skthermo._arrays import Array, as_columns
-from skthermo._frames import check_same_rows, check_temperatures, column_names, frame_like, like_targets, row_weights
+from skthermo._estimators.arguments import check_flag
+from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.frames import (
+    check_same_rows,
+    check_temperatures,
+    column_names,
+    frame_like,
+    like_targets,
+    row_weights,
+)
 from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
-from skthermo._weather import TrainingRange, parts
-from skthermo.fleet.prior._basis import steady_changes
-from skthermo.fleet.prior._bridges import families_by_name
+from skthermo.fleet.prior._basis import FleetBasis, steady_changes
+from skthermo.fleet.prior._covariates import Covariates
+from skthermo.fleet.prior._families import CoefficientFamily, Member
 from skthermo.fleet.prior._information import FleetNoise, Information
-from skthermo.fleet.prior._knowledge import FleetKnowledge
-from skthermo.fleet.prior._posterior import Mixture
-from skthermo.fleet.prior._records import BridgeRecords, days_of, usable_rows
+from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
+from skthermo.fleet.prior._records import BridgeRecords, days_of, families_by_name, usable_rows
 from skthermo.metrics import complete_r2
+from skthermo.residuals.weather import TrainingRange, parts
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
+
+
+@dataclass(frozen=True)
+class FleetKnowledge:
+    """Functions of the weather, noise, and the prior of coefficients, on a bridge's own and by pooled families."""
+
+    basis: FleetBasis
+    noise: FleetNoise | None
+    own: OwnPrior
+    covariates: Covariates = field(default_factory=lambda: Covariates({}, {}))
+    families: Mapping[Hashable, CoefficientFamily] = field(default_factory=dict)
+    chances: Mapping[Hashable, float] = field(default_factory=dict)
+
+    @classmethod
+    def none(cls, inputs: Array, n_knots: int) -> FleetKnowledge:
+        """Without a fleet: functions of a bridge's own weather."""
+        basis = FleetBasis.of([inputs], n_knots)
+        return cls(basis, None, OwnPrior(np.ones(basis.n_functions)))
+
+    def posterior(
+        self, records: BridgeRecords, families: Sequence[Hashable], covariates: Mapping[Hashable, Any] | None
+    ) -> tuple[Information, Mixture]:
+        """What a bridge's records tell, and that together with the fleet."""
+        found = Information.of(self.basis, records, families, self.own, self.noise)
+        own = self.own.fitted(found.J, found.h, families)
+        member = Member(found, families, *self.covariates.row(covariates), own)
+        prior = member.prior(self.families, predictive=True)
+        return found, mixture(found.J, found.h, families, prior, own, self.chances)
 
 
 class FleetMapper(RegressorMixin, Estimator):
@@ -52,7 +88,7 @@ class FleetMapper(RegressorMixin, Estimator):
     basis_ : FleetBasis
         Functions of the weather.
     coefficients_ : ndarray of shape (n_outputs, 1 + n_functions)
-        Posterior mean of the level and of the coefficients of the fleet's basis, of ln y.
+        CoefficientPosterior mean of the level and of the coefficients of the fleet's basis, of ln y.
     covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
         Their posterior covariance.
     misfit_ : ndarray of shape (n_outputs,)
@@ -255,7 +291,7 @@ class FleetMapper(RegressorMixin, Estimator):
         """
         return complete_r2(as_columns(y), as_columns(self.predict(X)), row_weights(sample_weight, X))
 
-    def _read(self, X: Any, y: Any) -> tuple[Array, Array]:
+    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         if y is None:
             raise ValueError("This FleetMapper estimator requires y to be passed, but the target y is None")
         inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
@@ -268,7 +304,7 @@ class FleetMapper(RegressorMixin, Estimator):
         self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
         return inputs, as_columns(values)
 
-    def _check_inputs(self, X: Any) -> None:
+    def _check_inputs(self, X: ArrayLike) -> None:
         if self.prior is None:
             return
         check_is_fitted(self.prior)
@@ -280,7 +316,7 @@ class FleetMapper(RegressorMixin, Estimator):
             return
         raise ValueError(f"X has the inputs {list(names)[:20]}; expected those of the fleet, {list(basis.names)[:20]}")
 
-    def _names_of(self, y: Any, n_outputs: int) -> list[Any]:
+    def _names_of(self, y: ArrayLike, n_outputs: int) -> list[Hashable]:
         """Names of the outputs, or those of the fleet in their order."""
         if isinstance(y, pd.DataFrame):
             return list(y.columns)
@@ -293,11 +329,11 @@ class FleetMapper(RegressorMixin, Estimator):
             raise ValueError(f"y has {n_outputs} columns without names; expected names, or {names[:20]}")
         return list(names)
 
-    def _inputs(self, X: Any) -> Array:
+    def _inputs(self, X: ArrayLike) -> Array:
         check_is_fitted(self)
         return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
 
-    def _posterior_at(self, X: Any, with_covariance: bool) -> tuple[Array, Array]:
+    def _posterior_at(self, X: ArrayLike, with_covariance: bool) -> tuple[Array, Array]:
         """exp of the posterior mean, and its covariance; NaN where an input is missing."""
         inputs = self._inputs(X)
         n_outputs = len(self.coefficients_)
@@ -314,7 +350,7 @@ class FleetMapper(RegressorMixin, Estimator):
                 covariance[rows] = values[rows][:, :, np.newaxis] * values[rows][:, np.newaxis] * logs
         return values, covariance
 
-    def _as_targets(self, X: Any, values: Array) -> Any:
+    def _as_targets(self, X: ArrayLike, values: Array) -> Array | pd.DataFrame | pd.Series:
         return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
     def __sklearn_tags__(self):

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import logsumexp
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 STEPS = 25  # to the deviation of a bridge on its own
 SHAPE_STEPS = 4
@@ -35,7 +35,7 @@ class CoefficientPrior(NamedTuple):
     root: Array
 
 
-class Posterior(NamedTuple):
+class CoefficientPosterior(NamedTuple):
     """Log evidence, up to a constant of the records, mean and covariance of all coefficients."""
 
     evidence: float
@@ -43,7 +43,7 @@ class Posterior(NamedTuple):
     covariance: Array
 
 
-class Update:
+class CoefficientUpdate:
     """N(mean, C C') times exp(-b'J b / 2 + h'b); C is block diagonal with the roots.
 
     With K = I + C'J C = L L' and e = h - J m: b ~ N(m + C K^-1 C'e, C K^-1 C').
@@ -68,19 +68,19 @@ class Update:
         return np.einsum("aij,ai->aj", self.root, e.reshape(len(self.root), -1)).ravel()
 
     @property
-    def posterior(self) -> Posterior:
+    def posterior(self) -> CoefficientPosterior:
         """Log evidence, up to a constant of the records, mean and covariance."""
         n_outputs, n_functions = self.root.shape[:2]
         transposed = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
         transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = self.root.transpose(0, 2, 1)
         B = solve_triangular(self.L, transposed.reshape(self.L.shape), lower=True, check_finite=False)
         shift = np.einsum("aij,aj->ai", self.root, self.shift.reshape(n_outputs, -1)).ravel()
-        return Posterior(self.evidence, self.m + shift, B.T @ B)
+        return CoefficientPosterior(self.evidence, self.m + shift, B.T @ B)
 
 
-def posterior(J: Array, h: Array, mean: Array, root: Array) -> Posterior:
+def posterior(J: Array, h: Array, mean: Array, root: Array) -> CoefficientPosterior:
     """Log evidence, mean and covariance of a Gaussian prior times a bridge's information."""
-    return Update(J, h, mean, root).posterior
+    return CoefficientUpdate(J, h, mean, root).posterior
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def mixture(
     pooled = [family for family in probabilities if family in families]
     chances = np.array([probabilities[family] for family in pooled])
     place = {family: i for i, family in enumerate(pooled)}
-    known: dict[tuple[bool, ...], tuple[float, Update]] = {}
+    known: dict[tuple[bool, ...], tuple[float, CoefficientUpdate]] = {}
 
     def weight(flags: tuple[bool, ...]) -> float:
         """Log evidence of a combination, and its probability before any record."""
@@ -176,7 +176,7 @@ def mixture(
             is_followed = np.array([family in place and flags[place[family]] for family in families])
             mean = np.where(is_followed[:, np.newaxis], fleet.mean, own.mean)
             root = np.where(is_followed[:, np.newaxis, np.newaxis], fleet.root, own.root)
-            update = Update(J, h, mean, root)
+            update = CoefficientUpdate(J, h, mean, root)
             known[flags] = log_chance(flags, chances) + update.evidence, update
         return known[flags][0]
 

@@ -10,17 +10,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._formatting import counted
+from skthermo._tables.text import counted
 from skthermo._validation import Estimator, Interval, check_is_fitted
 from skthermo.fleet.prior._basis import FleetBasis, steady_changes
-from skthermo.fleet.prior._bridges import bridges_of, common_inputs, families_by_name, read_bridge
-from skthermo.fleet.prior._comparison import LEAST_BRIDGES, Comparison
+from skthermo.fleet.prior._comparison import LEAST_BRIDGES, PoolingComparison
 from skthermo.fleet.prior._covariates import Covariates
 from skthermo.fleet.prior._families import Member
 from skthermo.fleet.prior._information import FleetNoise, Information
-from skthermo.fleet.prior._knowledge import FleetKnowledge
-from skthermo.fleet.prior._mapper import FleetMapper
+from skthermo.fleet.prior._mapper import FleetKnowledge, FleetMapper
 from skthermo.fleet.prior._posterior import OwnPrior
+from skthermo.fleet.prior._records import bridges_of, common_inputs, families_by_name, read_bridge
 
 
 class FleetPrior(Estimator):
@@ -160,7 +159,7 @@ class FleetPrior(Estimator):
             for one, of_output, z, covariance in zip(found, families, Z, unknown, strict=True)
         ]
         names = sorted({family for of_output in families for family in of_output if family is not None}, key=str)
-        compared = Comparison.of(members, list(read), names, basis.covariance)
+        compared = PoolingComparison.of(members, list(read), names, basis.covariance)
         noise = FleetNoise.of(found, families)
         self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities)
         self.comparison_, self.bridges_ = compared.by_family, compared.by_bridge

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._weather import weather_coordinates
+from skthermo._tables.arrays import Array
+from skthermo.residuals.weather import weather_coordinates
 
 MOST_COORDINATES = 3  # of the weather
 LOW, HIGH = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
 
 
 @dataclass(frozen=True)
-class WeatherBasis:
+class WeatherFunctions:
     """What a chain may have mislearned depends on the weather as a sum of these functions.
 
     A constant, principal coordinates of the standardised temperatures and their squares, two hinges of the first one,
@@ -29,7 +29,7 @@ class WeatherBasis:
     ends: Array
 
     @classmethod
-    def of(cls, temperatures: Array) -> WeatherBasis:
+    def of(cls, temperatures: Array) -> WeatherFunctions:
         """The basis for records, (n_records, n_sensors), without gaps in those that count."""
         known = temperatures[~np.isnan(temperatures).any(axis=1)]
         scaler, components = (step for _, step in weather_coordinates(known).steps)
@@ -59,7 +59,7 @@ class DailyMeans:
     """Daily means of the logarithm of measured over predicted frequencies.
 
     ``values`` and ``counts``, (n_days, n_modes), are means and numbers of records; ``basis``, (n_days, n_modes, size),
-    is the mean of the `WeatherBasis` over the records of each mode. ``days`` begin every ``freq``.
+    is the mean of the `WeatherFunctions` over the records of each mode. ``days`` begin every ``freq``.
     """
 
     days: pd.DatetimeIndex
@@ -73,7 +73,7 @@ class DailyMeans:
         ratios: Array,
         temperatures: Array,
         times: pd.DatetimeIndex,
-        basis: WeatherBasis,
+        basis: WeatherFunctions,
         days: pd.DatetimeIndex,
         before: float = np.nan,
     ) -> DailyMeans:

@@ -11,20 +11,19 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array, as_floats, spread_evenly
-from skthermo._changes import Changes
-from skthermo._frames import check_same_rows, frame_like
-from skthermo._frequency_effects import FrequencyEffects, healthy_frequencies, read_groups
-from skthermo._saved_frames import SavesFrames
-from skthermo._times import has_stamps
+from skthermo._effects.changes import StructuralChanges
+from skthermo._effects.frequencies import FrequencyEffects, healthy_frequencies, read_groups
+from skthermo._estimators.warnings import warnings_once, without_warnings
+from skthermo._tables.arrays import Array, as_floats, spread_evenly
+from skthermo._tables.frames import check_same_rows, frame_like
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import YEAR, has_stamps
 from skthermo._validation import check_is_fitted
-from skthermo._warnings import warnings_once, without_warnings
-from skthermo.monitoring.drift._daily import DailyMeans, WeatherBasis, calendar
-from skthermo.monitoring.drift._kalman import DailySteps, Observation, State, absorb
+from skthermo.monitoring.drift._daily import DailyMeans, WeatherFunctions, calendar
+from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State, absorb
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.preprocessing import ExponentialMeans
 
-YEAR = pd.Timedelta(days=365.25)
 RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
@@ -36,32 +35,19 @@ MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has 
 
 @dataclass(frozen=True)
 class ParameterState(SavesFrames):
-    """What a `ParameterFilter` knows at the end of a day.
+    """What a `ParameterFilter` knows at the end of a day: mean and covariance of all states given the days so far.
 
-    Parameters
-    ----------
-    day : Timestamp
-        Beginning of the last day.
-    mean, covariance : ndarray
-        Of all states given the days so far.
-    weather : float
-        First coordinate of that day's mean weather; NaN if it is not known.
-    distance : float
-        Squared Mahalanobis distance of the day's frequencies from what was foretold; NaN without any.
-    n_modes : int
-        Number of modes in that distance.
+    ``weather`` is the first coordinate of that day's mean weather, NaN if it is not known.
     """
 
     day: pd.Timestamp
     mean: Array
     covariance: Array
     weather: float = float("nan")
-    distance: float = float("nan")
-    n_modes: int = 0
 
 
 @dataclass(frozen=True)
-class ResponseSurface:
+class QuadraticFrequencies:
     """Ln frequencies as quadratic functions of ln parameters, where these lie within what they were fitted to.
 
     ``coefficients`` are empty where the functions are not accurate enough, and all rows are solved by the model.
@@ -72,7 +58,7 @@ class ResponseSurface:
     coefficients: Array
 
     @classmethod
-    def of(cls, fem: Any, theta: Array) -> ResponseSurface:
+    def of(cls, fem: Any, theta: Array) -> QuadraticFrequencies:
         """Fit to some of the rows of theta, and try it on others."""
         known = theta[~np.isnan(theta).any(axis=1)]
         ends, none = np.array([known.min(axis=0), known.max(axis=0)]), np.empty((0, 0))
@@ -114,14 +100,14 @@ class DailyRecords:
     """How daily means are made of records, for a chain: its predictions, and the weather."""
 
     fem: Any
-    basis: WeatherBasis
-    surface: ResponseSurface
+    basis: WeatherFunctions
+    surface: QuadraticFrequencies
     freq: str
 
     @classmethod
     def of(cls, fem: Any, T: Any, freq: str) -> DailyRecords:
         """Learn the weather, and the frequencies in it."""
-        return cls(fem, WeatherBasis.of(weather(fem, T)), ResponseSurface.of(fem, parameters(fem, T)), freq)
+        return cls(fem, WeatherFunctions.of(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)), freq)
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
@@ -180,7 +166,9 @@ class GroupEffects:
         """Effects at the parameters that the chain gives for records, for small changes."""
         members = read_groups(fem.model, groups)
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        frequencies = FrequencyEffects.of(fem, parameters(fem, T), as_floats(F), Changes.of_damage(fem.model, of_model))
+        frequencies = FrequencyEffects.of(
+            fem, parameters(fem, T), as_floats(F), StructuralChanges.of_damage(fem.model, of_model)
+        )
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])
         unchanged = np.zeros(len(of_model))
         slopes, nominal = (-effects(unchanged)[1] @ incidence for effects in (frequencies, frequencies.nominal()))
@@ -207,22 +195,10 @@ def with_mirror_images(slopes: Array, nominal: Array) -> Array:
 
 @dataclass(frozen=True)
 class ParameterFilter:
-    """Follows the stiffness of groups day by day, apart from weather and noise.
+    """Follows the stiffness of groups day by day, apart from weather and noise, relative to the mean of a baseline.
 
-    It is made by `of` from records of a healthy baseline. The stiffness is relative to the baseline's mean.
-
-    Parameters
-    ----------
-    records : DailyRecords
-        How daily means are made of records.
-    members : mapping of str to list of str
-        The model's groups behind each group.
-    slopes : ndarray of shape (n_modes, n_groups)
-        Relative change of frequencies per relative change of stiffness.
-    noise : DailyNoise
-        How daily means scatter.
-    start_ : ParameterState
-        What is known at the end of the baseline.
+    ``members`` are the model's groups behind each group, ``slopes``, (n_modes, n_groups), relative changes of
+    frequencies per relative change of stiffness; ``start_`` is what is known at the end of the baseline.
     """
 
     records: DailyRecords
@@ -290,14 +266,7 @@ class ParameterFilter:
         return state
 
     def estimate(self, state: ParameterState) -> pd.DataFrame:
-        """Change of each group's stiffness since the baseline, and yearly, with standard errors.
-
-        Returns
-        -------
-        DataFrame
-            One row a group: ``change``, ``standard_error``, ``per_year`` and ``per_year_error``, as natural logarithms
-            of the relative stiffness.
-        """
+        """Change of each group's stiffness since the baseline, and yearly, with standard errors, as its logarithm."""
         n = len(self.members)
         errors = np.sqrt(np.diag(state.covariance)[: 2 * n])
         columns = {
@@ -317,18 +286,15 @@ class ParameterFilter:
         n = len(self.members)
         return self.slopes @ state.covariance[:n, :n] @ self.slopes.T
 
-    def _step(self, state: ParameterState, day: Observation | None, learns: bool) -> ParameterState:
-        """One day further; what is not learned from has no effect but on the distance."""
+    def _step(self, state: ParameterState, day: DayShown | None, learns: bool) -> ParameterState:
+        """One day further."""
         n = len(self.members)
         length = length_of(self.records.freq)
         walk, turn = (deviation**2 * length * np.eye(n) for deviation in (WALK, TURN))
         steps = DailySteps(length, walk, turn, self.noise.memory, self.noise.renewal)
         predicted = steps.predict(State(state.mean, state.covariance))
-        if day is None or not len(day.values):
-            return replace(state, mean=predicted.mean, covariance=predicted.covariance, distance=np.nan, n_modes=0)
-        known, update = absorb(predicted, day)
-        mean, covariance = known if learns else predicted
-        return replace(state, mean=mean, covariance=covariance, distance=update.distance, n_modes=len(day.values))
+        mean, covariance = absorb(predicted, day)[0] if learns and day is not None else predicted
+        return replace(state, mean=mean, covariance=covariance)
 
 
 def check_records(fem: Any, T: Any, F: Any) -> None:
@@ -360,7 +326,7 @@ def length_of(freq: str) -> float:
     return length
 
 
-def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array) -> Observation:
+def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array) -> DayShown:
     """The daily mean of a day as the states show in it: levels and slopes of groups, constants, disturbances."""
     present = np.flatnonzero(daily.known[number])
     n_modes, n_groups = slopes.shape
@@ -371,7 +337,7 @@ def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array
         first = 2 * n_groups + mode * size
         design[row, first : first + size] = daily.basis[number, mode]
         design[row, mode - n_modes] = 1.0
-    return Observation(daily.values[number, present], design, noise.of_day(daily.counts[number], present))
+    return DayShown(daily.values[number, present], design, noise.of_day(daily.counts[number], present))
 
 
 def with_time(daily: DailyMeans, n_shapes: int) -> Array:

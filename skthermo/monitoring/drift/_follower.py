@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from skthermo._arrays import Array
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array
 from skthermo._validation import check_is_fitted
-from skthermo._warnings import without_warnings
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._filter import WALK, ParameterFilter, ParameterState, length_of
@@ -41,20 +41,10 @@ class Waiting:
 class FollowerState:
     """What a `DriftFollower` knows at the end of a day.
 
-    Parameters
-    ----------
-    known : ParameterState
-        Drift by the days that have waited long enough.
-    waiting : Waiting
-        Daily means of the days since.
-    sudden : ndarray of bool
-        Which of these days are in a time that departs from what was foretold; drift is not learned from them.
-    weather : float
-        First coordinate of the last day's mean weather; NaN if it is not known.
-    times, temperatures : ndarray
-        Latest records, as many as lags of the chain look back, in nanoseconds and in degrees Celsius.
-    n_left_out : int
-        Number of days from which drift was not learned, in a row, until now.
+    ``known`` is the drift by the days that have waited long enough, ``waiting`` holds those since. Drift is not learned
+    from those that are ``sudden``: in a time that departs from what was foretold; ``n_left_out`` of such in a row.
+    ``weather`` is the first coordinate of the last day's mean weather, NaN if it is not known, ``times`` (nanoseconds)
+    and ``temperatures`` are the latest records, as many as lags of the chain look back.
     """
 
     known: ParameterState
@@ -83,16 +73,8 @@ class DriftFollower:
     What is taken out is the drift found, times a share that is 0 as long as it may be chance and goes to 1 as it
     becomes clear.
 
-    Parameters
-    ----------
-    filter : ParameterFilter
-        Learned from the baseline.
-    limit : float
-        Change of a group's stiffness that is worth attention however slowly it came.
-    memory : Memory
-        How far back lags of the chain look.
-    start_ : FollowerState
-        What is known at the end of the baseline.
+    ``limit`` is the change of a group's stiffness that is worth attention however slowly it came, ``start_`` what is
+    known at the end of the baseline.
     """
 
     filter: ParameterFilter
@@ -110,28 +92,7 @@ class DriftFollower:
         *,
         limit: float = LIMIT,
     ) -> DriftFollower:
-        """Learn from a baseline.
-
-        Parameters
-        ----------
-        fem : DataInformedFEM
-            A fitted chain.
-        T, F : DataFrame
-            Temperatures and frequencies of the baseline.
-        groups : sequence of str or mapping, optional
-            Damage groups whose stiffness may drift. By default all.
-        limit : float, default=0.05
-            Change of a group's stiffness that is worth attention however slowly it came.
-
-        Returns
-        -------
-        DriftFollower
-
-        Raises
-        ------
-        ValueError
-            If the chain is not fitted, or the baseline lacks columns that it was fitted on.
-        """
+        """Learn from the temperatures and frequencies of a baseline, for a fitted chain; by default for all groups."""
         check_is_fitted(fem)
         temperatures = list(getattr(fem, "feature_names_in_", ["named temperatures"]))
         missing = [one for one in temperatures if one not in T] + [one for one in fem.mode_names_ if one not in F]
@@ -153,19 +114,9 @@ class DriftFollower:
         return self.start_
 
     def advance(self, state: FollowerState, T: pd.DataFrame, F: pd.DataFrame) -> FollowerState:
-        """The state at the end of a day.
+        """The state at the end of one complete day, whose records are in order of time.
 
-        Parameters
-        ----------
-        state : FollowerState
-            At the end of an earlier day.
-        T, F : DataFrame
-            Temperatures and frequencies of one complete day, in order of time. The state stays as it is without any,
-            or if they are of a day that is known already, such as the last one of the baseline.
-
-        Returns
-        -------
-        FollowerState
+        It stays as it is without any, or if that day is known already, such as the last one of the baseline.
         """
         if not len(F):
             return state
@@ -181,21 +132,8 @@ class DriftFollower:
         times, temperatures = _latest(self.memory, beside)
         return replace(self._with_day(state, daily), times=times, temperatures=temperatures)
 
-    def corrected(self, state: FollowerState, T: pd.DataFrame, F: pd.DataFrame) -> pd.DataFrame:
-        """Measured frequencies without the drift that is taken out.
-
-        Parameters
-        ----------
-        state : FollowerState
-            At the end of the day before.
-        T, F : DataFrame
-            Temperatures and frequencies.
-
-        Returns
-        -------
-        DataFrame
-            As ``F``, in Hz.
-        """
+    def corrected(self, state: FollowerState, F: pd.DataFrame) -> pd.DataFrame:
+        """Measured frequencies without the drift that is taken out, by the state at the end of the day before."""
         shift = dict(zip(self.modes, self.share(state) * self.filter.frequency_drift(state.known), strict=True))
         return F * np.exp([-shift.get(mode, 0.0) for mode in F])
 
@@ -211,17 +149,9 @@ class DriftFollower:
     def report(self, state: FollowerState) -> pd.DataFrame:
         """Drift of each group since the baseline.
 
-        Parameters
-        ----------
-        state : FollowerState
-            At the end of a day.
-
-        Returns
-        -------
-        DataFrame
-            By group, of its stiffness: relative ``change`` and ``standard_error``, the same a year (``per_year``,
-            ``per_year_error``), whether the change is ``significant``, ``taken_out`` (the change that is taken out of
-            the frequencies), and whether a significant change is ``beyond_limit``.
+        Of its stiffness: relative ``change`` and ``standard_error``, the same a year (``per_year``,
+        ``per_year_error``), whether the change is ``significant``, ``taken_out`` (the change that is taken out of the
+        frequencies), and whether a significant change is ``beyond_limit``.
         """
         found = self.filter.estimate(state.known)
         scale = np.exp(found["change"])

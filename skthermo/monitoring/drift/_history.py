@@ -10,20 +10,19 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from skthermo._arrays import Array, as_floats, is_real
-from skthermo._formatting import SPACE, counted, listed, percent, probability_text, significant
-from skthermo._frames import frame_like
-from skthermo._times import has_stamps
+from skthermo._tables.arrays import Array, as_floats, is_real
+from skthermo._tables.frames import frame_like
+from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
+from skthermo._tables.times import YEAR, has_stamps
 
 CONFIDENCE = 0.95  # of the bands
-YEAR = pd.Timedelta(days=365.25)
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
 DRAWS = 4000
 FARTHEST = 100.0  # years ahead for which a date is told
 SHORT = 1.5  # years of records below which season and drift are hardly told apart
 
 
-class Course(NamedTuple):
+class GroupCourse(NamedTuple):
     """Ln stiffness of a group on each day, its standard deviation, and its random walk's in a year.
 
     ``end`` and ``end_covariance`` are of the level on the last day and the steady rate a year.
@@ -35,7 +34,7 @@ class Course(NamedTuple):
     end_covariance: Array
     walk: float
 
-    def with_error_of_effects(self, share: float) -> Course:
+    def with_error_of_effects(self, share: float) -> GroupCourse:
         """The same course, of which a share may be an error of the FE model's effects."""
         return self._replace(
             deviation=np.hypot(self.deviation, share * self.mean),
@@ -53,7 +52,7 @@ class ParameterHistory:
     ----------
     days : DatetimeIndex
         Beginning of each day.
-    courses : mapping of str to Course
+    courses : mapping of str to GroupCourse
         Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0
         on the first day.
     years : float
@@ -103,7 +102,7 @@ class ParameterHistory:
     """
 
     days: pd.DatetimeIndex
-    courses: Mapping[str, Course] = field(repr=False)
+    courses: Mapping[str, GroupCourse] = field(repr=False)
     years: float
     p_value: float
     significance: float
@@ -146,12 +145,9 @@ class ParameterHistory:
         no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
         another one of its set), "no sign", or "not seen"; ``noticed_from``.
         """
-        change = np.array([np.expm1(course.mean[-1]) for course in self.courses.values()])
-        errors = np.array([np.exp(course.mean[-1]) * course.deviation[-1] for course in self.courses.values()])
-        levels = np.array([course.mean[-1] for course in self.courses.values()])
-        deviations = np.array([course.deviation[-1] for course in self.courses.values()])
-        names = list(self.courses)
-        weights = self.explanations
+        levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.courses.values()]).T
+        change, errors = np.expm1(levels), np.exp(levels) * deviations
+        names, weights = list(self.courses), self.explanations
         shares = [
             weights.loc[[name in groups for groups in weights["groups"]], "probability"].sum()
             if name in self.groups
@@ -277,7 +273,7 @@ class ParameterHistory:
         is_set = any(" and ".join(others) == name for others in self.rivals.values())
         return "perhaps" if is_set else "no sign"
 
-    def _first_passages(self, course: Course, level: float, random: np.random.RandomState) -> Array:
+    def _first_passages(self, course: GroupCourse, level: float, random: np.random.RandomState) -> Array:
         """Years after the last day at which ln stiffness first reaches a level, in draws; infinite if it never does."""
         beyond = course.mean <= level if level < 0 else course.mean >= level
         if beyond[-1]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 
 class State(NamedTuple):
@@ -19,7 +19,7 @@ class State(NamedTuple):
     covariance: Array
 
 
-class Observation(NamedTuple):
+class DayShown(NamedTuple):
     """What a day showed: values, (n,), how they depend on the states, (n, n_states), and the noise's covariance."""
 
     values: Array
@@ -27,16 +27,12 @@ class Observation(NamedTuple):
     noise: Array
 
 
-class Update(NamedTuple):
-    """What a day changed: innovations, (n,), over their covariance, its inverse, and the gain, (n_states, n).
-
-    ``distance`` is the squared Mahalanobis distance of the innovations.
-    """
+class DayLearned(NamedTuple):
+    """What a day changed: innovations, (n,), over their covariance, its inverse, and the gain, (n_states, n)."""
 
     weighted: Array
     precision: Array
     gain: Array
-    distance: float
 
 
 @dataclass(frozen=True)
@@ -81,14 +77,14 @@ class DailySteps:
         vector[-fading:] = (self.memory * vector[-fading:].T).T
         return vector
 
-    def filtered(self, start: State, days: Sequence[Observation]) -> State:
+    def filtered(self, start: State, days: Sequence[DayShown]) -> State:
         """The state after all days; the first of them begins with the state that is given."""
         state = start
         for number, day in enumerate(days):
             state = absorb(self.predict(state) if number else state, day)[0]
         return state
 
-    def smoothed(self, start: State, days: Sequence[Observation]) -> tuple[Array, Array, State]:
+    def smoothed(self, start: State, days: Sequence[DayShown]) -> tuple[Array, Array, State]:
         """Levels of each day given all days, (n_days, n_levels), their covariances, and the state after all days.
 
         By the backward recursion of Bryson and Frazier, which needs no inverse of a state's covariance.
@@ -118,10 +114,10 @@ class DailySteps:
         return means, covariances, end
 
 
-def absorb(state: State, day: Observation) -> tuple[State, Update]:
+def absorb(state: State, day: DayShown) -> tuple[State, DayLearned]:
     """The state once a day is known, and what the day changed."""
     if not len(day.values):
-        return state, Update(np.empty(0), np.empty((0, 0)), np.empty((len(state.mean), 0)), 0.0)
+        return state, DayLearned(np.empty(0), np.empty((0, 0)), np.empty((len(state.mean), 0)))
     shown = state.covariance @ day.design.T
     spread = day.design @ shown + day.noise
     precision = cho_solve(cho_factor(spread, lower=True), np.eye(len(spread)))
@@ -129,4 +125,4 @@ def absorb(state: State, day: Observation) -> tuple[State, Update]:
     weighted, gain = precision @ innovation, shown @ precision
     covariance = state.covariance - gain @ shown.T
     found = State(state.mean + shown @ weighted, (covariance + covariance.T) / 2)
-    return found, Update(weighted, precision, gain, float(innovation @ weighted))
+    return found, DayLearned(weighted, precision, gain)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 LASTING = np.geomspace(1.5, 99, 16)
 """Factors by which the fading part raises the variance of a mean of many days that are tried."""

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from skthermo._arrays import Array, as_random_state, is_real
-from skthermo._warnings import warnings_once
+from skthermo._estimators.warnings import warnings_once
+from skthermo._tables.arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, Explanations, ModeTrends
 from skthermo.monitoring.drift._filter import (
@@ -24,7 +24,7 @@ from skthermo.monitoring.drift._filter import (
     shapes_of_time,
     with_time,
 )
-from skthermo.monitoring.drift._history import Course, ParameterHistory
+from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailySteps, State
 from skthermo.monitoring.drift._noise import DailyNoise
 
@@ -175,7 +175,7 @@ class Followed:
     found: Explanations
     length: float
 
-    def best(self) -> list[Course]:
+    def best(self) -> list[GroupCourse]:
         """The groups of the best set, by a Kalman smoother."""
         groups, walk = self.found.sets[0], float(self.found.walk[0])
         slopes, n = self.trends.slopes[:, list(groups)], len(groups)
@@ -188,7 +188,7 @@ class Followed:
         means, covariances, end = steps.smoothed(State(np.zeros(len(covariance)), covariance), days)
         deviations = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
         return [
-            Course(
+            GroupCourse(
                 means[:, place],
                 deviations[:, place],
                 end.mean[[place, n + place]],
@@ -198,7 +198,7 @@ class Followed:
             for place in range(n)
         ]
 
-    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> Course:
+    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> GroupCourse:
         """Groups that all change alike, if only some others change beside them; from the trends of the modes."""
         trends, n = self.trends, self.trends.n_shapes
         both = replace(
@@ -209,7 +209,7 @@ class Followed:
         shapes = shapes_of_time(len(self.daily.days), n)
         at_end = np.array([shapes[-1], np.append(1 / trends.years, np.zeros(n - 1))])
         deviations = np.sqrt(np.einsum("ti,ij,tj->t", shapes, covariance, shapes))
-        return Course(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
+        return GroupCourse(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
 
 
 def confused_sets(found: Explanations, rivals: Mapping[int, Sequence[int]]) -> list[tuple[int, ...]]:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 WEEK = pd.Timedelta("7D")
 

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator
 
-from skthermo._arrays import Array
-from skthermo._warnings import without_warnings
-from skthermo._weather import BEYOND, TrainingRange
+from skthermo._tables.arrays import Array
+from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring.retraining._blocks import block_mean, blocks_of
+from skthermo.residuals.weather import BEYOND, TrainingRange
 
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
 STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
@@ -23,27 +22,7 @@ FALSE, SMALLEST = "records above the threshold", "smallest change found"  # rows
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A fitted detector, the threshold of its monitor, and the damage indices of its baseline, each from others."""
-
-    detector: BaseEstimator
-    threshold: float
-    baseline: pd.DataFrame
-    index: pd.Series
-
-    def ratio(self, records: pd.DataFrame) -> Array:
-        """Damage index over threshold."""
-        with without_warnings():
-            scores = self.detector.score_samples(records[list(self.detector.feature_names_in_)])
-        return -np.asarray(scores) / self.threshold
-
-    def own_ratio(self, times: pd.DatetimeIndex) -> Array:
-        """The same of records of its baseline, each judged by the others."""
-        return (self.index / self.threshold).reindex(times).to_numpy()
-
-
-@dataclass(frozen=True)
-class Comparison:
+class DetectorComparison:
     """The old detector and the one that may follow it, on the records that the old one has not learned from.
 
     ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its
@@ -55,13 +34,13 @@ class Comparison:
     @classmethod
     def of(
         cls,
-        old: Judged,
-        new: Judged,
+        old: ActiveDetector,
+        new: ActiveDetector,
         overlap: pd.DataFrame,
         targets: list[Any],
         spread: pd.Series,
         events: dict[Any, pd.DataFrame],
-    ) -> Comparison:
+    ) -> DetectorComparison:
         """On the overlap: false alarms, scatter, the smallest changes found, weather, and records of past events.
 
         ``spread`` holds standard deviations of the frequencies, weather taken out, in Hz.
@@ -116,17 +95,17 @@ def _weeks(records: pd.DataFrame) -> pd.DataFrame:
     return records[np.isin(blocks, chosen)]
 
 
-def smallest_changes(judged: Judged, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
+def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
     """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 
     For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
     """
     records = _weeks(records)
     blocks = blocks_of(records.index)
-    found, start = np.full((len(targets), blocks.max() + 2), np.nan), judged.ratio(records)
+    found, start = np.full((len(targets), blocks.max() + 2), np.nan), active.ratio(records)
     for mode, target in enumerate(targets):
         steps = spread[target] / records[target].mean() * np.array(STEPS)
-        ratios = [judged.ratio(records.assign(**{target: records[target] * (1 - step)})) for step in steps[1:]]
+        ratios = [active.ratio(records.assign(**{target: records[target] * (1 - step)})) for step in steps[1:]]
         curve = np.array([start, *ratios])
         found[mode, -1] = _crossing(steps, curve)
         for block in range(blocks.max() + 1):
@@ -166,20 +145,22 @@ def _crossing(steps: Array, curve: Array) -> float:
     return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
 
 
-def _unknown(old: Judged, new: Judged, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
+def _unknown(old: ActiveDetector, new: ActiveDetector, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
     """Shares of records outside the weather of each baseline."""
     weather = [name for name in overlap.columns if name not in targets]
     if not weather:
         return [0.0, 0.0, 0.0, np.nan, False]
     shares = []
-    for judged in (old, new):
-        known = TrainingRange.of(judged.baseline[weather], np.ones(len(judged.baseline), dtype=bool))
+    for active in (old, new):
+        known = TrainingRange.of(active.trained[weather], np.ones(len(active.trained), dtype=bool))
         shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
     return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
 
 
-def _found(old: Judged, new: Judged, events: dict[Any, pd.DataFrame]) -> Iterator[tuple[str, list[Any]]]:
+def _found(
+    old: ActiveDetector, new: ActiveDetector, events: dict[Any, pd.DataFrame]
+) -> Iterator[tuple[str, list[Any]]]:
     """Peaks of past events over the threshold: what was found has to be found again."""
     for number, records in events.items():
-        peaks = [float(np.nanmax(judged.ratio(records), initial=0.0)) for judged in (old, new)]
+        peaks = [float(np.nanmax(active.ratio(records), initial=0.0)) for active in (old, new)]
         yield f"event {number}, peak over threshold", [*peaks, peaks[1] - peaks[0], np.nan, peaks[1] <= 1 < peaks[0]]

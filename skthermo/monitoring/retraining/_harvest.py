@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator
+
+from skthermo.monitoring._memory import Memory
 
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun unseen
 
@@ -68,9 +69,6 @@ def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, An
         yield event.start - margin, event.end, f"event {number} ({event.kind}), {state}{still}"
 
 
-def margin_of(detector: BaseEstimator, records: pd.DataFrame) -> pd.Timedelta:
-    """How long before an event's first alarm records do not train: a week, or the detector's longest window."""
-    step = pd.Series(records.index).diff().median()
-    windows = [value for name, value in detector.get_params().items() if name.split("__")[-1] == "window"]
-    lengths = [pd.Timedelta(one) if isinstance(one, str) else one * step for one in windows]
-    return max([MARGIN, *lengths])
+def margin_of(memory: Memory, records: pd.DataFrame) -> pd.Timedelta:
+    """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
+    return max(MARGIN, memory.duration(pd.Series(records.index).diff().median()))

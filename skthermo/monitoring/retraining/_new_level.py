@@ -8,12 +8,10 @@ import numpy as np
 import pandas as pd
 from sklearn.utils import check_random_state
 
-from skthermo._arrays import Array
-from skthermo._times import correlation_time
+from skthermo._tables.arrays import Array
+from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
 from skthermo.monitoring.retraining._shift import WeatherFree
-
-YEAR_DAYS = 365.25
 
 
 @dataclass(frozen=True)
@@ -82,4 +80,4 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
     middle = pd.Series(old).groupby(blocks).agg(lambda some: some.iloc[len(some) // 2])
     covered = np.unique(new.dayofyear)
     distance = np.abs(middle.dt.dayofyear.to_numpy()[:, np.newaxis] - covered)
-    return np.minimum(distance, YEAR_DAYS - distance).min(axis=1) > WEEK.days / 2
+    return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2

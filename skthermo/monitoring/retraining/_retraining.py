@@ -10,21 +10,20 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._formatting import counted
-from skthermo._validation import last_step
-from skthermo._warnings import without_warnings
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.text import counted
+from skthermo._tables.times import YEAR
+from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring.retraining._blocks import blocks_of
-from skthermo.monitoring.retraining._comparison import Comparison, Judged, smallest_changes
+from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
 from skthermo.monitoring.retraining._harvest import Harvest, margin_of
 from skthermo.monitoring.retraining._new_level import NewLevel
-from skthermo.monitoring.retraining._shift import Changes, WeatherFree
+from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree
 
 FEWEST_WEEKS = 3  # of new records, from which standard errors of a comparison can be told
 
-YEAR = pd.Timedelta("365.25D")
-
-Limit = Callable[[BaseEstimator, pd.DataFrame], float]
-"""The threshold that a monitor promises for a detector that was fitted on some records."""
+Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
+"""A detector that was fitted on some records, with the threshold that its monitor promises."""
 
 
 @dataclass(frozen=True)
@@ -123,26 +122,26 @@ class Retraining:
 
 
 def retrained(
-    monitor: Any, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False, limit: Limit
+    monitor: Any, records: pd.DataFrame | None, activated: Activated, *, until: Any = None, force: bool = False
 ) -> Retraining:
     """A detector that has learned from the baseline and what came since, compared with the one in charge."""
     harvest = _harvest(monitor, records, until)
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
-    old, targets = _in_charge(monitor), list(monitor.targets_)
+    old, targets = monitor.active_, list(monitor.targets_)
     prior, since = monitor.prior_, monitor.since_
-    baseline = pd.concat([old.baseline, harvest.records])
+    baseline = pd.concat([old.trained, harvest.records])
     if prior is not None:
         own = baseline[baseline.index >= since]
         level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
         moved = level.prior(prior, own, monitor.random_state)
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
-    new = _candidate(monitor, baseline, limit)
+    new = _candidate(monitor, baseline, activated)
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * baseline[targets].mean()
-    found = Comparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
+    found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
     reasons, notes = [f"clearly worse: {name}" for name in found.worse()], []
     clearest = changes.clearest
     if clearest.matters:
@@ -172,21 +171,21 @@ def retrained(
     return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
 
 
-def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) -> Retraining:
+def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = _stamp(since, monitor.trained_.index)
-    old, targets, prior = _in_charge(monitor), list(monitor.targets_), monitor.prior_
+    old, targets, prior = monitor.active_, list(monitor.targets_), monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
-        prior = old.baseline
+        prior = old.trained
     if prior is None:
         raise ValueError(f"the baseline since {monitor.since_} needs no older records any more; expected refit")
     prior = prior[prior.index < since]
     if not len(prior):
-        raise ValueError(f"since is {since}, but the baseline begins at {old.baseline.index[0]}; expected a later time")
+        raise ValueError(f"since is {since}, but the baseline begins at {old.trained.index[0]}; expected a later time")
     events = monitor.events_
     damage = events[events["acknowledged"] & ~events["harmless"] & (events["start"] >= since)]
-    trained, kept = old.baseline[old.baseline.index >= first], monitor.corrected_
+    trained, kept = old.trained[old.trained.index >= first], monitor.corrected_
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
     own = harvest.records
@@ -196,9 +195,9 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
     level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
     moved = level.prior(prior, own, monitor.random_state)
     baseline = pd.concat([moved, own])
-    new = _candidate(monitor, baseline, limit)
+    new = _candidate(monitor, baseline, activated)
     spread = level.old.residuals.std() * prior[targets].mean()
-    found = [smallest_changes(one, one.baseline, targets, spread)[:, -1] for one in (old, new)]
+    found = [smallest_changes(one, one.trained, targets, spread)[:, -1] for one in (old, new)]
     table = level.table.assign(old=found[0], new=found[1])
     notes = [
         f"{counted(level.span.days, 'day')} and {counted(len(own), 'record')} since {since:%Y-%m-%d %H:%M}; "
@@ -213,7 +212,7 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None, limit: Limit) ->
 def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
     """Records since the baseline that may train."""
     kept = _until(_kept(monitor, records), until)
-    margin = margin_of(monitor.detector_, monitor.trained_)
+    margin = margin_of(monitor.memory_, monitor.trained_)
     return Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
 
 
@@ -251,33 +250,25 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
     return Retraining(kind, False, (reason,), (), pd.DataFrame(), excluded)
 
 
-def _in_charge(monitor: Any) -> Judged:
-    index = pd.Series(last_step(monitor.detector_).baseline_index_, monitor.trained_.index)
-    return Judged(monitor.detector_, monitor.threshold_, monitor.trained_, index)
-
-
-def _candidate(monitor: Any, baseline: pd.DataFrame, limit: Limit) -> Judged:
+def _candidate(monitor: Any, baseline: pd.DataFrame, activated: Activated) -> ActiveDetector:
     """A clone of the detector, fitted, with its monitor's threshold."""
     with without_warnings():
-        detector = clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)])
-        threshold = limit(detector, baseline)
-    index = pd.Series(last_step(detector).baseline_index_, baseline.index)
-    return Judged(detector, threshold, baseline, index)
+        return activated(clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)]), baseline)
 
 
-def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> Changes:
+def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> ShiftsTried:
     """What weather does not explain of the records, events left out that were acknowledged as harmless."""
     events, known = monitor.events_, np.zeros(len(baseline), dtype=bool)
     for event in events[events["harmless"]].itertuples():
         known |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
     rest = replace(free, residuals=free.residuals[~known])
-    return Changes.of(rest, baseline[~known].drop(columns=list(monitor.targets_)), since)
+    return ShiftsTried.of(rest, baseline[~known].drop(columns=list(monitor.targets_)), since)
 
 
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
     """Kept records of each event that was not acknowledged as harmless."""
     records, events, found = monitor.corrected_, monitor.events_, {}
-    margin = margin_of(monitor.detector_, monitor.trained_)  # which windows reach back into
+    margin = margin_of(monitor.memory_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
         inside = records[(records.index >= event.start - margin) & (pd.isna(event.end) | (records.index <= event.end))]
         if not event.harmless and len(inside):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_law
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._arrays import Array
-from skthermo._formatting import probability_text
-from skthermo._gaussian import Gaussian
-from skthermo._times import correlation_time
-from skthermo._warnings import without_warnings
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import probability_text
+from skthermo._tables.times import correlation_time
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
+from skthermo.residuals.gaussian import Gaussian
 from skthermo.surrogate import TemperatureMapper
 
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
@@ -70,7 +70,7 @@ def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
 
 
 @dataclass(frozen=True)
-class Shift:
+class LevelShift:
     """A change of frequencies along a course in time, from 0 to 1, that weather does not explain.
 
     ``change`` and ``standard_error`` are relative, by mode; ``size`` is the length of the change in standard deviations
@@ -100,7 +100,7 @@ class Shift:
         return bool((self.standard_error / self.scatter).median() > HIDDEN)
 
     @classmethod
-    def along(cls, courses: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[Shift]:
+    def along(cls, courses: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[LevelShift]:
         """The change along each course, beside what the weather explains of it and of the frequencies.
 
         Residuals are regressed on what weather does not tell of the course, so that a season that only one period has
@@ -110,7 +110,7 @@ class Shift:
         return [cls._of(what, one, free) for what, one in zip(courses, left.T, strict=True)]
 
     @classmethod
-    def _of(cls, what: str, left: Array, free: WeatherFree) -> Shift:
+    def _of(cls, what: str, left: Array, free: WeatherFree) -> LevelShift:
         values = free.residuals.to_numpy()
         known = ~np.isnan(values) & ~np.isnan(left)[:, np.newaxis]
         counts = np.maximum(known.sum(axis=0), 1)
@@ -140,13 +140,13 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Changes:
+class ShiftsTried:
     """What weather does not explain: between the baseline and new records, from some day on, or steadily."""
 
-    tried: tuple[Shift, ...]
+    tried: tuple[LevelShift, ...]
 
     @classmethod
-    def of(cls, free: WeatherFree, weather: pd.DataFrame, since: pd.Timestamp) -> Changes:
+    def of(cls, free: WeatherFree, weather: pd.DataFrame, since: pd.Timestamp) -> ShiftsTried:
         """Steps at some days of the new period, which begins at ``since``, and steady changes in it and over all."""
         times = weather.index
         new = times[times >= since]
@@ -155,20 +155,20 @@ class Changes:
         for what, first in (("steadily over the new records", since), ("steadily over all records", times[0])):
             course = np.asarray((times - first) / (times[-1] - first), dtype=float)
             courses[what] = np.maximum(course, 0.0)
-        return cls(tuple(Shift.along(courses, free, weather)))
+        return cls(tuple(LevelShift.along(courses, free, weather)))
 
     @property
-    def step(self) -> Shift:
+    def step(self) -> LevelShift:
         """The change from the baseline to all new records."""
         return self.tried[0]
 
     @property
-    def trend(self) -> Shift:
+    def trend(self) -> LevelShift:
         """The steady change over all records."""
         return self.tried[-1]
 
     @property
-    def clearest(self) -> Shift:
+    def clearest(self) -> LevelShift:
         """The least likely of all, by its probability among so many."""
         best = min(self.tried, key=lambda one: np.nan_to_num(one.p_value, nan=1.0))
         return replace(best, p_value=min(best.p_value * len(self.tried), 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 Days = NDArray[np.int64]
 LONGEST = 120  # days that are kept: a drift of 1 degree a month has come to 4 by then
@@ -63,7 +63,7 @@ class Departures(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DailyNoise:
+class ThermometerNoise:
     """Noise of a standardised daily series: its scale, its correlation from day to day and how far its level wanders.
 
     ``limit`` is the statistic of a change that noise reaches as rarely as promised.
@@ -75,7 +75,7 @@ class DailyNoise:
     limit: float
 
     @classmethod
-    def of(cls, departures: Departures, per_year: float) -> DailyNoise:
+    def of(cls, departures: Departures, per_year: float) -> ThermometerNoise:
         """Learn from a healthy series."""
         limit = float(norm.isf(per_year / 365.25 / TESTS_A_DAY / 2))
         days, y = departures.known()[:2]

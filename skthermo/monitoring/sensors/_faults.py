@@ -9,19 +9,19 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
+from skthermo._tables.times import DAY_NS
 
 LASTS = np.iinfo(np.int64).min  # end of a fault that lasts
-SOON = 7 * 86400 * 10**9  # nanoseconds after its end in which a fault that comes again is the same
+SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
 COLUMNS = ["column", "kind", "since", "told", "until", "detail"]
 LEFT_OUT = ("dead", "stuck", "absurd", "offset", "drift")
 DEPARTURES = ("offset", "drift", "disagree")
 MONTH = 30.4  # days
-DAY = 86400 * 10**9  # nanoseconds
 
 
 @dataclass(frozen=True)
-class Faults:
+class SensorFaults:
     """Column of each fault by its position, the other one where two are concerned (else -1), times in nanoseconds.
 
     ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
@@ -37,7 +37,7 @@ class Faults:
     rate: Array
 
     @classmethod
-    def none(cls) -> Faults:
+    def none(cls) -> SensorFaults:
         """No fault."""
         whole, real = np.empty(0, dtype=np.int64), np.empty(0)
         return cls(whole, whole, np.empty(0, dtype="<U8"), whole, whole, whole, real, real)
@@ -55,7 +55,7 @@ class Faults:
 
     def opened(
         self, kind: str, column: int, since: int, told: int, *, other: int = -1, size: float = 0.0, rate: float = 0.0
-    ) -> Faults:
+    ) -> SensorFaults:
         """With one more fault, or with that one again which has just ended."""
         same = (self.column == column) & (self.other == other) & (self.kind == kind)
         again = np.flatnonzero(same & (self.until > since - SOON))
@@ -63,9 +63,9 @@ class Faults:
             return self.with_values(int(again[-1]), until=LASTS)
         values = (column, other, kind, since, told, LASTS, size, rate)
         whole = (np.append(getattr(self, part.name), value) for part, value in zip(fields(self), values, strict=True))
-        return Faults(*whole)
+        return SensorFaults(*whole)
 
-    def with_values(self, fault: int, **values: str | float) -> Faults:
+    def with_values(self, fault: int, **values: str | float) -> SensorFaults:
         """With other values of one fault."""
         changed = {name: getattr(self, name).copy() for name in values}
         for name, value in values.items():
@@ -78,18 +78,13 @@ class Faults:
         for fault in range(len(self.column)):
             ours, other = int(self.column[fault]), int(self.other[fault])
             for column, partner in [(ours, other), (other, ours)][: 1 if other < 0 else 2]:
-                rows.append(
-                    [names[column], str(self.kind[fault]), *self._times(fault), self._detail(fault, names, partner)]
-                )
+                times = (int(part[fault]) for part in (self.since, self.told, self.until))
+                rows.append([names[column], str(self.kind[fault]), *times, self._detail(fault, names, partner)])
         table = pd.DataFrame(rows, columns=COLUMNS)
         for name in ("since", "told", "until"):
             stamps = pd.DatetimeIndex(np.array(table[name].tolist(), dtype="datetime64[ns]"))
             table[name] = stamps if not zone else stamps.tz_localize("UTC").tz_convert(zone)
         return table
-
-    def _times(self, fault: int) -> list[int]:
-        """Beginning, day of telling and end."""
-        return [int(self.since[fault]), int(self.told[fault]), int(self.until[fault])]
 
     def _detail(self, fault: int, names: Sequence[Hashable], partner: int) -> str:
         """What was seen, and what is done about it."""

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._gaussian import Gaussian
+from skthermo._tables.arrays import Array, median, robust_deviation
 from skthermo.monitoring.sensors._thermometers import local_days
+from skthermo.residuals.gaussian import Gaussian
 
 ABSURD = 0.25  # change of a frequency, as a logarithm, that no damage gives to one mode alone
 UNMOVED = 0.05  # median of the changes of all modes up to which one moves alone
@@ -20,13 +20,7 @@ NEARER = 0.5  # distance of both from their places when exchanged, over that as 
 CERTAIN = 20.0  # logarithm of the odds that two modes are exchanged
 LARGEST = 50.0  # logarithm of the odds that one record may add
 LEAST_DEVIATION = 1e-4  # of the logarithm of a frequency
-NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 JITTER = 1e-6  # share of its variance that each column has of its own, also where two show the same
-
-
-def median(values: Array) -> Array:
-    """Median of each column, NaN passed over."""
-    return pd.DataFrame(values).median().to_numpy()
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,7 @@ class Modes:
         bare = cls(together, median(logs), lowest, highest, np.empty(0))
         rest = pd.DataFrame(bare.logarithms(temperatures, frequencies)[0])
         by_day = rest.groupby(local_days(stamps)).median().to_numpy()
-        deviations = NORMAL * median(np.abs(by_day - median(by_day)))
+        deviations = robust_deviation(by_day)
         deviations = np.maximum(np.nan_to_num(deviations, nan=np.inf), LEAST_DEVIATION)
         return cls(together, bare.centre, lowest, highest, deviations)
 

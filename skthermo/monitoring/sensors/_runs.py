@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
+from skthermo.preprocessing.checks import equal_runs
 
 Counts = NDArray[np.int64]
 MISSING, REPEATED, ABSURD = range(3)
@@ -72,8 +73,7 @@ class RunLimits:
             if not known.size:
                 continue
             last[column] = series[known[-1]]
-            equal = np.flatnonzero(np.append(np.diff(series[known]) != 0, True))
-            lengths = [np.diff(known) - 1, np.diff(np.append(-1, equal))]
+            lengths = [np.diff(known) - 1, equal_runs(series[known])[1]]
             least = [max(FEWEST[MISSING], round(per_day)), FEWEST[REPEATED]]
             for kind, runs in enumerate(lengths):
                 runs = np.sort(runs[runs > kind])[::-1]

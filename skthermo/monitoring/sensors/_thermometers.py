@@ -8,12 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._gaussian import Gaussian
-from skthermo.monitoring.sensors._changes import DailyNoise, Days, Departures
+from skthermo._tables.arrays import Array
+from skthermo._tables.times import DAY, DAY_NS, YEAR
+from skthermo.monitoring.sensors._changes import Days, Departures, ThermometerNoise
+from skthermo.residuals.gaussian import Gaussian
 
-DAY = 86400 * 10**9  # nanoseconds
-YEAR = 365.25  # days
 WHOLE_YEAR = 330  # days from which a baseline tells the season of each thermometer
 SEASONS = 2  # harmonics of the year, and of the day
 OFTEN = 4  # records a day from which the time of the day counts
@@ -26,11 +25,11 @@ JITTER = 1e-6  # share of its variance that each thermometer has of its own, als
 
 def local_days(stamps: pd.DatetimeIndex) -> Days:
     """Calendar day of each stamp in its own time zone, in days since 1970."""
-    return stamps.tz_localize(None).as_unit("ns").asi8 // DAY
+    return stamps.tz_localize(None).as_unit("ns").asi8 // DAY_NS
 
 
 @dataclass(frozen=True)
-class Climate:
+class UsualWeather:
     """Usual temperature of each thermometer by season and time of day."""
 
     coefficients: Array
@@ -38,7 +37,7 @@ class Climate:
     has_hours: bool
 
     @classmethod
-    def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, has_season: bool, has_hours: bool) -> Climate:
+    def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, has_season: bool, has_hours: bool) -> UsualWeather:
         """Learn from records; NaN is passed over."""
         empty = cls(np.empty((0, 0)), has_season, has_hours)
         inputs = empty.inputs(stamps)
@@ -50,8 +49,8 @@ class Climate:
 
     def inputs(self, stamps: pd.DatetimeIndex) -> Array:
         """A constant and harmonics of the year and the day."""
-        at = stamps.tz_localize(None).as_unit("ns").asi8 / DAY
-        periods = [YEAR] * self.has_season + [1.0] * self.has_hours
+        at = stamps.tz_localize(None).as_unit("ns").asi8 / DAY_NS
+        periods = [YEAR / DAY] * self.has_season + [1.0] * self.has_hours
         waves = [2 * np.pi * k * at / period for period in periods for k in range(1, SEASONS + 1)]
         return np.column_stack([np.ones(len(at)), *(part for wave in waves for part in (np.sin(wave), np.cos(wave)))])
 
@@ -64,13 +63,13 @@ class Climate:
 class Thermometers:
     """Daily anomalies of thermometers, and how they go together in the baseline."""
 
-    climate: Climate
+    climate: UsualWeather
     gaussian: Gaussian
     least: float
     n_days: int
     lowest: Array
     highest: Array
-    noises: tuple[DailyNoise, ...]
+    noises: tuple[ThermometerNoise, ...]
 
     @classmethod
     def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, per_year: float) -> Thermometers | None:
@@ -92,7 +91,9 @@ class Thermometers:
             part = cls._learned(stamps[~test], temperatures[~test], options, least)
             means = part.daily_means(stamps[test], temperatures[test])
             found[:, fold_of == fold] = part.departures(means, np.ones(n_sensors, dtype=bool))
-        noises = tuple(DailyNoise.of(Departures(days, *found[:, :, j]), per_year / n_sensors) for j in range(n_sensors))
+        noises = tuple(
+            ThermometerNoise.of(Departures(days, *found[:, :, j]), per_year / n_sensors) for j in range(n_sensors)
+        )
         whole = cls._learned(stamps, temperatures, options, least)
         return replace(whole, noises=noises)
 
@@ -100,8 +101,8 @@ class Thermometers:
     def _learned(
         cls, stamps: pd.DatetimeIndex, temperatures: Array, options: tuple[bool, bool], least: float
     ) -> Thermometers:
-        """Climate and covariance from some records."""
-        climate = Climate.of(stamps, temperatures, *options)
+        """Usual weather and covariance from some records."""
+        climate = UsualWeather.of(stamps, temperatures, *options)
         bare = cls(climate, Gaussian(np.empty(0), np.empty((0, 0))), least, 0, np.empty(0), np.empty(0), ())
         means = bare.daily_means(stamps, temperatures)
         found = Gaussian.of(means[~np.isnan(means).all(axis=1)])

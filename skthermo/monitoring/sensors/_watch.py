@@ -10,16 +10,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import columns_by_sensor, frame_like
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import columns_by_sensor, frame_like
+from skthermo._tables.times import DAY_NS
 from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
-from skthermo.monitoring.sensors._faults import DAY, DEPARTURES, Faults
+from skthermo.monitoring.sensors._faults import DEPARTURES, SensorFaults
 from skthermo.monitoring.sensors._modes import CERTAIN, Modes
 from skthermo.monitoring.sensors._runs import ABSURD, MISSING, REPEATED, RunLimits, Runs
 from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
+from skthermo.preprocessing.checks import Plausible
 
 A_DEGREE = 1.0  # below which thermometers may depart without a fault
-IMPOSSIBLE = 30.0  # degrees, or the baseline's range, outside that range, which no weather gives
 LEAST_OTHERS = 2  # thermometers that tell which one is at fault
 CLEAR = 4.6  # logarithm of the odds that one thermometer is at fault, against each other one
 ENDED = 7.0  # logarithm of the odds that an offset or a drift has ended
@@ -37,7 +38,7 @@ class WatchState:
     departures: Array
     exchanged: Array
     exchanged_since: NDArray[np.int64]
-    faults: Faults
+    faults: SensorFaults
 
 
 @dataclass(frozen=True)
@@ -55,29 +56,16 @@ class SensorWatch:
     columns: list[list[int]]
     modes: list[Hashable]
     zone: str
-    lowest: Array
-    highest: Array
+    weather: Plausible
     run_limits: RunLimits
     thermometers: Thermometers | None
     expected: Modes
 
     @classmethod
     def of(cls, T: pd.DataFrame, F: pd.DataFrame, *, per_year: float = 0.1) -> SensorWatch:
-        """Learn from the baseline.
+        """Learn from the baseline; lags of a sensor may have columns of their own.
 
-        Parameters
-        ----------
-        T : DataFrame of shape (n_samples, n_temperatures)
-            Temperatures in degrees Celsius on a ``DatetimeIndex``; lags of a sensor may have columns of their own.
-        F : DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz, on the same index.
-        per_year : float, default=0.1
-            Offsets and drifts of healthy thermometers that may be told in a year, over all of them.
-
-        Returns
-        -------
-        SensorWatch
-            For the days after the baseline.
+        ``per_year`` offsets and drifts of healthy thermometers may be told in a year, over all of them.
         """
         by_sensor = columns_by_sensor(T)
         order = np.argsort(T.index.asi8, kind="stable")
@@ -85,16 +73,13 @@ class SensorWatch:
         columns = list(by_sensor.values())
         temperatures = as_floats(T)[order][:, [own[0] for own in columns]]
         frequencies = as_floats(F)[order]
-        lowest, highest = np.fmin.reduce(temperatures), np.fmax.reduce(temperatures)
-        beyond = np.maximum(highest - lowest, IMPOSSIBLE)
         per_day = len(stamps) / max(len(np.unique(local_days(stamps))), 1)
         return cls(
             list(by_sensor),
             columns,
             list(F.columns),
             "" if stamps.tz is None else str(stamps.tz),
-            lowest - beyond,
-            highest + beyond,
+            Plausible.of_weather(temperatures),
             RunLimits.of(np.hstack([temperatures, frequencies]), per_day),
             Thermometers.of(stamps, temperatures, per_year),
             Modes.of(temperatures, frequencies, stamps),
@@ -110,7 +95,7 @@ class SensorWatch:
             np.empty((4, 0, n_sensors)),
             np.zeros(n_pairs),
             np.zeros(n_pairs, dtype=np.int64),
-            Faults.none(),
+            SensorFaults.none(),
         )
 
     def faults(self, state: WatchState) -> pd.DataFrame:
@@ -162,7 +147,7 @@ class SensorWatch:
 
     def _midnight(self, day: int) -> np.int64:
         """Beginning of a day, in nanoseconds."""
-        stamp = pd.Timestamp(day * DAY)
+        stamp = pd.Timestamp(day * DAY_NS)
         return np.int64(
             (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
         )
@@ -171,11 +156,11 @@ class SensorWatch:
         self, temperatures: Array, frequencies: Array
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array]:
         """Impossible temperatures, absurd frequencies, and logarithms of frequencies beside expected ones and these."""
-        impossible = (temperatures < self.lowest) | (temperatures > self.highest)
+        impossible = self.weather.implausible(temperatures)
         rest, expected = self.expected.logarithms(np.where(impossible, np.nan, temperatures), frequencies)
         return impossible, self.expected.absurd(rest), rest, expected
 
-    def _in_place(self, faults: Faults, frequencies: Array) -> Array:
+    def _in_place(self, faults: SensorFaults, frequencies: Array) -> Array:
         """Frequencies with exchanged modes back in their columns."""
         frequencies = frequencies.copy()
         for fault in faults.lasting("swapped"):
@@ -237,11 +222,11 @@ class SensorWatch:
         """With what each thermometer shows beside those that can be trusted."""
         return replace(state, departures=self.thermometers.departures(state.means, self._trusted(state.faults)))
 
-    def _trusted(self, faults: Faults) -> NDArray[np.bool_]:
+    def _trusted(self, faults: SensorFaults) -> NDArray[np.bool_]:
         """Thermometers that are not left out."""
         return ~self._left_out(faults)[: len(self.sensors)]
 
-    def _left_out(self, faults: Faults) -> NDArray[np.bool_]:
+    def _left_out(self, faults: SensorFaults) -> NDArray[np.bool_]:
         """Thermometers and modes that are left out."""
         return faults.left_out(len(self.sensors) + len(self.modes)) >= 0
 
@@ -261,7 +246,7 @@ class SensorWatch:
         for fault in state.faults.lasting(*DEPARTURES):
             faults = state.faults
             sensor, told = int(faults.column[fault]), int(faults.told[fault])
-            after = state.days * DAY > told
+            after = state.days * DAY_NS > told
             departures = Departures(state.days, *state.departures[:, :, sensor])
             before = departures.rows(after & (state.days <= state.days[-1] - RECENT)).known()
             level = faults.size[fault] if len(before.days) < RECENT else np.median(before.values * before.deviations)
@@ -271,14 +256,14 @@ class SensorWatch:
                 until = int(self._midnight(end))
                 state = replace(state, faults=faults.with_values(fault, until=until))
                 state = self._departing(self._forgotten(state, sensor, end))
-            elif midnight - told < LONGEST * DAY / 2 and faults.kind[fault] != "disagree":
+            elif midnight - told < LONGEST * DAY_NS / 2 and faults.kind[fault] != "disagree":
                 found = self._change(state, sensor)
                 if found is not None and self._is_fault(sensor, found):
                     state = replace(state, faults=faults.with_values(fault, **self._described(found)))
         return state
 
     def _described(self, change: Change) -> dict[str, Any]:
-        """A change in the words of `Faults`."""
+        """A change in the words of `SensorFaults`."""
         kind = "drift" if change.rate else "offset"
         return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
 
@@ -301,7 +286,10 @@ class SensorWatch:
         n_departing = 1 + len(also) + len(state.faults.lasting("offset", "drift"))
         is_clear = len(changes) > LEAST_OTHERS and 2 * n_departing < len(self.sensors)
         if is_clear and not rivals:
-            return self._agreed(without, midnight)
+            faults = without.faults
+            for fault in faults.lasting("disagree"):  # the one at fault has been found
+                faults = faults.with_values(fault, until=midnight)
+            return replace(without, faults=faults)
         if state.faults.lasting("disagree") or (is_clear and told[worst].n_days < RECENT):
             return state
         other = max(set(changes) - {worst}, key=lambda sensor: changes[sensor].weight)
@@ -312,9 +300,3 @@ class SensorWatch:
         """The most likely change of each thermometer that is not left out and has a value."""
         free = np.flatnonzero(self._trusted(state.faults) & ~np.isnan(state.means[-1]))
         return {int(sensor): found for sensor in free if (found := self._change(state, sensor)) is not None}
-
-    def _agreed(self, state: WatchState, midnight: int) -> WatchState:
-        """Thermometers that disagreed do so no longer: the one at fault has been found."""
-        for fault in state.faults.lasting("disagree"):
-            state = replace(state, faults=state.faults.with_values(fault, until=midnight))
-        return state

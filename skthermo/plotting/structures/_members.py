@@ -1,22 +1,30 @@
 """Members of structures as lines and surfaces, and their supports, in two and three dimensions."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.fem import Structure
-from skthermo.plotting._axes import Axes, one_axes
+from skthermo.plotting._axes import panels
 from skthermo.plotting._style import BLACK, drawing, pyplot
-from skthermo.plotting.structures._view import View
+from skthermo.plotting.structures._projection import Projection
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import Collection
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
 ELEVATION, AZIMUTH = 22, -60
 Cell = tuple[float, float, float, float]
 
 
-def check_structure(structure: Any, groups: Iterable[str] | None) -> None:
+def check_structure(structure: object, groups: Iterable[str] | None) -> None:
     """Raise an error for what is not a structure, or for groups that it does not have."""
     if not isinstance(structure, Structure):
         raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
@@ -25,21 +33,21 @@ def check_structure(structure: Any, groups: Iterable[str] | None) -> None:
             raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
 
 
-def structure_axes(ax: Axes, view: View, width: float) -> Axes:
+def structure_axes(ax: Axes | None, view: Projection, width: float) -> Axes:
     """Axes of a plane or of space: those that are given, or those of a new figure."""
     if ax is None:
         ratio = height_of(np.array(list(view.nodes.values())))
         width /= max(ratio, 1.0)  # tall structures are as high as others are wide
         height = width * ratio + 0.8
-        if not view.is_space:
-            return one_axes(None, (width, height))
-        return space_axes(pyplot().figure(figsize=(width, height)))
-    ax = one_axes(ax, (width, width))
+        if view.is_space:
+            return space_axes(pyplot().figure(figsize=(width, height)))
+        return panels(None, ["one display"], (width, height))[0]
+    (ax,) = panels(ax, ["one display"], (width, width))
     check_axes(ax, view)
     return ax
 
 
-def check_axes(ax: Axes, view: View) -> None:
+def check_axes(ax: Axes, view: Projection) -> None:
     """Raise an error for flat axes where a structure needs space."""
     if view.is_space and not hasattr(ax, "get_zlim"):
         raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
@@ -56,7 +64,7 @@ def height_of(points: Array) -> float:
     return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
 
 
-def space_axes(figure: Any) -> Axes:
+def space_axes(figure: Figure) -> Axes:
     """Three-dimensional axes without perspective."""
     return figure.add_subplot(projection="3d", proj_type="ortho", computed_zorder=False)
 
@@ -115,22 +123,22 @@ def corners(structure: Structure, names: Iterable[Hashable], places: Mapping[Has
     return [np.array([places[node] for node in elements[name].nodes]) for name in names]
 
 
-def add_lines(ax: Axes, lines: list[Array], **style: Any) -> Any:
+def add_lines(ax: Axes, lines: list[Array], **style: Any) -> Collection:
     """Add a collection of lines in two or three dimensions."""
     return add_collection(ax, "LineCollection", lines, capstyle="round", **style)
 
 
-def add_surfaces(ax: Axes, surfaces: list[Array], **style: Any) -> Any:
+def add_surfaces(ax: Axes, surfaces: list[Array], **style: Any) -> Collection:
     """Add a collection of polygons in two or three dimensions."""
     return add_collection(ax, "PolyCollection", surfaces, edgecolors="none", **style)
 
 
-def add_points(ax: Axes, points: list[Array], **style: Any) -> Any:
+def add_points(ax: Axes, points: list[Array], **style: Any) -> Collection:
     """Add a diamond for every spring to the ground and every point mass, in two or three dimensions."""
     return ax.scatter(*np.vstack(points).T, s=36, marker="D", edgecolors=BLACK, linewidths=0.5, clip_on=False, **style)
 
 
-def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> Any:
+def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> Collection:
     """Add a collection of the kind that the axes' dimension needs."""
     is_space = hasattr(ax, "get_zlim")
     if is_space:
@@ -142,7 +150,7 @@ def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> An
     return collection
 
 
-def draw_supports(ax: Axes, view: View, size: float = 11.0) -> dict[str, Any]:
+def draw_supports(ax: Axes, view: Projection, size: float = 11.0) -> dict[str, Line2D]:
     """Triangles below nodes that are held: filled where they are so in every direction, open where some stay free."""
     nodes, supports, drawn = view.nodes, view.supports, {}
     kinds = {True: ("fixed in every direction", BLACK), False: ("free in some direction", "white")}

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import check_theta
-from skthermo._arrays import Array
+from skthermo._estimators.arguments import check_theta
+from skthermo._tables.arrays import Array
 from skthermo.fem import ModalModel, Structure
-from skthermo.plotting._axes import Axes, panels
+from skthermo.plotting._axes import panels
+from skthermo.plotting._display import Display
 from skthermo.plotting._style import LIGHT, ORANGE, pyplot
 from skthermo.plotting.structures._members import (
     Cell,
@@ -27,13 +28,16 @@ from skthermo.plotting.structures._members import (
     sort_members,
     space_axes,
 )
-from skthermo.plotting.structures._view import View
+from skthermo.plotting.structures._projection import Projection
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 GAP = 0.015  # space between the panels of a figure, as a share of it
 
 
 @dataclass(eq=False, repr=False)
-class ModeShapesDisplay:
+class ModeShapesDisplay(Display):
     """Mode shapes over the structure at rest, with their frequencies, in its plane or in space.
 
     It is best made by `from_structure`.
@@ -92,7 +96,7 @@ class ModeShapesDisplay:
         theta: ArrayLike | None = None,
         *,
         groups: Sequence[str] | None = None,
-        **options: Any,
+        **options: object,
     ) -> ModeShapesDisplay:
         """Draw modes of a structure.
 
@@ -146,7 +150,7 @@ class ModeShapesDisplay:
 
     def plot(
         self,
-        ax: Axes = None,
+        ax: Axes | np.ndarray | None = None,
         *,
         amplitude: float = 0.06,
         colour: str | Mapping[str, str] = ORANGE,
@@ -173,7 +177,7 @@ class ModeShapesDisplay:
         ModeShapesDisplay
             Itself.
         """
-        view = View.of(self.structure, ax)
+        view = Projection.of(self.structure, ax)
         moved = [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
         rest = view.nodes
         points = np.array([place for places in (rest, *moved) for place in places.values()])
@@ -181,7 +185,6 @@ class ModeShapesDisplay:
             cells = self._new_panels(view, n_columns, height_of(points))
         else:
             self.axes_, cells = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3)), [None] * len(moved)
-        self.figure_ = self.axes_[0].figure
         parts = self._parts(colour)
         self.lines_ = []
         for ax_, cell, mode, places, frequency in zip(
@@ -221,7 +224,7 @@ class ModeShapesDisplay:
             for group in self.groups
         ]
 
-    def _new_panels(self, view: View, n_columns: int, ratio: float) -> list[Cell | None]:
+    def _new_panels(self, view: Projection, n_columns: int, ratio: float) -> list[Cell | None]:
         """Axes of a new figure, and in space the cell of the figure that each of them should fill."""
         n_columns = min(n_columns, len(self.modes))
         n_rows = -(-len(self.modes) // n_columns)
@@ -241,7 +244,7 @@ class ModeShapesDisplay:
         ]
 
 
-def moved_nodes(view: View, shape: Array, amplitude: float) -> dict[Hashable, Array]:
+def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashable, Array]:
     """Places of the nodes in a mode, whose largest displacement is a share of the structure's extent."""
     nodes, axes = view.nodes, view.directions
     moves = {node: np.zeros(len(axes)) for node in nodes}

@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, real_array
+from skthermo._tables.arrays import Array, real_array
 from skthermo.fem import Structure
-from skthermo.plotting._axes import Axes, legend_columns
+from skthermo.plotting._axes import legend_columns
+from skthermo.plotting._display import Display
 from skthermo.plotting._style import COLOURS, GREY, LIGHT, ORANGE, drawing, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
     add_lines,
@@ -25,7 +26,15 @@ from skthermo.plotting.structures._members import (
     sort_members,
     structure_axes,
 )
-from skthermo.plotting.structures._view import View
+from skthermo.plotting.structures._projection import Projection
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.collections import Collection
+    from matplotlib.colorbar import Colorbar
+
+    from skthermo.studies import LocatedDamage
 
 WIDTH, THIN = 2.5, 0.8
 DAMAGE_COLOURS = ["#BFC5CC", "#F0C04A", ORANGE, "#7A0019"]  # from grey, as nothing there asks for attention
@@ -38,7 +47,7 @@ LABELS = {
 
 
 @dataclass(eq=False, repr=False)
-class StructureDisplay:
+class StructureDisplay(Display):
     """Members of a structure, coloured by value or by group, and its supports.
 
     A structure whose nodes and motions lie in one plane is drawn in that plane, any other in space. A triangle marks a
@@ -61,7 +70,7 @@ class StructureDisplay:
 
     Attributes
     ----------
-    ax_, figure_ : matplotlib's Axes and Figure
+    ax_, axes_, figure_ : matplotlib's Axes, array that holds them, and Figure
         Where it is drawn.
     members_ : dict
         Collections of lines, surfaces and points, by ``"lines"``, ``"surfaces"`` and ``"points"`` or by group.
@@ -94,7 +103,7 @@ class StructureDisplay:
         *,
         groups: Sequence[str] | None = None,
         label: str | None = None,
-        **options: Any,
+        **options: object,
     ) -> StructureDisplay:
         """Draw a structure.
 
@@ -128,7 +137,7 @@ class StructureDisplay:
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
 
     @classmethod
-    def from_located(cls, located: Any, quantity: str = "probability", **options: Any) -> StructureDisplay:
+    def from_located(cls, located: LocatedDamage, quantity: str = "probability", **options: object) -> StructureDisplay:
         """Draw where a structure is damaged, member by member.
 
         Parameters
@@ -157,7 +166,7 @@ class StructureDisplay:
 
     def plot(
         self,
-        ax: Axes = None,
+        ax: Axes | None = None,
         *,
         cmap: str = "viridis",
         limits: tuple[float, float] | None = None,
@@ -183,10 +192,9 @@ class StructureDisplay:
             Itself.
         """
         is_own_figure = ax is None
-        view = View.of(self.structure, ax)
-        self.ax_ = structure_axes(ax, view, width=9.0)
-        self.figure_ = self.ax_.figure
-        self.members_: dict[str, Any] = {}
+        view = Projection.of(self.structure, ax)
+        self.axes_ = np.array([structure_axes(ax, view, width=9.0)], dtype=object)
+        self.members_: dict[str, Collection] = {}
         if self.values is not None:
             width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
             self._draw_values(view, self.values, cmap, limits, width)
@@ -202,7 +210,7 @@ class StructureDisplay:
         return self
 
     def _draw_values(
-        self, view: View, values: Array, cmap: str, limits: tuple[float, float] | None, width: float
+        self, view: Projection, values: Array, cmap: str, limits: tuple[float, float] | None, width: float
     ) -> None:
         """Members in the colours of their values; those without are grey and thin, and surfaces among them left out."""
         known = values[np.isfinite(values)]
@@ -228,7 +236,7 @@ class StructureDisplay:
             places = corners(self.structure, points, nodes)
             self.members_["points"] = add_points(self.ax_, places, zorder=4, **style)
 
-    def _draw_colorbar(self, is_beside: bool) -> Any:
+    def _draw_colorbar(self, is_beside: bool) -> Colorbar:
         """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
         shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
@@ -236,7 +244,7 @@ class StructureDisplay:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
         return self.figure_.colorbar(shown, label=plain(self.label or ""), **place)
 
-    def _draw_groups(self, view: View, linewidth: float | Mapping[str, float]) -> None:
+    def _draw_groups(self, view: Projection, linewidth: float | Mapping[str, float]) -> None:
         groups, nodes = self.structure.groups, view.nodes
         widths = linewidth if isinstance(linewidth, Mapping) else {}
         width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
@@ -256,7 +264,7 @@ class StructureDisplay:
                 style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
                 self.members_[name] = add_lines(self.ax_, corners(self.structure, lines, nodes), **style)
 
-    def _draw_legend(self, view: View, supports: Mapping[str, Any], is_own_figure: bool) -> None:
+    def _draw_legend(self, view: Projection, supports: Mapping[str, Artist], is_own_figure: bool) -> None:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
         if not handles:
             return
@@ -269,7 +277,7 @@ class StructureDisplay:
             self.figure_.legend(handles, labels, loc=place, **style)
 
 
-def values_by_member(structure: Structure, values: Any) -> Array:
+def values_by_member(structure: Structure, values: Mapping[Hashable, float] | ArrayLike) -> Array:
     """Value of each member, NaN where there is none."""
     members, groups = list(structure.members), structure.groups
     if hasattr(values, "to_dict"):

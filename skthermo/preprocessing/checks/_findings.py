@@ -10,16 +10,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_floats, median, robust_deviation, spread_evenly
-from skthermo._frames import MARKERS, check_same_rows, column_names, columns_by_sensor
-from skthermo._saved_frames import SavesFrames
-from skthermo._times import row_times
+from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
+from skthermo._tables.frames import MARKERS, check_same_rows, column_names, columns_by_sensor
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import row_times
 from skthermo.preprocessing._exponential import trailing_means
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
 from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of
 from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
-from skthermo.preprocessing.checks._shift import Shift, best_shift, explained, with_past
+from skthermo.preprocessing.checks._shift import TimeShift, best_shift, explained, with_past
 from skthermo.preprocessing.checks._stuck import stuck_runs
 from skthermo.preprocessing.checks._swaps import swapped_modes
 from skthermo.preprocessing.checks._trend import largest_step, trend_table
@@ -37,6 +37,21 @@ LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that
 LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
 ABSURD = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
 PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
+
+WARNINGS = {
+    "stuck sensor": "values of a sensor only repeat: {}; expected NaN where it is stuck",
+    "stuck mode": "values of a mode only repeat: {}; expected NaN where it is stuck",
+    "weather": "the temperatures explain nothing of the frequencies: {}",
+    "time shift": "temperatures of other rows explain the frequencies better: {}",
+    "exchanged modes": "modes look exchanged in some rows: {}; expected the same mode in all of a column",
+    "outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}; expected "
+    "NaN where a value is wrong: HampelFilter puts it there",
+    "memory": "frequencies follow the weather of weeks, as soil and large concrete do: {}; append these means to the "
+    "inputs of the regression",
+    "step": "frequencies change at once by what the weather does not explain: {}; expected records of one structure, "
+    "in one state and by one way of identification",
+    "trend": "what the weather leaves of the frequencies has a trend: {}",
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,37 +114,8 @@ class RecordFindings(SavesFrames):
         kind, text : str
             What the warning is about, and what it says.
         """
-        for kind in map(str, self.table["what"].unique()):
-            rows = self.table[self.table["what"] == kind]
-            details = "; ".join(rows["detail"])
-            if kind in ("stuck sensor", "stuck mode"):
-                yield kind, f"values of a sensor or a mode only repeat: {details}; expected NaN where it is stuck"
-            elif kind == "weather":
-                yield kind, f"the temperatures explain nothing of the frequencies: {details}"
-            elif kind == "time shift":
-                yield kind, f"temperatures of other rows explain the frequencies better: {details}"
-            elif kind == "exchanged modes":
-                yield kind, f"modes look exchanged in some rows: {details}; expected the same mode in all of a column"
-            elif kind == "outliers":
-                yield (
-                    kind,
-                    f"frequencies are far from their neighbours in time and from what the weather explains: {details}; "
-                    "expected NaN where a value is wrong: HampelFilter puts it there",
-                )
-            elif kind == "memory":
-                yield (
-                    kind,
-                    f"frequencies follow the weather of weeks, as soil and large concrete do: {details}; append these "
-                    "means to the inputs of the regression",
-                )
-            elif kind == "step":
-                yield (
-                    kind,
-                    f"frequencies change at once by what the weather does not explain: {details}; expected records of "
-                    "one structure, in one state and by one way of identification",
-                )
-            else:
-                yield kind, f"what the weather leaves of the frequencies has a trend: {details}"
+        for kind, rows in self.table.groupby("what", sort=False):
+            yield kind, WARNINGS[kind].format("; ".join(rows["detail"]))
 
 
 def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str = "Hz") -> RecordFindings:
@@ -385,7 +371,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[
     records.outliers |= far
 
 
-def _shifted(records: _Records, shift: Shift) -> tuple[NDArray[np.intp], str]:
+def _shifted(records: _Records, shift: TimeShift) -> tuple[NDArray[np.intp], str]:
     rows = np.arange(max(shift.rows, 0), len(records.F) + min(shift.rows, 0))
     length, direction = "", "before" if shift.rows > 0 else "after"
     if records.hours is not None:

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, spread_evenly
+from skthermo._tables.arrays import Array, spread_evenly
 from skthermo.preprocessing._weather_regression import out_of_fold
 
 MOST_ROWS = 4000  # that are predicted for each shift
@@ -21,7 +21,7 @@ LEAST_GAIN = 0.01  # share of the variance that shifted temperatures explain bey
 LEAST_EXPLAINED = 0.1  # share of the variance that shifted temperatures explain
 
 
-class Shift(NamedTuple):
+class TimeShift(NamedTuple):
     """By how many rows temperatures are earlier than frequencies, and the shares of the variance explained."""
 
     rows: int
@@ -31,7 +31,7 @@ class Shift(NamedTuple):
 
 def best_shift(
     lines: Array, past: Array, places: Array, F: Array, folds: NDArray[np.intp], inertia: int
-) -> Shift | None:
+) -> TimeShift | None:
     """The shift at which temperatures explain most, if they explain clearly more than those of the row and its past.
 
     A structure may follow the weather late, by up to ``inertia`` rows, without a fault.
@@ -44,7 +44,7 @@ def best_shift(
         if not varying.any():
             continue
         ratio = float(np.exp(np.log(np.maximum(other, 1e-300)[varying] / own[varying]).mean()))
-        found.append((ratio, Shift(shift, *(float(1 - np.nanmean(part)) for part in (other, own)))))
+        found.append((ratio, TimeShift(shift, *(float(1 - np.nanmean(part)) for part in (other, own)))))
     if not found:
         return None
     ratio, best = min(found)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 
 SHORTEST = 5  # number of equal records in a row that may count as stuck
 USUAL = 4  # times the length of a usual run, which a stuck one exceeds where values are rounded
@@ -15,14 +15,19 @@ STEPS = 3  # steps of rounding that count as little
 MOST_RUNS = 20  # longest ones of a column, which are looked at
 
 
+def equal_runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First place and length of each run of equal values; without NaN."""
+    first = np.flatnonzero(np.append(True, values[1:] != values[:-1])[: len(values)])
+    return first, np.diff(np.append(first, len(values)))
+
+
 def stuck_runs(column: Array) -> list[NDArray[np.intp]]:
     """Rows of each run of equal values in a column, in order of time, at which it was stuck; NaN is passed over."""
     rows = np.flatnonzero(~np.isnan(column))
     values = column[rows]
     if len(values) < 4 * SHORTEST:
         return []
-    first = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
-    lengths = np.diff(np.append(first, len(values)))
+    first, lengths = equal_runs(values)
     if lengths.max() < SHORTEST or len(lengths) < 3:
         return []
     step = np.abs(np.diff(values[first])).min()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import NORMAL, Array, median
+from skthermo._tables.arrays import NORMAL, Array, median
 from skthermo.preprocessing._weather_regression import out_of_fold
 
 LEAST_ROWS = 3

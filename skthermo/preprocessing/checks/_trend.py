@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import Array, as_columns
-from skthermo._frames import column_names
-from skthermo._times import correlation_time, has_stamps, row_times
+from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.frames import column_names
+from skthermo._tables.times import YEAR, correlation_time, has_stamps, row_times
 
-YEAR = 365.25 * 86400e9  # nanoseconds
+Rows = NDArray[np.intp]
 PARTS = 5  # into which the records are divided, to compare the first with the last
 LEAST_RECORDS = 10
 N_PLACES = 100  # at which a step is sought
@@ -67,10 +67,8 @@ def trend_table(inputs: Array, values: Array, times: Array, names: Sequence[Hash
     span = np.ptp(times) if len(times) else 0.0
     places = (times - times[:1]) / span if span > 0 else np.zeros(len(times))
     rows = [_trend(inputs, places, column) for column in values.T]
-    table = pd.DataFrame(
-        rows, index=list(names), columns=["change", "standard_error", "first", "last", "n_independent"]
-    )
-    table.insert(2, "per_year", table["change"] * (YEAR / span if is_timed and span > 0 else np.nan))
+    table = pd.DataFrame(rows, index=list(names), columns=ESTIMATES)
+    table.insert(2, "per_year", table["change"] * (YEAR.value / span if is_timed and span > 0 else np.nan))
     return table
 
 
@@ -81,17 +79,27 @@ def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
     if len(y) < LEAST_RECORDS + 2 * inputs.shape[1] or np.ptp(x) == 0:
         return [np.nan] * 5
     # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
-    left = np.column_stack([x, y])
-    left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-8)[0]
-    alone, rest = left.T
+    alone, rest = _beside(beside, np.column_stack([x, y])).T
     change = alone @ rest / (alone @ alone)
-    scatter = np.full(len(column), np.nan)
-    scatter[known] = rest - change * alone
-    time = min(correlation_time(scatter), len(y) / 2)
-    variance = np.nansum(scatter**2) / max(len(y) - inputs.shape[1] - 2 * time, 1.0)
-    at = scatter[known] + change * (x - x.mean())
+    scatter = rest - change * alone
+    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.shape[1])
+    at = scatter + change * (x - x.mean())
     ends = [at[part].mean() if part.any() else np.nan for part in (x <= 1 / PARTS, x >= 1 - 1 / PARTS)]
-    return [change, np.sqrt(variance * time / (alone @ alone)), *ends, len(y) / time]
+    return [change, error, *ends, len(y) / time]
+
+
+def _beside(inputs: Array, columns: Array) -> Array:
+    """What inputs leave of columns."""
+    return columns - inputs @ np.linalg.lstsq(inputs, columns, rcond=1e-8)[0]
+
+
+def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
+    """Of the coefficient of a regressor with this sum of squares, and the correlation time of what it leaves."""
+    in_time = np.full(n_rows, np.nan)
+    in_time[known] = scatter
+    time = min(correlation_time(in_time), len(known) / 2)
+    variance = np.sum(scatter**2) / max(len(known) - n_inputs - 2 * time, 1.0)
+    return float(np.sqrt(variance * time / square)), time
 
 
 class Step(NamedTuple):
@@ -114,7 +122,7 @@ def largest_step(inputs: Array, column: Array) -> Step | None:
     at = np.arange(1, n_places) * len(known) // n_places
     order, beside = np.arange(len(known)), inputs[known]
     left = np.column_stack([order / len(known), order[:, np.newaxis] >= at, column[known]])
-    left = left - beside @ np.linalg.lstsq(beside, left, rcond=1e-8)[0]
+    left = _beside(beside, left)
     shapes, rest = left[:, :-1], left[:, -1]
     squares = np.maximum((shapes**2).sum(axis=0), 1e-12 * len(known))
     changes = shapes.T @ rest / squares
@@ -122,8 +130,6 @@ def largest_step(inputs: Array, column: Array) -> Step | None:
     best = 1 + int(remaining[1:].argmin())
     if remaining[best] > SHARPER * remaining[0]:
         return None
-    scatter = np.full(len(column), np.nan)
-    scatter[known] = rest - changes[best] * shapes[:, best]
-    time = min(correlation_time(scatter), len(known) / 2)
-    variance = remaining[best] / max(len(known) - inputs.shape[1] - 2 * time, 1.0)
-    return Step(int(known[at[best - 1]]), float(changes[best]), float(np.sqrt(variance * time / squares[best])))
+    scatter = rest - changes[best] * shapes[:, best]
+    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.shape[1])
+    return Step(int(known[at[best - 1]]), float(changes[best]), error)

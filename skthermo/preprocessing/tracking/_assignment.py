@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.preprocessing.tracking._poles import Poles
 from skthermo.preprocessing.tracking._reference import ReferenceModes, shape_agreement
 

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import as_floats, real_array, refuse_no_numbers, without_mask
-from skthermo._frames import check_same_rows
+from skthermo._tables.arrays import as_floats, real_array, shape_array
+from skthermo._tables.frames import check_same_rows
 
 FIELDS = ("frequencies", "damping", "shapes")
 
@@ -107,7 +107,7 @@ def _from_arrays(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -
             raise ValueError(f"damping has shape {damping.shape}; expected {F.shape}, as frequencies")
         damping = damping[record, column]
     if shapes is not None:
-        shapes = _numbers(shapes, "shapes")
+        shapes = shape_array(shapes, "shapes of X", any_size=True)
         if shapes.ndim != 3 or shapes.shape[:2] != F.shape:
             raise ValueError(f"shapes have shape {shapes.shape}; expected {F.shape + ('n_sensors',)}")
         shapes = shapes[record, column]
@@ -140,7 +140,7 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
     """One array for each record, of as many entries as the record has frequencies."""
     if len(values) != len(lengths):
         raise ValueError(f"{what} has {len(values)} records and frequencies {len(lengths)}; expected the same number")
-    rows = [as_floats(row) if what == "damping" else _numbers(row, what) for row in values]
+    rows = [as_floats(row) if what == "damping" else shape_array(row, f"{what} of X", any_size=True) for row in values]
     for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
         if length == 0 and row.size == 0:
             rows[i] = np.empty((0,) * ndim)
@@ -148,20 +148,6 @@ def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
             expected = (int(length),) if ndim == 1 else (int(length), "n_sensors")
             raise ValueError(f"{what} of record {i} have shape {row.shape}; expected {expected}")
     return rows
-
-
-def _numbers(values: Any, what: str) -> NDArray:
-    try:
-        if not np.iscomplexobj(values):
-            refuse_no_numbers(values)
-        array = np.asarray(without_mask(values))
-        if array.dtype.kind == "O":
-            array = array.astype(complex)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{what} of X is not numeric ({error}); expected numbers, real or complex") from error
-    if array.dtype.kind not in "biufc":
-        raise ValueError(f"{what} of X is of type {array.dtype}; expected numbers, real or complex")
-    return array.astype(np.result_type(array.dtype, np.float32), copy=False)
 
 
 def _chosen_sensors(shapes: NDArray, given: Any, wanted: list | None) -> NDArray:

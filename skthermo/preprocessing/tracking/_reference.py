@@ -9,8 +9,8 @@ import pandas as pd
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, real_array, rows_by_pattern, shape_array
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, real_array, rows_by_pattern, shape_array
 
 
 class ReferenceModes(NamedTuple):

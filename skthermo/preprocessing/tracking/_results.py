@@ -5,8 +5,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
-from skthermo._arrays import Array
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
 from skthermo.preprocessing.tracking._assignment import Pairs
 from skthermo.preprocessing.tracking._poles import Poles
 from skthermo.preprocessing.tracking._reference import ReferenceModes, shape_agreement

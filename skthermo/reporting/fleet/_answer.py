@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
-from skthermo._formatting import counted, counted_number, percent, significant
-from skthermo.reporting._html import Html, bullets, element, joined, paragraphs, section, table
+from skthermo._tables.text import counted, counted_number, significant
+from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
 from skthermo.reporting.fleet._bridge import CALLED, FAILED, OPEN, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
-from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, symbol
+from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, banner, first_section
 
 MOST_NAMED = 5  # largest number of bridges in a sentence
 
@@ -25,20 +25,16 @@ COUNTED = {
 """States in words, the worst first."""
 
 
-def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, written: str) -> Html:
+def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any, written: str) -> Section:
     """How many bridges are in which state, which ones need somebody, and what to do."""
     numbers = pd.Series([bridge.state for bridge in bridges]).value_counts()
     counts = [f"{numbers[state]:,} {text}" for state, text in COUNTED.items() if numbers.get(state, 0)]
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
     unexplained = sum(bridge.place == UNEXPLAINED for bridge in bridges)
-    lines = [
-        element("p", _headline(numbers, len(bridges), unknown, unexplained), class_="headline"),
-        element("p", f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}."),
-        element("p", f"As of {written}, when this page was written. Of later days it says nothing.", class_="soft"),
-    ]
     state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
     state = NOT_JUDGED if unknown and state == HEALTHY else state
-    banner = element("div", symbol(state), element("div", joined(lines)), class_=f"state {state.replace(' ', '-')}")
+    headline = _headline(numbers, len(bridges), unknown, unexplained)
+    standing = banner(state, written, headline, f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}.")
     known = [
         _named(bridges, links, CALLED, "In alarm, and standing out among all bridges"),
         _named(bridges, links, OPEN, "In alarm, but no more than chance may give among so many bridges"),
@@ -55,8 +51,8 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Any, str], found: Any, writ
         "An event begins when its damage index exceeds a threshold. An alarm does not prove damage, and healthy means "
         "that no change is seen, not that there is none."
     )
-    parts = [banner, bullets(item for item in known if item), element("h3", "What to do"), bullets(_steps(bridges))]
-    return section("today", "The bridges today", *parts, element("h3", "What the words mean"), paragraphs(words))
+    known = [text for text in known if text]
+    return first_section("The bridges today", standing, known, _steps(bridges), words)
 
 
 def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) -> str:
@@ -76,7 +72,7 @@ def _is(number: int) -> str:
     return "is" if number == 1 else "are"
 
 
-def _named(bridges: Sequence[Bridge], links: Mapping[Any, str], place: int, text: str) -> Html:
+def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], place: int, text: str) -> Html:
     """A sentence that names the bridges of one place, the worst first; nothing without any."""
     names = [bridge.name for bridge in bridges if bridge.place == place]
     if not names:
@@ -88,29 +84,14 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Any, str], place: int, text
 
 
 def _false_alarms(found: Any) -> list[str]:
-    """How many events there were, how many of them stand out, and how many are expected by chance."""
+    """How many false alarms all monitors raise, which bridges stand out, and how many of these are false."""
     if found is None:
         return []
-    n_events, n_called = len(found.table), len(found.called)
-    promised, left = (
-        counted_number(float(significant(number, 2)), "false alarm")
-        for number in (found.promised_false_per_year, found.expected_false_per_year)
-    )
-    sentences = [f"Even if all bridges stay healthy, their monitors together raise about {promised} a year."]
-    if not n_events:
-        return [*sentences, "There has been no damage event in the last year that was not said to be harmless."]
-    limit, judged = percent(found.share), counted(found.n_judged, "judged bridge")
-    events = f"{counted(n_events, 'damage event')} in the last year"
-    called = f"None of {judged} is singled out: among so many, chance explains {events}"
-    if n_called:
-        called = (
-            f"{n_called:,} of {judged} {_is(n_called)} singled out: chance hardly explains the highest events there"
-        )
-    return [
-        *sentences,
-        f"{called}. Of bridges that are singled out in this way, at most {limit} are expected to be healthy on "
-        f"average, about {left} a year; wrong records and weather unlike the baseline's make more.",
-    ]
+    n_false = counted_number(float(significant(found.promised_false_per_year, 2)), "false alarm")
+    told = f"Even if all bridges stay healthy, their monitors together raise about {n_false} a year."
+    if not len(found.table):
+        return [told, "There has been no damage event in the last year that was not said to be harmless."]
+    return [told, f"{counted(len(found.table), 'damage event')} in the last year.", *found.summary().splitlines()]
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:
@@ -134,7 +115,7 @@ def _steps(bridges: Sequence[Bridge]) -> list[str]:
     return steps or ["Nothing; look at the date of this page."]
 
 
-def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Html:
+def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Section:
     """How many bridges gave which warnings, and which errors there were."""
     parts = []
     if len(warned):
@@ -149,4 +130,4 @@ def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Html:
     if len(errors):
         rows = [[str(row["bridge"]), str(row["error"])] for _, row in errors.iterrows()]
         parts += [element("h3", "Errors"), table("What failed.", ["Bridge", "Error"], rows, is_cards=True)]
-    return section("warnings", "Warnings and errors", *parts)
+    return section("warnings", "Warnings and errors", *parts, link="Warnings")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import counted, duration_text, listed, percent
+from skthermo._tables.text import counted, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
 from skthermo.reporting.service import ALARM, ATTENTION, NOT_JUDGED, Standing, moment
@@ -78,7 +78,7 @@ class Bridge:
         elif standing.state == ATTENTION:
             place = WORN
         elif standing.state == NOT_JUDGED:
-            place, size = SILENT, (standing.now - _silent_since(standing)) / pd.Timedelta("1D")
+            place, size = SILENT, (standing.now - standing.doubt.since) / pd.Timedelta("1D")
         elif change > 0:
             place = DRIFTING
         days = standing.days_until(standing.now)
@@ -100,19 +100,12 @@ class Bridge:
         )
 
 
-def _silent_since(standing: Standing) -> pd.Timestamp:
-    """Since when nothing is known of a bridge that is not judged."""
-    if not standing.has_records or standing.is_silent or standing.is_ahead or standing.error:
-        return standing.last
-    return standing.unjudged_since
-
-
 def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
     if len(opened):
         return opened["start"].min()
     if standing.state == NOT_JUDGED:
-        return _silent_since(standing)
+        return standing.doubt.since
     ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
     return ends.max() if len(ends) else standing.monitor.days_.index[0]
 
@@ -127,7 +120,7 @@ def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list
         if standing.is_silent:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
     elif standing.state == NOT_JUDGED:
-        texts.append(_reason(standing))
+        texts.append(f"{standing.doubt.explanation}.")
     elif standing.state == ATTENTION:
         texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
     if standing.error and standing.state == ALARM:
@@ -143,19 +136,6 @@ def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list
 
 def _more(failed: pd.DataFrame) -> str:
     return f" and {len(failed) - 3} more" if len(failed) > 3 else ""
-
-
-def _reason(standing: Standing) -> str:
-    if standing.error:
-        return f"{standing.error}."
-    if not standing.has_records:
-        return "No record has come since the baseline."
-    if standing.is_ahead:
-        return "The dates of its records are wrong."
-    if standing.is_silent:
-        return f"No record for {duration_text(standing.now - standing.last)}."
-    reason = str(standing.judged["reason"].iloc[-1]) if len(standing.judged) else ""
-    return f"{reason[:1].upper()}{reason[1:]}." if reason else "No reason is given."
 
 
 def _drift(standing: Standing) -> tuple[float, str]:

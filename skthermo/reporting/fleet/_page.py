@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from skthermo._formatting import counted, percent
 from skthermo._io import write_when_complete
-from skthermo.reporting._html import Html, bullets, element, joined, page, paragraphs, section, table
-from skthermo.reporting._settings import settings
+from skthermo._tables.text import counted, percent
+from skthermo.fleet import Fleet
+from skthermo.reporting._html import Html, Section, bullets, element, joined, page, paragraphs, section, table
+from skthermo.reporting._model import learned, stiffnesses
+from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.fleet._answer import answer, warnings_of_all
 from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.fleet._files import folder_of, link, page_names
-from skthermo.reporting.fleet._fit import fit_page
-from skthermo.reporting.service import ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment, monitor_page, symbol, time_of
+from skthermo.reporting.service import (
+    ATTENTION,
+    HEALTHY,
+    NOT_JUDGED,
+    Standing,
+    Time,
+    banner,
+    moment,
+    monitor_page,
+    symbol,
+    time_of,
+)
+from skthermo.surrogate import DataInformedFEM
 
 COLUMNS = [
     "Bridge",
@@ -27,11 +42,23 @@ COLUMNS = [
     "Days judged in the last month",
     "Warnings",
 ]
+HEADLINES = {
+    FAILED: (
+        "Not judged: it could not be fitted",
+        "An engineer should look at the records and at the model of this bridge; the others are not affected.",
+    ),
+    NOT_JUDGED: (
+        "Not judged: its monitor cannot be used",
+        "An engineer should look at the monitor of this bridge; the others are not affected.",
+    ),
+    UNWATCHED: ("Not judged: no monitor", "Records that come are judged once the bridge has a monitor."),
+}
+"""What heads the page of a bridge without a monitor that can be asked, and what to do."""
 
 
 def fleet_page(
-    fleet: Any, file: Path, title: str, now: Any, limit: float, share: float
-) -> tuple[Html, dict[str, tuple[str, Html]]]:
+    fleet: Fleet, file: Path, title: str, now: Time, limit: float, share: float
+) -> tuple[Html, list[Section]]:
     """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
     written = moment(_as_written(now))
     folder = folder_of(file)
@@ -42,51 +69,66 @@ def fleet_page(
     found = fleet.discoveries(share) if len(fleet.monitors) else None
     writer = PageWriter(fleet, found, folder, files, element("a", title, href=link("..", file.name)), now, limit)
     bridges = sorted((writer.write(name) for name in names), key=lambda bridge: bridge.order)
-    sections = {
-        "today": ("Today", answer(bridges, links, found, written)),
-        "bridges": ("All bridges", _all_bridges(bridges, links)),
-        "promise": ("False alarms", _promise(found)),
-        "warnings": ("Warnings", warnings_of_all(fleet.warnings, fleet.errors)),
-        "settings": ("Settings", _settings(fleet, limit, share)),
-    }
+    sections = [
+        answer(bridges, links, found, written),
+        _all_bridges(bridges, links),
+        _promise(found),
+        warnings_of_all(fleet.warnings, fleet.errors),
+        _settings(fleet, limit, share),
+    ]
     introduction = paragraphs(f"One row for each of {counted(len(bridges), 'bridge')}, the worst first.")
     return introduction, sections
 
 
+@dataclass(frozen=True)
 class PageWriter:
     """Writes the page of one bridge after the other, and keeps only what the page of all says of it."""
 
-    def __init__(
-        self, fleet: Any, found: Any, folder: Path, files: Mapping[Any, str], back: Html, now: Any, limit: float
-    ):
-        self.fleet, self.folder, self.files, self.back, self.now, self.limit = fleet, folder, files, back, now, limit
-        called = None if found is None else found.table[found.table["is_called"].astype(bool)]
-        self.called = {} if called is None else {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
-        self.warned = dict(list(fleet.warnings.groupby("bridge")))
-        self.errors = {name: "; ".join(rows["error"].astype(str)) for name, rows in fleet.errors.groupby("bridge")}
+    fleet: Fleet
+    found: Any
+    folder: Path
+    files: Mapping[Hashable, str]
+    back: Html
+    now: Time
+    limit: float
 
-    def write(self, name: Any) -> Bridge:
+    @cached_property
+    def called(self) -> dict[Hashable, set[int]]:
+        """Numbers of the events that stand out among all, by bridge."""
+        if self.found is None:
+            return {}
+        called = self.found.table[self.found.table["is_called"].astype(bool)]
+        return {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
+
+    @cached_property
+    def errors(self) -> dict[Hashable, str]:
+        """Errors by bridge."""
+        return {name: "; ".join(rows["error"].astype(str)) for name, rows in self.fleet.errors.groupby("bridge")}
+
+    def write(self, name: Hashable) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
-        warned = self.warned.get(name, self.fleet.warnings.iloc[:0])
-        messages = list(dict.fromkeys(warned["message"]))
+        warned = self.fleet.warnings
+        messages = warned.loc[warned["bridge"] == name, "message"].unique().tolist()
         monitor, unread = _opened(self.fleet.monitors, name)
         error = self.errors.get(name, "")
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
-        listed = section("warnings", "Warnings of its fit", bullets(messages) or paragraphs("There was no warning."))
+        told = bullets(messages) or paragraphs("There was no warning.")
+        listed = section("warnings", "Warnings of its fit", told, link="Warnings")
         if standing is not None:
             bridge = Bridge.watched(name, standing, self.called.get(name, set()), len(messages))
             introduction, sections = monitor_page(standing, is_one_of_many=True)
-            sections["warnings"] = ("Warnings", listed)
-            sections["settings"] = sections.pop("settings")
+            sections[-1:-1] = [listed]
         else:
             bridge, chain = self._without_monitor(name, unread, error, len(messages))
-            introduction, sections = fit_page(bridge, chain, listed, moment(_as_written(self.now)))
+            introduction, sections = Html(), fit_page(bridge, chain, listed, moment(_as_written(self.now)))
         back = element("p", "One of the bridges of ", self.back, ".")
         text = page(str(name), joined([back, introduction]), sections, paragraphs("Written by skthermo."))
         write_when_complete(self.folder / self.files[name], text)
         return bridge
 
-    def _without_monitor(self, name: Any, unread: str, error: str, n_warnings: int) -> tuple[Bridge, Any]:
+    def _without_monitor(
+        self, name: Hashable, unread: str, error: str, n_warnings: int
+    ) -> tuple[Bridge, DataInformedFEM | None]:
         """A bridge that nobody watches, and its chain, if it has one."""
         chain, without_chain = _opened(self.fleet.chains, name)
         if unread:
@@ -96,7 +138,22 @@ class PageWriter:
         return Bridge.unwatched(name, error, n_warnings), chain
 
 
-def _as_written(now: Any) -> pd.Timestamp:
+def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, written: str) -> list[Section]:
+    """Sections on a bridge without a monitor: what its model has learned, or why it could not."""
+    unknown = "Whether the bridge is healthy is not known: silence never means healthy."
+    headline, advice = HEADLINES.get(bridge.state, HEADLINES[UNWATCHED])
+    state = banner(NOT_JUDGED, written, headline, bridge.why, unknown)
+    sections = [section("today", "Today", state, paragraphs(advice))]
+    report = getattr(chain, "report_", None)
+    if hasattr(report, "offsets"):
+        sections.append(section("fit", "How good the model is", *learned(report), *stiffnesses(report)))
+    sections.append(warned)
+    if chain is not None:
+        sections.append(settings("For the engineer.", "Settings of the model.", parameters({"model": chain})))
+    return sections
+
+
+def _as_written(now: Time) -> pd.Timestamp:
     """The time that stands on the pages, as it was given: bridges may have records of different time zones."""
     if now is None:
         return time_of(None).floor("min")
@@ -104,7 +161,7 @@ def _as_written(now: Any) -> pd.Timestamp:
     return time_of(now, zone)
 
 
-def _opened(mapping: Mapping[Any, Any], name: Any) -> tuple[Any, str]:
+def _opened(mapping: Mapping[Hashable, Any], name: Hashable) -> tuple[Any, str]:
     """What a mapping has under a name, read from its file perhaps; nothing, and why, where it cannot be read."""
     if name not in mapping:
         return None, ""
@@ -114,7 +171,7 @@ def _opened(mapping: Mapping[Any, Any], name: Any) -> tuple[Any, str]:
         return None, f"{type(error).__name__}: {error}"
 
 
-def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Any, str]) -> Html:
+def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Section:
     """The table, the worst first."""
     rows = [
         [
@@ -146,11 +203,13 @@ def _state(bridge: Bridge) -> Html:
     return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
 
 
-def _promise(found: Any) -> Html:
+def _promise(found: Any) -> Section:
     """What few false alarms mean where there are many bridges."""
     title = "What false alarms mean for many bridges"
     if found is None:
-        return section("promise", title, paragraphs("No bridge has a monitor, so that there are no alarms."))
+        return section(
+            "promise", title, paragraphs("No bridge has a monitor, so that there are no alarms."), link="False alarms"
+        )
     meaning = (
         "A monitor that raises one false alarm a year is a good one for one bridge. Two hundred such monitors raise "
         "one on more than every second day, and who follows each of them soon follows none. So the events of all "
@@ -163,10 +222,10 @@ def _promise(found: Any) -> Html:
         "weather is unlike that of the baseline. An event of another bridge is not proved to be false: it only cannot "
         "be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
     )
-    return section("promise", title, paragraphs(meaning, rule))
+    return section("promise", title, paragraphs(meaning, rule), link="False alarms")
 
 
-def _settings(fleet: Any, limit: float, share: float) -> Html:
+def _settings(fleet: Fleet, limit: float, share: float) -> Section:
     """What this page was made with."""
     monitors, chains = (f"{len(mapping):,}" for mapping in (fleet.monitors, fleet.chains))
     rows = [

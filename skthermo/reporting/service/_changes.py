@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Hashable
 
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import SPACE, listed, percent, significant
-from skthermo.reporting._html import Html, bullets, figure, paragraphs, section, table
+from skthermo._tables.text import SPACE, listed, percent, significant
+from skthermo.reporting._html import Section, bullets, figure, paragraphs, section, table
 from skthermo.reporting.service._figures import draw_drift
 from skthermo.reporting.service._standing import YEAR, Standing, moment
 
@@ -36,7 +36,7 @@ def drift_sentences(standing: Standing) -> list[str]:
     return [_group(name, row, standing.last, standing.limit) for name, row in certain.iterrows()]
 
 
-def _group(name: Any, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
+def _group(name: Hashable, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
     change, rate = float(row["change"]), float(row["per_year"])
     verb = "lost" if change < 0 else "gained"
     text = f"{name} has {verb} {_size(change, row['standard_error'])} of its stiffness since the baseline"
@@ -78,9 +78,9 @@ def _year(last: pd.Timestamp, years: float) -> str:
     return f"{last + years * YEAR:%Y}"
 
 
-def drift(standing: Standing, *, is_drawn: bool = True) -> Html:
+def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
     """Drift by group: in words, perhaps as a drawing, and in numbers."""
-    title, found = "Slow change of the structure", standing.monitor.drift_
+    found = standing.monitor.drift_
     parts = [bullets(drift_sentences(standing))]
     if found is not None:
         meaning = (
@@ -101,7 +101,7 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Html:
         columns = ["Group", "Change so far", "Change a year", "Beyond its error"]
         parts += [paragraphs(meaning), figure(caption, [] if drawn is None else [drawn])]
         parts.append(table("Change of stiffness by group, ± two standard errors.", columns, rows))
-    return section("drift", title, *(part for part in parts if part))
+    return section("drift", "Slow change of the structure", *parts, link="Slow change")
 
 
 def _signed(value: float, error: float) -> str:
@@ -126,7 +126,7 @@ def sensor_sentences(standing: Standing) -> list[str]:
     ]
 
 
-def sensors(standing: Standing) -> Html:
+def sensors(standing: Standing) -> Section:
     """Faults that last, and those that are over."""
     known = standing.monitor.faults_
     parts = [bullets(sensor_sentences(standing))]

@@ -6,15 +6,15 @@ from collections.abc import Hashable
 
 import pandas as pd
 
-from skthermo._formatting import counted, counted_number, duration_text, listed, significant
-from skthermo.reporting._html import Html, element, paragraphs, section, table
+from skthermo._tables.text import counted, counted_number, duration_text, listed, significant
+from skthermo.reporting._html import Section, element, paragraphs, section, table
 from skthermo.reporting.service._standing import ONE_DAY, Standing, moment
 
 MOST_LISTED = 30  # largest number of events in the table
 COLUMNS = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
 
 
-def events(standing: Standing) -> Html:
+def events(standing: Standing) -> Section:
     """All events, the newest first."""
     known = standing.events
     if not len(known):
@@ -57,7 +57,7 @@ def _failing(standing: Standing, event: pd.Series) -> str:
     return f"{listed(names)} failed at that time" if names else ""
 
 
-def promise(standing: Standing) -> Html:
+def promise(standing: Standing) -> Section:
     """What was asked for, what is expected, and how many events there were."""
     monitor, promised = standing.monitor, standing.monitor.promise_
     asked = counted_number(monitor.false_alarms_per_year, "false alarm")
@@ -92,6 +92,7 @@ def promise(standing: Standing) -> Html:
         "What the promise means",
         paragraphs(*sentences),
         table("The rule for events, for the engineer.", ["What", "Value"], rows),
+        link="The promise",
     )
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pandas as pd
 
-from skthermo._formatting import counted, significant
+from skthermo._tables.text import counted, significant
 from skthermo.plotting import MonitorDisplay
 from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
@@ -74,7 +72,7 @@ def draw_drift(standing: Standing) -> Html | None:
     return _drawn(standing, f"Change of stiffness over time of the groups {names}.", parts=["drift"], height=3.0)
 
 
-def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4, **options: Any) -> Html:
+def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4, **options: object) -> Html:
     """A display of the monitor, with its legend below."""
 
     def make() -> MonitorDisplay:

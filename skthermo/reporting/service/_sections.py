@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pandas as pd
 
-from skthermo._formatting import counted, share_text
-from skthermo.reporting._html import Html, element, figure, paragraphs, section, table
+from skthermo._tables.text import counted, share_text
+from skthermo.monitoring import Monitor
+from skthermo.reporting._html import Html, Section, element, figure, paragraphs, section, table
 from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.service._changes import drift, sensors
 from skthermo.reporting.service._events import events, promise
@@ -18,21 +17,21 @@ from skthermo.reporting.service._today import today
 MOST_REASONS = 12  # largest number of reasons in a table
 
 
-def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[Html, dict[str, tuple[str, Html]]]:
-    """What stands above the sections, and these with their titles; one of many has smaller drawings."""
-    return paragraphs(*introduction(standing.monitor)), {
-        "today": ("Today", today(standing)),
-        "events": ("Events", events(standing)),
-        "index": ("Damage index", _index(standing, is_one_of_many)),
-        "drift": ("Slow change", drift(standing, is_drawn=not is_one_of_many)),
-        "sensors": ("Sensors", sensors(standing)),
-        "unjudged": ("What was not judged", unjudged(standing)),
-        "promise": ("The promise", promise(standing)),
-        "settings": ("Settings", _settings(standing.monitor)),
-    }
+def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[Html, list[Section]]:
+    """What stands above the sections, and these, the settings last; one of many has smaller drawings."""
+    return paragraphs(*introduction(standing.monitor)), [
+        today(standing),
+        events(standing),
+        _index(standing, is_one_of_many),
+        drift(standing, is_drawn=not is_one_of_many),
+        sensors(standing),
+        unjudged(standing),
+        promise(standing),
+        _settings(standing.monitor),
+    ]
 
 
-def introduction(monitor: Any) -> list[str]:
+def introduction(monitor: Monitor) -> list[str]:
     """What the monitor learned from, and how many records have come since."""
     first, last = (moment(time) for time in monitor.trained_.index[[0, -1]])
     n_records = int(monitor.counts_["n_records"])
@@ -48,7 +47,7 @@ def introduction(monitor: Any) -> list[str]:
     return sentences
 
 
-def _index(standing: Standing, is_small: bool) -> Html:
+def _index(standing: Standing, is_small: bool) -> Section:
     """Damage indices of the last month and of the last year; a small drawing shows the days of the year only."""
     title = "Damage index"
     if not standing.has_records:
@@ -70,7 +69,7 @@ def _index(standing: Standing, is_small: bool) -> Html:
     return section("index", title, paragraphs(text), figure(caption, drawn + draw_days(standing)))
 
 
-def unjudged(standing: Standing) -> Html:
+def unjudged(standing: Standing) -> Section:
     """How many records were not judged, and why."""
     counts, judged, days = standing.monitor.counts_, standing.judged, standing.monitor.days_
     title = "What was not judged"
@@ -103,7 +102,7 @@ def unjudged(standing: Standing) -> Html:
     }
     rows = [[f"Records {text}", f"{int(counts[name]):,}"] for name, text in names.items() if counts.get(name)]
     parts.append(table("What else was noticed.", ["What", "Number"], rows) if rows else Html())
-    return section("unjudged", title, *(part for part in parts if part))
+    return section("unjudged", title, *parts)
 
 
 def _reasons(caption: str, reasons: pd.Series) -> Html:
@@ -115,13 +114,11 @@ def _reasons(caption: str, reasons: pd.Series) -> Html:
     return table(caption, ["Reason", "Records"], rows) if rows else Html()
 
 
-def _settings(monitor: Any) -> Html:
+def _settings(monitor: Monitor) -> Section:
     """Parameters of the monitor, of its detector and of the model."""
     detector = monitor.detector_
     parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
-    rows = [[f"monitor: {name}", v] for name, v in parameters(monitor) if name not in ("detector", "fem")]
-    rows += [[f"{part}: {name}", v] for part, one in parts.items() for name, v in parameters(one)]
-    rows += [] if monitor.fem is None else [[f"model: {name}", v] for name, v in parameters(monitor.fem)]
+    rows = parameters({"monitor": monitor, **parts, "model": monitor.fem}, but=("monitor: detector", "monitor: fem"))
     targets = [str(name) for name in monitor.targets_]
     others = [str(name) for name in monitor.baseline_.columns if name not in set(monitor.targets_)]
     rows += [["natural frequencies", element("code", ", ".join(targets))]]

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime, tzinfo
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from skthermo._formatting import SPACE, counted, duration_text, listed, percent
+from skthermo._tables.text import SPACE, counted, duration_text, listed, percent
+from skthermo.monitoring import Monitor
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
+Time: TypeAlias = str | datetime | None
 ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not judged"
+
+
+class Doubt(NamedTuple):
+    """Why it is not known whether a structure is healthy: since when, in a line and in a sentence."""
+
+    since: pd.Timestamp
+    headline: str
+    explanation: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +34,13 @@ class Standing:
     ``error`` says why the newest records could not be handed to the monitor, if they could not.
     """
 
-    monitor: Any
+    monitor: Monitor
     now: pd.Timestamp
     limit: float
     error: str = ""
 
     @classmethod
-    def of(cls, monitor: Any, now: Any = None, limit: float = 0.1, error: str = "") -> Standing:
+    def of(cls, monitor: Monitor, now: Time = None, limit: float = 0.1, error: str = "") -> Standing:
         """Now is by the clock where no time is given."""
         return cls(monitor, time_of(now, monitor.last_.tz), limit, error)
 
@@ -95,15 +106,7 @@ class Standing:
             return "Healthy: no alarm"
         if self.state == ATTENTION:
             return "No alarm, but much stiffness has been lost slowly"
-        if self.error:
-            return "Not judged: its new records could not be used"
-        if not self.has_records:
-            return "Not judged: no record since the baseline"
-        if self.is_ahead:
-            return "Not judged: the dates of the records are wrong"
-        if self.is_silent:
-            return f"Not judged: no record since {moment(self.last)}"
-        return f"Not judged since {moment(self.unjudged_since)}"
+        return self.doubt.headline
 
     def explanation(self) -> str:
         """What the headline means, and why."""
@@ -123,22 +126,26 @@ class Standing:
             )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
+        return f"{self.doubt.explanation}. Whether the structure is healthy now is not known."
+
+    @property
+    def doubt(self) -> Doubt:
+        """Why it is not known whether the structure is healthy, and since when."""
+        last, gone = moment(self.last), duration_text(self.now - self.last)
         if self.error:
-            return f"{self.error}. Whether the structure is healthy now is not known."
+            return Doubt(self.last, "Not judged: its new records could not be used", self.error)
         if not self.has_records:
-            return f"The baseline ends on {moment(self.last)}; whether the structure is healthy now is not known."
+            text = f"No record has come since the baseline, which ends on {last}"
+            return Doubt(self.last, "Not judged: no record since the baseline", text)
         if self.is_ahead:
-            return (
-                f"The newest record is of {moment(self.last)}, and this page was written on {moment(self.now)}. As "
-                "long as the clocks do not agree, it is not known whether new records are missing."
-            )
+            text = f"The newest record is of {last}, a time after {moment(self.now)}, when this page was written"
+            return Doubt(self.last, "Not judged: the dates of the records are wrong", text)
         if self.is_silent:
-            return (
-                f"A record usually comes every {self.step_text}; the newest is {duration_text(self.now - self.last)} "
-                "old. Whether the structure is healthy now is not known."
-            )
+            text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
+            return Doubt(self.last, f"Not judged: no record since {last}", text)
         reason = str(self.judged["reason"].iloc[-1]) if len(self.judged) else ""
-        return f"Because: {reason or 'no reason is given'}. Whether the structure is healthy now is not known."
+        since = self.unjudged_since
+        return Doubt(since, f"Not judged since {moment(since)}", f"Because: {reason or 'no reason is given'}")
 
     @property
     def step_text(self) -> str:
@@ -187,7 +194,7 @@ class Standing:
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
 
 
-def time_of(now: Any, zone: Any = None) -> pd.Timestamp:
+def time_of(now: Time, zone: tzinfo | None = None) -> pd.Timestamp:
     """A time in the zone of the records, by the clock where none is given."""
     try:
         time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
@@ -200,7 +207,7 @@ def time_of(now: Any, zone: Any = None) -> pd.Timestamp:
     return time
 
 
-def moment(time: Any, *, is_short: bool = False) -> str:
+def moment(time: Time, *, is_short: bool = False) -> str:
     """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
     if pd.isna(time):
         return ""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from skthermo._formatting import counted, listed, significant
-from skthermo.reporting._html import Html, bullets, element, joined, paragraphs, section
+from collections.abc import Iterable, Sequence
+
+from skthermo._tables.text import counted, listed, significant
+from skthermo.reporting._html import Html, Section, bullets, element, joined, paragraphs, section
 from skthermo.reporting.service._changes import drift_sentences, sensor_sentences
 from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment
 
@@ -14,7 +16,7 @@ SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATIO
 MOST_NAMED = 5  # largest number of events in a sentence
 
 
-def today(standing: Standing) -> Html:
+def today(standing: Standing) -> Section:
     """State, and what an owner should know, in a few sentences."""
     sentences = [*_newest(standing), *_events(standing), *sensor_sentences(standing)]
     sentences += drift_sentences(standing)
@@ -24,22 +26,25 @@ def today(standing: Standing) -> Html:
         "exceeds its threshold, and ends when it has stayed low for a while. An alarm does not prove damage, and "
         "healthy means that no change is seen, not that there is none."
     )
-    parts = [_banner(standing), bullets(sentences)]
-    steps = _what_to_do(standing)
-    if steps:
-        parts += [element("h3", "What to do"), bullets(steps)]
-    return section("today", "Today", *parts, element("h3", "What the words mean"), paragraphs(words))
+    state = banner(standing.state, moment(standing.now), standing.headline(), standing.explanation())
+    return first_section("Today", state, sentences, _what_to_do(standing), words)
 
 
-def _banner(standing: Standing) -> Html:
-    """The state as a symbol, a word and a sentence, in its colour."""
-    written = (
-        f"As of {moment(standing.now)}, when this page was written. A page that is older than it should be says "
-        "nothing of today."
+def first_section(title: str, state: Html, sentences: Iterable[str], steps: Sequence[str], words: str) -> Section:
+    """What an owner reads first: the state, what is known, what to do, and what the words mean."""
+    parts = [state, bullets(sentences)]
+    parts += [element("h3", "What to do"), bullets(steps)] if steps else []
+    return section("today", title, *parts, element("h3", "What the words mean"), paragraphs(words))
+
+
+def banner(state: str, written: str, headline: str, *sentences: str) -> Html:
+    """A state as a symbol, a line and some sentences in its colour, and the time when the page was written."""
+    as_of = (
+        f"As of {written}, when this page was written. A page that is older than it should be says nothing of today."
     )
-    lines = [element("p", standing.headline(), class_="headline"), element("p", standing.explanation())]
-    words = element("div", joined([*lines, element("p", written, class_="soft")]))
-    return element("div", symbol(standing.state), words, class_=f"state {standing.state.replace(' ', '-')}")
+    lines = [element("p", headline, class_="headline"), *(element("p", text) for text in sentences)]
+    words = element("div", joined([*lines, element("p", as_of, class_="soft")]))
+    return element("div", symbol(state), words, class_=f"state {state.replace(' ', '-')}")
 
 
 def symbol(state: str) -> Html:

@@ -1,6 +1,6 @@
 """Which damage a detector would find."""
 
-from skthermo.studies.detectability._arrangement import Arrangement
+from skthermo.studies.detectability._candidates import Arrangement
 from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
 from skthermo.studies.detectability._simulation import Measurement
 from skthermo.studies.detectability._study import DetectabilityStudy

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._pod_curve import PODCurve, bracket_of, pod_curve
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class FamilyRates:
     """Results of one detector for one family and source, with the highest upper bound of its false alarms there."""
 
     name: str
@@ -78,11 +78,11 @@ class Family:
             raise ValueError(f"family {self.name!r}: {error}") from error
 
 
-def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], Family]:
+def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], FamilyRates]:
     """Families by detector, name and source."""
     healthy = results[results["measure"] == "PFA"].groupby(["detector", "source"])["highest"].max()
     damaged = results[(results["measure"] == "POD") & results["family"].notna()]
     return {
-        key: Family(key[1], key[2], rows, float(healthy.get((key[0], key[2]), np.nan)), confidence)
+        key: FamilyRates(key[1], key[2], rows, float(healthy.get((key[0], key[2]), np.nan)), confidence)
         for key, rows in damaged.groupby(["detector", "family", "source"], sort=False)
     }

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, t
 
-from skthermo._arrays import Array
-from skthermo._times import correlation_time
+from skthermo._tables.arrays import Array
+from skthermo._tables.times import correlation_times
 
 BLOCK = 10  # length of a block, in correlation times
 LEAST_FREEDOM = 10  # fewest degrees of freedom of the variance; blocks are shortened to reach them
@@ -72,7 +72,7 @@ class Blocks:
         n_repeats, n_records = decisions.shape
         if whole_repeats:
             return cls(np.zeros(1, dtype=int), ~np.isnan(decisions))
-        time = np.mean([correlation_time(row) for row in _scatter(decisions)])
+        time = correlation_times(_scatter(decisions).T).mean()
         strata = max(n_repeats - 1, 1)
         number = max(n_records / (BLOCK * time), LEAST_FREEDOM / strata + (n_repeats == 1))
         number = int(np.clip(np.ceil(number), 1, n_records))

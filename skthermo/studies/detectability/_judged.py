@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._times import row_times, time_of
-from skthermo._warnings import warnings_of_detector
+from skthermo._estimators.warnings import warnings_of_detector
+from skthermo._tables.arrays import Array
+from skthermo._tables.times import row_times, time_of
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.scenarios import BaseScenario
 

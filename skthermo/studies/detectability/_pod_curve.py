@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
-from skthermo._arguments import check_flag
-from skthermo._arrays import Array, is_real, real_array
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import check_flag
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, is_real, real_array
 from skthermo.studies.detectability._intervals import clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity

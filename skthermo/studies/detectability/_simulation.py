@@ -10,12 +10,12 @@ import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike
 
-from skthermo._arrays import Array, as_columns, as_floats
-from skthermo._frames import column_names, frame_like
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import without_warnings
 from skthermo._io import run_jobs
-from skthermo._threads import single_blas_thread
+from skthermo._tables.arrays import Array, as_columns, as_floats
+from skthermo._tables.frames import column_names, frame_like
 from skthermo._validation import _num_samples
-from skthermo._warnings import without_warnings
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
 from skthermo.studies.detectability._waits import damaged_rows, transitions_of

@@ -8,34 +8,37 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._arguments import check_flag, check_jobs
-from skthermo._arrays import as_random_state, positive_integer
-from skthermo._threads import single_blas_thread
+from skthermo._estimators.arguments import check_jobs
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
+from skthermo._tables.arrays import Array, as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
-from skthermo._warnings import checked_once, warn_user, warnings_once
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._families import Family, families_of
-from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
+from skthermo.studies.detectability._findings import StudyFindings
+from skthermo.studies.detectability._judged import Judgement
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
-from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
     clean_frequencies,
 )
-from skthermo.studies.detectability._waits import soonest, waits_table
-from skthermo.studies.detectability._world_rates import WorldRates, sentences
+from skthermo.studies.detectability._world_rates import WorldRates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.worlds import Worlds
 
-MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
-
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
+
+
+def _found_attribute(name: str) -> Any:
+    """A property of a study: what its last run found, under this name."""
+    return property(
+        lambda study: getattr(study._found(), name), doc=f"``findings_.{name}``, as the class describes it."
+    )
 
 
 class DetectabilityStudy(BaseEstimator):
@@ -93,6 +96,8 @@ class DetectabilityStudy(BaseEstimator):
 
     Attributes
     ----------
+    findings_ : StudyFindings
+        All that the last `run` found, which nothing changes afterwards; the attributes and methods below read it.
     results_ : DataFrame
         What `run` returned.
     detectors_ : dict of str to detector
@@ -214,6 +219,21 @@ class DetectabilityStudy(BaseEstimator):
         self.random_state = random_state
         self.verbose = verbose
 
+    results_ = _found_attribute("table")
+    detectors_ = _found_attribute("detectors")
+    thresholds_ = _found_attribute("thresholds")
+    indices_ = _found_attribute("indices")
+    decisions_ = _found_attribute("decisions")
+    transitions_ = _found_attribute("transitions")
+    calibration_ = _found_attribute("calibration")
+    arrangements_ = _found_attribute("arrangements")
+    uncertainty_ = _found_attribute("uncertainty")
+    worlds_ = _found_attribute("worlds")
+    scenarios_ = _found_attribute("scenarios")
+    errors_ = _found_attribute("errors")
+    confidence_ = _found_attribute("confidence")
+    warnings_ = _found_attribute("warnings")
+
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -296,7 +316,7 @@ class DetectabilityStudy(BaseEstimator):
             candidates = judgement.ask(
                 detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts)
             )
-        with warnings_once("in the simulations of this study") as self.warnings_, single_blas_thread():
+        with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
@@ -305,42 +325,17 @@ class DetectabilityStudy(BaseEstimator):
                 simulation.first_repeat(judgement, measured, seeds[0])
         with stages.stage(f"other {n_repeats - 1} repeats"):
             simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
-        self.worlds_ = None
+        rates = None
         if worlds.parts:
             with stages.stage(f"{len(worlds.seeds)} worlds"):
                 left = simulation.without(judgement.errors)
-                self.worlds_ = WorldRates.of(left, judgement, worlds, self.n_jobs, max(self.verbose - 1, 0))
-        rows = judgement.ask(
-            candidates, lambda name: [one.summary(confidence) for one in judgement.records(name, scenarios)]
-        )
-        self._keep(judgement, candidates, scenarios, list(rows))
-        self.confidence_ = confidence
-        table = [rows.get(name, [{"detector": name, "error": self.errors_.get(name)}]) for name in detectors]
-        columns = list(next(iter(rows.values()))[0])
-        results = pd.DataFrame([row for some in table for row in some], columns=columns)
-        self.results_ = results if self.worlds_ is None else self.worlds_.banded(results, confidence)
-        self.uncertainty_ = None if self.worlds_ is None else self.worlds_.table()
-        self._warn_of_many_false_alarms()
-        return self.results_
-
-    def _keep(
-        self,
-        judgement: Judgement,
-        candidates: Mapping[str, Candidate],
-        scenarios: list[BaseScenario],
-        rows: Sequence[str],
-    ) -> None:
-        """Keep what the detectors that have not failed decided, and the errors of the others."""
-        self.errors_ = {name: f"{type(error).__name__}: {error}" for name, error in judgement.errors.items()}
-        self.scenarios_ = scenarios
-        self.detectors_ = {name: candidates[name].detector for name in rows}
-        self.thresholds_ = {name: candidates[name].threshold for name in rows}
-        self.arrangements_ = {name: candidates[name].arrangement for name in rows}
-        records = [one for name in rows for one in judgement.records(name, scenarios)]
-        self.indices_ = {(one.detector, one.scenario.name, one.source): one.damage_index for one in records}
-        self.decisions_ = {(one.detector, one.scenario.name, one.source): one.decisions for one in records}
-        self.transitions_ = {key: np.array(found) for key, found in judgement.transitions.items() if key[0] in rows}
-        self.calibration_ = {key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows}
+                rates = WorldRates.of(left, judgement, worlds, self.n_jobs, max(self.verbose - 1, 0))
+        self.findings_ = StudyFindings.of(judgement, candidates, scenarios, list(detectors), rates, confidence, texts)
+        doubt = self.findings_.many_false_alarms()
+        if doubt:
+            self.findings_ = replace(self.findings_, warnings=[*texts, doubt])
+            warn_user(doubt, "many false alarms")
+        return self.findings_.table
 
     def pod_curve(
         self, family: str, source: str = "data-informed", *, log: bool = False, detector: str | None = None
@@ -374,9 +369,7 @@ class DetectabilityStudy(BaseEstimator):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        found = self._family(family, source, detector)
-        curves = [] if self.worlds_ is None else self.worlds_.curves(found, log)
-        return replace(found.curve(log), worlds=tuple(curves))
+        return self._found().pod_curve(family, source, log=log, detector=detector)
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -415,27 +408,7 @@ class DetectabilityStudy(BaseEstimator):
             If a curve has no finite slope or lies outside the bounds of some tested severities, or there is none
             because the POD does not increase. Of texts that differ in their numbers only, the first is given.
         """
-        check_probability(level, "level")
-        if method not in ("grid", "curve"):
-            raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
-        families = {key: one for key, one in families_of(self._results(), self.confidence_).items() if len(one.tested)}
-        if detector is not None or self.results_["detector"].nunique() == 1:
-            name = self.detector_name(detector)
-            families = {key[1:]: one for key, one in families.items() if key[0] == name}
-        with warnings_once("for other families or sources"):
-            found = {
-                key: family.on_grid(level) if method == "grid" else family.on_curve(level)
-                for key, family in families.items()
-            }
-        if not found:
-            raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
-        names = ["detector", "family", "source"][-len(next(iter(found))) :]
-        index = pd.MultiIndex.from_tuples(list(found), names=names)
-        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
-        if self.worlds_ is None:
-            return table
-        bands = [self.worlds_.smallest(one, level, method, self.confidence_) for one in families.values()]
-        return table.assign(**dict(zip(["band_lowest", "band_highest"], np.transpose(bands), strict=True)))
+        return self._found().minimum_detectable_damage(level, method, detector)
 
     def time_to_find(
         self,
@@ -533,21 +506,9 @@ class DetectabilityStudy(BaseEstimator):
         bottom 10 %  3 days  13 days
         bottom 20 %  1 days   2 days
         """
-        results = self._results()
-        check_probability(level, "level")
-        asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
-        known = results["source"].dropna().unique().tolist()
-        if source not in known:
-            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
-        chosen = None if detector is None else self.detector_name(detector)
-        scenarios = {one.name: one for one in self.scenarios_}
-        records = {
-            key: JudgedRecords(key[0], scenarios[key[1]], source, self.indices_[key], decisions)
-            for key, decisions in self.decisions_.items()
-            if key[2] == source and chosen in (None, key[0])
-        }
-        table = waits_table(records, self.transitions_, within, level, asked)
-        return soonest(table, within) if check_flag(smallest, "smallest") else table
+        return self._found().time_to_find(
+            within, level, source=source, confidence=confidence, detector=detector, smallest=smallest
+        )
 
     def is_undetected(self, family: str, source: str = "data-informed", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.
@@ -573,7 +534,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there is no such family or source, or there are several detectors and none is named.
         """
-        return self._family(family, source, detector).is_undetected
+        return self._found().is_undetected(family, source, detector)
 
     def ranking(
         self,
@@ -665,33 +626,42 @@ class DetectabilityStudy(BaseEstimator):
         'healthy' raises a false alarm within 1 day in 2, within 7 days in 10, within 30 days in 37 of 100 cases.
         'bottom 10 %' is found within 13 days in 95 of 100 cases; a healthy structure alarms by then in 18 of 100.
         """
-        rows = self._results()
-        limit = check_probability(max_false_alarms, "max_false_alarms")
-        asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
-        if by not in ("pod", "pod_equal"):
-            raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_equal'")
-        known = rows["source"].dropna().unique().tolist()
-        if source not in known:
-            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
-        rows = rows[rows["source"] == source]
-        for measure, kind in (("PFA", "healthy"), ("POD", "damaged")):
-            if not (rows["measure"] == measure).any():
-                raise ValueError(
-                    f"source {source!r} has the scenarios {rows['scenario'].unique().tolist()}, none of them {kind}; "
-                    "expected healthy and damaged ones"
-                )
-        calibration = {name: decisions for (name, of), decisions in self.calibration_.items() if of == source}
-        if by == "pod_equal" and not calibration:
-            raise ValueError(f"source {source!r} has no healthy records to move thresholds by; expected by='pod'")
-        scenarios = {one.name: one for one in self.scenarios_}
-        records = [
-            JudgedRecords(key[0], scenarios[key[1]], source, self.indices_[key], decisions)
-            for key, decisions in self.decisions_.items()
-            if key[2] == source
-        ]
-        if asked != self.confidence_:
-            rows = pd.DataFrame([one.summary(asked) for one in records])
-        return rank(records, rows, calibration, self.errors_, limit, asked, by)
+        return self._found().ranking(max_false_alarms, source, confidence, by=by)
+
+    def labelled_scores(
+        self, detector: str | None = None, source: str = "data-informed", scenarios: Sequence[str] | None = None
+    ) -> tuple[NDArray[np.bool_], Array]:
+        """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+        source : str, default="data-informed"
+            "data-informed" or "reference".
+        scenarios : sequence of str, optional
+            Damaged states whose records are put together, from the onset of damage on; by default all.
+
+        Returns
+        -------
+        is_damaged : ndarray of shape (n_records,)
+            Records of all repeats; those that are not judged are left out.
+        scores : ndarray of shape (n_records,)
+            Minus the decision function: positive is an alarm.
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If the detector is not known, or it has judged no healthy or no damaged records of these scenarios.
+
+        Examples
+        --------
+        Found damage over false alarms, for all thresholds, is ``RocCurveDisplay.from_predictions(
+        *study.labelled_scores("raw"), name="raw")`` of scikit-learn.
+        """
+        return self._found().labelled_scores(detector, source, scenarios)
 
     def summary(self, max_false_alarms: float = 0.02, source: str = "data-informed") -> str:
         """Which detector finds most, and which are not clearly worse, in plain sentences.
@@ -716,13 +686,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             As `ranking`.
         """
-        ranking = self.ranking(max_false_alarms, source)
-        waits = self.time_to_find(source=source, detector=ranking.index[0], smallest=True)
-        soon = [f"{row['scenario']!r} {row['text']}." for _, row in waits.iterrows()]
-        told = "\n".join([in_words(ranking, max_false_alarms), *soon])
-        if self.worlds_ is None or source != SIMULATED:
-            return told
-        return f"{told}\n{self.uncertainty_summary(ranking.index[0])}"
+        return self._found().summary(max_false_alarms, source)
 
     def uncertainty_summary(self, detector: str | None = None) -> str:
         """What the bands hold, and which part of the widest one is the largest, in plain sentences.
@@ -745,7 +709,7 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there are several detectors and none is named, or the one that is named has no results.
         """
-        return sentences(self._results(), self.uncertainty_, self.detector_name(detector), self.confidence_)
+        return self._found().uncertainty_summary(detector)
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.
@@ -767,42 +731,12 @@ class DetectabilityStudy(BaseEstimator):
         ValueError
             If there are several detectors and none is named, or the one that is named has no results.
         """
-        rows = self._results()
-        known = rows.loc[rows["error"] == "", "detector"].unique().tolist()
-        if detector is None and rows["detector"].nunique() == 1:
-            return known[0]
-        if not isinstance(detector, str) or detector not in known:
-            raise ValueError(f"detector is {detector!r:.100}; expected the name of one of {known}")
-        return detector
+        return self._found().detector_name(detector)
 
-    def _results(self) -> pd.DataFrame:
-        if not hasattr(self, "results_"):
+    def _found(self) -> StudyFindings:
+        if not hasattr(self, "findings_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")
-        return self.results_
-
-    def _family(self, family: str, source: str, detector: str | None) -> Family:
-        name = self.detector_name(detector)
-        found = {key: one for key, one in families_of(self._results(), self.confidence_).items() if key[0] == name}
-        is_known = isinstance(family, str) and isinstance(source, str)
-        if not is_known or (name, family, source) not in found:
-            known = [f"{f!r} ({s})" for _, f, s in found]
-            raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
-        return found[name, family, source]
-
-    def _warn_of_many_false_alarms(self) -> None:
-        """Warn if a detector takes most simulated records of the healthy structure for damaged."""
-        rows = self.results_[(self.results_["measure"] == "PFA") & (self.results_["source"] == SIMULATED)]
-        many = rows[rows["lowest"] > MANY_FALSE_ALARMS]
-        if len(many):
-            names = ", ".join(map(repr, many["detector"].unique()))
-            text = (
-                f"{many['rate'].iloc[0]:.0%} of the simulated records of scenario {many['scenario'].iloc[0]!r}, where "
-                "nothing is changed, raise an alarm; expected a baseline in Hz of the structure that the chain has "
-                "learned, and weather in degrees Celsius as in the baseline"
-                f"{f' (detectors {names})' if self.results_['detector'].nunique() > 1 else ''}"
-            )
-            self.warnings_.append(text)
-            warn_user(text, "many false alarms")
+        return self.findings_
 
     def _checked_detectors(self) -> dict[str, Any]:
         """Detectors by name; an error for what is none."""

@@ -11,19 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_names, check_size
-from skthermo._arrays import as_columns, as_floats, as_random_state, positive_integer
-from skthermo._frames import column_names
-from skthermo._threads import single_blas_thread
-from skthermo._times import has_stamps, row_times, time_of
+from skthermo._estimators.arguments import check_names, check_size
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import warn_user, warnings_once
+from skthermo._tables.arrays import as_columns, as_floats, as_random_state, positive_integer
+from skthermo._tables.frames import column_names
+from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
-from skthermo._warnings import warn_user, warnings_once
+from skthermo.studies.detectability._candidates import SeenColumns
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.detectability._pod_curve import check_probability
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.detectability._task_scorer import TaskScorer
-from skthermo.studies.detectability._view import View
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 
 YEAR = 365.2425  # days
@@ -409,7 +409,7 @@ def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
         stamped = T if has_stamps(T) else F
         index = stamped.index if has_stamps(stamped) else None
         return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
-    known = View(names, n_sensors, np.arange(len(names)), False)._positions_of(baseline, "the baseline")
+    known = SeenColumns(names, n_sensors, np.arange(len(names)), False)._positions_of(baseline, "the baseline")
     index = baseline.index if has_stamps(baseline) else None
     return pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
 

@@ -12,11 +12,11 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._arrays import Array
-from skthermo._warnings import warnings_once
+from skthermo._estimators.warnings import warnings_once
+from skthermo._tables.arrays import Array
+from skthermo.studies.detectability._candidates import has_targets
 from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._study import check_detector
-from skthermo.studies.detectability._view import has_targets
 
 FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, is_real
-from skthermo._formatting import counted, duration_text
-from skthermo._times import has_stamps, row_times, time_of
+from skthermo._tables.arrays import Array, is_real
+from skthermo._tables.text import counted, duration_text
+from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
 from skthermo.studies.detectability._judged import JudgedRecords
 

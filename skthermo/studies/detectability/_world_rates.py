@@ -11,12 +11,12 @@ from joblib import delayed
 from scipy.special import expit, logit
 from scipy.stats import t
 
-from skthermo._arrays import Array
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
-from skthermo._threads import single_blas_thread
-from skthermo._warnings import warn_user, without_warnings
+from skthermo._tables.arrays import Array
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._families import Family
+from skthermo.studies.detectability._families import FamilyRates
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement, Key
 from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
@@ -93,7 +93,7 @@ class WorldRates:
 
         Student's law on the scale of the logit: of few worlds, quantiles are hardly known.
         """
-        spread, number = Spread.of(self.logits(key)), len(self.rates[key])
+        spread, number = WorldSpread.of(self.logits(key)), len(self.rates[key])
         variance = spread.between + self.with_noise * spread.within
         margin = t.ppf((1 + confidence) / 2, number - 1) * np.sqrt(variance * (1 + 1 / number))
         lowest, highest = self._rates(spread.mean + np.array([-margin, margin]), key)
@@ -117,7 +117,7 @@ class WorldRates:
                 results.loc[row, ["band_lowest", "band_highest"]] = self.band(key, confidence)
         return results
 
-    def smallest(self, family: Family, level: float, method: str, confidence: float) -> tuple[float, float]:
+    def smallest(self, family: FamilyRates, level: float, method: str, confidence: float) -> tuple[float, float]:
         """Band of the smallest severity of a family that is detected reliably."""
         severities, rates = family.tested["severity"].to_numpy(dtype=float), self._campaigns(family)
         if not len(rates):
@@ -132,7 +132,7 @@ class WorldRates:
         lowest, highest = (np.quantile(found, q, method=m) for q, m in ((tail, "lower"), (1 - tail, "higher")))
         return float(sign * lowest), float(sign * highest)
 
-    def curves(self, family: Family, log: bool = False) -> list[PODCurve]:
+    def curves(self, family: FamilyRates, log: bool = False) -> list[PODCurve]:
         """Fitted curves of all campaigns of all worlds that have one."""
         tested, curves = family.tested, []
         n = tested["n_effective"] / tested["n_repeats"]
@@ -141,7 +141,7 @@ class WorldRates:
                 curves.append(pod_curve(tested["severity"], row * n, n, log=log))
         return [curve for curve in curves if np.isfinite(curve.slope)]
 
-    def _campaigns(self, family: Family) -> Array:
+    def _campaigns(self, family: FamilyRates) -> Array:
         """Rates of single campaigns, (n_campaigns, n_severities); none of measured records."""
         keys = list(zip(family.tested["detector"], family.tested["scenario"], strict=True))
         if family.source != SIMULATED or not all(key in self.rates for key in keys):
@@ -162,14 +162,14 @@ class WorldRates:
         """Standard deviation of the rate due to each part."""
         steps = self.rates[key]
         changes = np.concatenate([steps[:, :1], np.diff(steps, axis=1)], axis=1)
-        deviations = {"noise": np.sqrt(Spread.of(steps[:, -1]).within)} if self.with_noise else {}
+        deviations = {"noise": np.sqrt(WorldSpread.of(steps[:, -1]).within)} if self.with_noise else {}
         for number, part in enumerate(self.parts):
-            deviations[part] = np.sqrt(Spread.of(changes[:, number]).between)
+            deviations[part] = np.sqrt(WorldSpread.of(changes[:, number]).between)
         return deviations
 
 
 @dataclass(frozen=True)
-class Spread:
+class WorldSpread:
     """Mean of values, (n_worlds, n_draws), and their variances between worlds and within them."""
 
     mean: float
@@ -177,7 +177,7 @@ class Spread:
     within: float
 
     @classmethod
-    def of(cls, values: Array) -> "Spread":
+    def of(cls, values: Array) -> "WorldSpread":
         """Analysis of variance of values, (n_worlds, n_draws)."""
         means, within = values.mean(axis=1), float(values.var(axis=1, ddof=1).mean())
         between = max(float(means.var(ddof=1)) - within / values.shape[1], 0.0)

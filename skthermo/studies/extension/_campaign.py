@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import column_names
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import column_names
 from skthermo.studies.detectability import Measurement
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import clone
 
-from skthermo._arguments import check_noise, integer_row
-from skthermo._arrays import Array, as_floats, as_random_state, positive_integer, real_array
-from skthermo._frames import check_same_rows, column_names
+from skthermo._estimators.arguments import check_noise, integer_row
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import warn_user, warnings_once, without_warnings
 from skthermo._io import run_jobs
-from skthermo._threads import single_blas_thread
-from skthermo._warnings import warn_user, warnings_once, without_warnings
+from skthermo._tables.arrays import Array, as_floats, as_random_state, positive_integer, real_array
+from skthermo._tables.frames import check_same_rows, column_names
 from skthermo.fem import linearise
 from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
 from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name

@@ -1,30 +1,28 @@
 """Which causes explain a shift of frequencies, and how probably."""
 
+from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior
+from skthermo.studies.identification._curves import Effects, ShiftComparison, cubic
+from skthermo.studies.identification._evidence import Observed
+from skthermo.studies.identification._explanations import Scale, screen
 from skthermo.studies.identification._identified import IdentifiedDamage
 from skthermo.studies.identification._identify import compared, identify_damage
-from skthermo.studies.identification.measured import Shift, observe
-from skthermo.studies.identification.weighing import (
-    SOMETHING_ELSE,
-    Cause,
-    Comparison,
-    DamagePrior,
-    Observed,
-    Posterior,
-    Scale,
-    screen,
-)
+from skthermo.studies.identification._observe import observe
+from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._shift import FrequencyShift
 
 __all__ = [
     "SOMETHING_ELSE",
     "Cause",
-    "Comparison",
+    "ShiftComparison",
     "DamagePrior",
+    "Effects",
     "IdentifiedDamage",
     "Observed",
     "Posterior",
     "Scale",
-    "Shift",
+    "FrequencyShift",
     "compared",
+    "cubic",
     "identify_damage",
     "observe",
     "screen",

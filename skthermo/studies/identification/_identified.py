@@ -1,21 +1,373 @@
-"""Identified damage, as `identify_damage` returns it."""
+"""Identified damage, as `identify_damage` returns it, and what it says in sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo._formatting import SPACE
-from skthermo.studies.identification._sentences import answer, limits, warnings
-from skthermo.studies.identification._told import told
-from skthermo.studies.identification.measured import ComparedRecords
-from skthermo.studies.identification.weighing import DamagePrior
+from skthermo._effects.changes import HIGHEST_SEVERITY
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import SPACE, chance_text, listed, percent
+from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
+from skthermo.studies.identification._observe import ComparedRecords
 from skthermo.studies.scenarios import UncertainDamage
 
-UNLIKELY = 0.05  # probability of a misfit by chance below which it is said
+ALIKE = 0.95  # cosine between effects from which on causes that are confused are said together
+TOLD = {
+    "damage": ("a loss of {size}{of stiffness} in {name}", "of {size} in {name}", ""),
+    "stiffening": ("a gain of {size}{of stiffness} in {name}", "of {size} in {name}", " stiffer"),
+    "lower": ("a fall of {size} in {name}", "of {size} in {name}", " lower"),
+    "higher": ("a rise of {size} in {name}", "of {size} in {name}", " higher"),
+    "mass": ("added mass of {size} of {name}", "of {size} of {name}", ""),
+}
+"""What is said of a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
+
+NAMED, MOST_NAMED = 0.01, 4
+"""Probability from which on another explanation is named, and the largest number of those that are."""
+SURE = 0.9  # probability from which on the most probable explanation is not followed by averages over all
+LIKELY = 0.1  # probability from which on a cause is named among the averages
+RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is told
+CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
+PILED_UP = 1.05  # standard errors between the mean of an exponential law and its bound, with some margin
+EVEN = 0.1  # relative scatter of shifts up to which they count as even
+
+
+def either(names: Sequence[str]) -> str:
+    """One of these names, in a sentence."""
+    return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of one cause there is, and its 90 % band."""
+
+    cause: str
+    kind: str
+    value: float
+    lowest: float
+    highest: float
+
+    @property
+    def size(self) -> str:
+        """The amount, with the digits that its band carries."""
+        return f"{self._number(self.value)}{SPACE}%"
+
+    @property
+    def band(self) -> str:
+        """The band, from the smaller to the larger amount."""
+        low, high = sorted((self.lowest, self.highest), key=abs)
+        return f"between {self._number(low)} and {self._number(high)}{SPACE}%"
+
+    @property
+    def saying(self) -> str:
+        """What is said of it: a key of ``TOLD``."""
+        return self.kind if self.kind != "parameter" else "lower" if self.value < 0 else "higher"
+
+    @property
+    def subject(self) -> str:
+        """The name of what changed, without the direction."""
+        return self.cause.removesuffix(TOLD[self.saying][2])
+
+    def _number(self, value: float) -> str:
+        width = abs(self.highest - self.lowest)
+        return f"{100 * abs(value):.{0 if width >= 0.03 else 1 if width >= 0.003 else 2}f}"
+
+    def agrees(self, other: Amount) -> bool:
+        """Whether another cause's amount is of the same kind and within the band of this one."""
+        return self.saying == other.saying and self.lowest <= other.value <= self.highest
+
+    def resembles(self, other: Amount) -> bool:
+        """Whether another amount of the same cause differs by no more than the width of the band."""
+        return abs(self.value - other.value) <= abs(self.highest - self.lowest)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What may have changed, how much, and how probable that is, as it is told.
+
+    Each of ``changes`` holds the amounts of causes of which one has changed, the most probable first.
+    """
+
+    changes: tuple[tuple[Amount, ...], ...]
+    has_else: bool
+    probability: float
+
+    @property
+    def is_healthy(self) -> bool:
+        """Whether nothing has changed."""
+        return not self.changes and not self.has_else
+
+    @property
+    def is_else(self) -> bool:
+        """Whether something has changed, and none of the causes that were sought."""
+        return not self.changes and self.has_else
+
+    @property
+    def label(self) -> str:
+        """Causes with their amounts, for a table or a drawing."""
+        parts = [f"{either([one.cause for one in amounts])} {amounts[0].size}" for amounts in self.changes]
+        return ", ".join(parts + [SOMETHING_ELSE] * self.has_else) or NO_DAMAGE
+
+    def beside(self, first: Told) -> str:
+        """The one thing that it holds beside another explanation, if the rest is about the same; else nothing."""
+        known = {amounts[0].cause: amounts[0] for amounts in first.changes}
+        own = [amounts for amounts in self.changes if amounts[0].cause not in known]
+        shared = [amounts[0] for amounts in self.changes if amounts[0].cause in known]
+        is_same = len(shared) == len(known) and all(known[one.cause].resembles(one) for one in shared)
+        if first.is_healthy or not is_same or len(own) + self.has_else - first.has_else != 1:
+            return ""
+        return _phrase(own[0], False, False).removeprefix("a loss of ").rstrip(",") if own else SOMETHING_ELSE
+
+    def phrase(self, in_full: bool = False) -> str:
+        """Causes with their amounts as part of a sentence; in full with what is lost, and the bands."""
+        if self.is_else:
+            return "something else than damage of these groups"
+        said: list[str] = []
+        for place, amounts in enumerate(self.changes):
+            is_further = place > 0 and amounts[0].saying == self.changes[place - 1][0].saying
+            said.append(_phrase(amounts, is_further, in_full))
+        said += [SOMETHING_ELSE] * self.has_else
+        joined = listed(said) if not any(part.endswith(",") for part in said) else " and ".join(said)
+        return joined.rstrip(",") or NO_DAMAGE
+
+
+def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
+    """One cause, or several that cannot be told apart; those whose amounts agree share them."""
+    first, texts = amounts[0], []
+    shared = [one for one in amounts if first.agrees(one)]
+    for one in [first, *(one for one in amounts if one not in shared)]:
+        saying = TOLD[one.saying][is_further or (one is not first and one.saying == first.saying)]
+        names = either([other.subject for other in (shared if one is first else [one])])
+        text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
+        texts.append(text + (f" ({one.band})" if in_full else ""))
+    return " or ".join(texts) + (", which these modes cannot tell apart," if len(amounts) > 1 else "")
+
+
+def told(found: IdentifiedDamage) -> list[Told]:
+    """Explanations, the most probable first; those that these modes cannot tell apart are one.
+
+    They differ only in causes that look alike, or in causes that these modes do not show.
+    """
+    sets = alike_sets(found.confused, found.similarity)
+    together: dict[frozenset[Any], list[tuple[float, tuple[str, ...]]]] = {}
+    known: set[tuple[str, ...]] = set()
+    for name, probability in found.explanations["probability"].items():
+        causes = causes_of(found, str(name))
+        seen = tuple(cause for cause in causes if cause not in found.unseen)
+        shown = seen if seen in known else causes
+        known.add(causes)
+        key = frozenset(next((group for group in sets if cause in group), cause) for cause in shown)
+        together.setdefault(key, []).append((float(probability), causes))
+    said = [_joined(found, members, sets) for members in together.values()]
+    return sorted(said, key=lambda one: -one.probability)
+
+
+def _joined(found: IdentifiedDamage, members: list[tuple[float, tuple[str, ...]]], sets: list[frozenset[str]]) -> Told:
+    """The most probable of the explanations with the fewest causes, and what its causes may be taken for."""
+    fewest = min(len(causes) for _, causes in members)
+    first, *others = (causes for _, causes in members if len(causes) == fewest)
+    changes = []
+    for cause in first:
+        if cause == SOMETHING_ELSE:
+            continue
+        alike = next((group for group in sets if cause in group), frozenset())
+        amounts = {cause: amount_of(found, first, cause)}
+        for causes in others:
+            for other in causes:
+                if other in alike and other not in first:
+                    amounts.setdefault(other, amount_of(found, causes, other))
+        changes.append(tuple(amounts.values()))
+    return Told(tuple(changes), SOMETHING_ELSE in first, sum(probability for probability, _ in members))
+
+
+def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
+    """The causes of an explanation by its name."""
+    amounts = found.estimates.index
+    named = [str(cause) for explanation, cause in amounts if explanation == name]
+    return (*named, SOMETHING_ELSE) if name.endswith(SOMETHING_ELSE) else tuple(named)
+
+
+def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
+    """How much of a cause there is within an explanation."""
+    row = found.estimates.loc[(" + ".join(causes), cause)]
+    values = (float(row[name]) for name in ("severity", "lowest", "highest"))
+    return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
+
+
+def alike_sets(confused: Sequence[Sequence[str]], similarity: pd.DataFrame) -> list[frozenset[str]]:
+    """Sets of causes whose effects are nearly the same, among those that are confused."""
+    sets: list[frozenset[str]] = []
+    for members in confused:
+        for one, other in combinations(members, 2):
+            if similarity.loc[one, other] >= ALIKE:
+                touched = [group for group in sets if one in group or other in group]
+                joined = frozenset({one, other}).union(*touched)
+                sets = [group for group in sets if group not in touched] + [joined]
+    return sets
+
+
+def answer(found: IdentifiedDamage) -> Iterator[str]:
+    """What is most probable, how probable, what else could be."""
+    explanations = told(found)
+    first, *others = explanations
+    shown = " that these modes show" if found.unseen else ""
+    yield (
+        f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
+        f"{chance_text(first.probability)}."
+    )
+    if first.has_else:
+        what = "No damage of these groups" if first.is_else else "Damage of these groups alone hardly"
+        yield f"{what} explains the shifts; {_departure(found)}."
+        yield f"Likely causes: {likely_causes(found)}."
+    yield from _others(first, others)
+    if not first.is_healthy:
+        unchanged = sum(one.probability for one in explanations if one.is_healthy)
+        nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
+        yield f"The probability {nothing} is {chance_text(unchanged)}."
+    if first.probability < SURE and not first.is_else:
+        yield from _averages(found, first)
+    if first.is_healthy:
+        yield from _unnoticed(found)
+
+
+def _others(first: Told, others: Sequence[Told]) -> Iterator[str]:
+    """What else could be: the most probable explanation with one thing more, then others."""
+    probable = [one for one in others if not one.is_healthy and one.probability >= NAMED]
+    more = {more: one for one in probable if (more := one.beside(first))}
+    named = [f"{extra} ({chance_text(one.probability)})" for extra, one in more.items()][:MOST_NAMED]
+    texts = [f"about the same and {either(named)}"] if named else []
+    different = [one for one in probable if one not in more.values()][:MOST_NAMED]
+    texts += [f"{one.phrase()} ({chance_text(one.probability)})" for one in different]
+    if texts:
+        yield f"It could also be: {'; '.join(texts)}."
+
+
+def _averages(found: IdentifiedDamage, first: Told) -> Iterator[str]:
+    """Causes that are likely over all explanations together, unless they are those of the first and sure."""
+    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unseen)]
+    told_first = {amounts[0].cause for amounts in first.changes}
+    if told_first.issuperset(table.index) and (table["probability"] >= SURE).all():
+        return
+    named = []
+    for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
+        amount = Amount(str(cause), row["kind"], row["severity"], row["lowest"], row["highest"])
+        word = "damaged" if row["kind"] == "damage" else "changed"
+        probability = f"{word} with probability {chance_text(row['probability'])}"
+        named.append(f"{cause} {amount.size} ({amount.band}; {probability})")
+    if named:
+        yield f"Averaged over all explanations: {'; '.join(named)}."
+
+
+def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
+    """What could be damaged all the same."""
+    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unseen)]
+    losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
+    if losses:
+        yield f"A loss of stiffness of up to {listed(losses)} could have gone unseen."
+
+
+def limits(found: IdentifiedDamage) -> Iterator[str]:
+    """What cannot be said of the place or the cause."""
+    best = told(found)[0]
+    for causes in found.confused:
+        yield f"{listed(causes)} cannot be told apart by these modes: only their common effect is known."
+    if found.unseen:
+        yield f"Damage in {either(found.unseen)} cannot be seen in these modes: nothing is known of it."
+    if best.is_healthy and found.p_value < RARE:
+        yield f"Yet a healthy structure shows such shifts with a probability of only {chance_text(found.p_value)}."
+    if np.isnan(found.misfit_p_value):
+        yield "There are no more shifts than causes, so that any shift can be explained: the fit proves little."
+    elif found.misfit_p_value < RARE and not best.has_else:
+        yield (
+            "The most probable explanation leaves something unexplained (probability by chance "
+            f"{chance_text(found.misfit_p_value)}): {_departure(found)}."
+        )
+    if found.rest >= NAMED:
+        yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
+
+
+def warnings(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
+    """What is doubtful, by kind and text."""
+    yield from found.records.warnings()
+    best = told(found)[0]
+    if found.confused:
+        sets = "; ".join(" and ".join(causes) for causes in found.confused)
+        yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
+    if found.unseen:
+        names = ", ".join(found.unseen)
+        yield "unseen groups", f"groups that these modes do not show, of which nothing is known: {names}"
+    highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
+    if highest:
+        yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
+    if best.has_else or found.misfit_p_value < RARE:
+        doubt = (
+            f"probability of something else {chance_text(found.probability_of_else)}"
+            if best.has_else
+            else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
+        )
+        yield (
+            "unexplained shifts",
+            f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
+            f"{likely_causes(found)}",
+        )
+
+
+def _is_at_bound(found: IdentifiedDamage, cause: str) -> bool:
+    """Whether the law of a severity piles up at its upper bound, so that its mean is a standard error below it."""
+    if cause not in found.table.index or found.table.loc[cause, "kind"] != "damage":
+        return False
+    amount = found.estimates.loc[(found.explanations.index[0], cause)]
+    return bool(amount["severity"] + PILED_UP * amount["standard_error"] >= HIGHEST_SEVERITY)
+
+
+def _departure(found: IdentifiedDamage) -> str:
+    """The mode that damage explains least, in standard errors."""
+    shifts = found.shifts
+    worst = int(np.nanargmax(np.abs(found.unexplained)))
+    measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))
+    error = float(shifts["standard_error"].iloc[worst])
+    return (
+        f"mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
+        f"{100 * error:.2f}{SPACE}%), of which these groups explain {_signed(explained)}"
+    )
+
+
+def likely_causes(found: IdentifiedDamage) -> str:
+    """What may have shifted the frequencies where damage does not: what the shifts suggest, then what is usual."""
+    known, rest = found.shifts[found.shifts["measured"].notna()], found.unexplained
+    measured, error = (known[name].to_numpy(dtype=float) for name in ("measured", "standard_error"))
+    n_rose, mean, worst = int((measured > CLEAR * error).sum()), float(measured.mean()), int(np.nanargmax(np.abs(rest)))
+    causes = []
+    if len(known) > 2 and measured.std() < EVEN * abs(mean):
+        causes.append(
+            f"another clock of the logger, or mass or stiffness all over the structure: all frequencies moved by about "
+            f"{_signed(mean)}"
+        )
+    elif n_rose and rest[worst] > 0 and not found.table["kind"].eq("stiffening").any():
+        causes.append(
+            f"strengthening, which was not sought (stiffening=...): {n_rose} of {len(known)} frequencies rose, that "
+            f"of mode {found.shifts.index[worst]} by {_signed(found.shifts['measured'].iloc[worst])}"
+        )
+    elif (np.abs(rest) > CLEAR).sum() == 1:
+        causes.append(f"another mode taken for mode {found.shifts.index[worst]}, which alone departs")
+    usual = "damage outside these groups, a change of mass or of a support, a wrong sensor, or a wrong model"
+    return "; or ".join([*causes, usual])
+
+
+def _signed(shift: float) -> str:
+    return f"{100 * shift + 0.0:+.2f}{SPACE}%".replace("-0.00", "+0.00")
+
+
+def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
+    """An explanation with its amounts, such as "side span 12 %, main stays 4 %"."""
+    sizes = [percent(abs(amount), ".2g" if abs(amount) < 0.995 else ".0f") for amount in amounts]
+    parts = [f"{cause} {size}" for cause, size in zip(causes, sizes, strict=False)]
+    return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +484,7 @@ class IdentifiedDamage:
     @property
     def is_unexplained(self) -> bool:
         """Whether the most probable explanation leaves more of the shifts unexplained than chance would."""
-        return self.misfit_p_value < UNLIKELY
+        return self.misfit_p_value < RARE
 
     @property
     def unexplained(self) -> Array:

@@ -7,29 +7,33 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike
+from scipy import stats
 
-from skthermo._arguments import check_jobs
-from skthermo._arrays import MatrixLike, as_floats, as_random_state
-from skthermo._frequency_effects import FrequencyEffects
+from skthermo._effects.changes import StructuralChanges
+from skthermo._effects.frequencies import FrequencyEffects
+from skthermo._estimators.arguments import check_jobs
+from skthermo._estimators.warnings import warn_each, without_warnings
 from skthermo._io import run_jobs
-from skthermo._warnings import warn_each, without_warnings
-from skthermo.studies.identification._findings import findings
-from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._separability import VISIBLE, errors_alone
-from skthermo.studies.identification.measured import ShapeEffects, ShapeShift, Shift, observe
-from skthermo.studies.identification.weighing import (
-    Comparison,
-    DamagePrior,
-    Part,
-    Posterior,
-    Scale,
-    explanations,
-    read_causes,
-)
+from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state
+from skthermo.studies.identification._causes import Cause, DamagePrior, read_causes
+from skthermo.studies.identification._curves import Part, ShiftComparison
+from skthermo.studies.identification._evidence import Observed
+from skthermo.studies.identification._explanations import Scale, explanations
+from skthermo.studies.identification._identified import IdentifiedDamage, explanation_text
+from skthermo.studies.identification._observe import ComparedRecords, observe
+from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
+from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
+from skthermo.studies.identification._shift import FrequencyShift
 from skthermo.studies.scenarios import check_chain
 from skthermo.studies.worlds import checked_models
+
+LISTED = 1e-3  # least probability of explanations that are listed
+N_DRAWS = 500
+OF_GROUPS = ("damage", "stiffening")
 
 
 def identify_damage(
@@ -173,7 +177,7 @@ def identify_damage(
     seen = observe(fem, T, F, noise)
     effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
     every = compared(effects, seen.shift, shapes, dofs, shape_noise)
-    nominal = Comparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
+    nominal = ShiftComparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
     scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     whitened = every.observed().rotation @ scale.curves.first
     alone = errors_alone(whitened)
@@ -208,26 +212,102 @@ def identify_damage(
 
 def compared(
     effects: FrequencyEffects,
-    shift: Shift,
+    shift: FrequencyShift,
     shapes: Any,
     dofs: ArrayLike | None,
     shape_noise: ArrayLike | Literal["fitted"],
-) -> Comparison:
+) -> ShiftComparison:
     """Measured shifts of frequencies, and of shapes if there are any, beside the effects of causes."""
     parts = [Part(effects, shift.mean, shift.covariance, shift.freedom)]
-    if shapes is not None:
-        parts.append(_of_shapes(effects, shapes, dofs, shape_noise))
-    return Comparison(parts)
-
-
-def _of_shapes(
-    effects: FrequencyEffects, shapes: Any, dofs: ArrayLike | None, noise: ArrayLike | Literal["fitted"]
-) -> Part:
-    """Measured changes of mode shapes, and the effects of the groups on them."""
+    if shapes is None:
+        return ShiftComparison(parts)
     if dofs is None:
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
-    fem = effects.structure.fem
     states = (effects.theta, np.ones((1, effects.theta.shape[1])))
     candidates = [ShapeEffects.of(effects.structure, theta, dofs) for theta in states]
-    shift = ShapeShift.of(candidates, shapes, noise, fem.mode_names_)
-    return Part(shift.effects, shift.change, np.diag(shift.variances))
+    of_shapes = ShapeShift.of(candidates, shapes, shape_noise, effects.structure.fem.mode_names_)
+    return ShiftComparison([*parts, Part(of_shapes.effects, of_shapes.change, np.diag(of_shapes.variances))])
+
+
+def findings(
+    posterior: Posterior,
+    slopes: Array,
+    nominal: ShiftComparison,
+    shift: FrequencyShift,
+    records: ComparedRecords,
+    causes: list[Cause],
+    changes: StructuralChanges,
+    prior: DamagePrior,
+    random: np.random.RandomState,
+) -> IdentifiedDamage:
+    """Tables of a posterior, and what the causes' effects have in common.
+
+    ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
+    what the causes have in common is judged at the model's nominal state, too.
+    """
+    names, observed = [cause.name for cause in causes], nominal.observed()
+    signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
+    slopes, at_nominal = signs * slopes, signs * nominal.slopes(len(causes))
+    factor = two_errors(shift.freedom)
+    alone = factor * errors_alone(slopes)
+    seen = np.flatnonzero(alone <= VISIBLE)
+    groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
+    table = posterior.table(names)
+    table["error_alone"], table["kind"] = alone, [cause.kind for cause in causes]
+    first, factors = changes.n_parameters, changes.factors(posterior.drawn(names, N_DRAWS, random))
+    estimates, best = posterior.estimates(LISTED), posterior.explanations[0]
+    listed = [one for one in posterior.explanations if one.probability >= LISTED] or [best]
+    return IdentifiedDamage(
+        explanations=pd.DataFrame(
+            {
+                "probability": [one.probability for one in listed],
+                "misfit": [one.misfit for one in listed],
+                "text": [explanation_text(one.causes, one.draws.mean(axis=0)) for one in listed],
+            },
+            index=[one.name for one in listed],
+        ),
+        estimates=estimates,
+        table=table,
+        shifts=_shift_table(shift, posterior.explained(), factor),
+        rest=max(1 - sum(one.probability for one in listed), 0.0),
+        most_probable=best.causes,
+        probability_of_damage=1 - posterior.no_damage,
+        probability_of_else=posterior.probability_of("something else"),
+        similarity=pd.DataFrame(cosines(at_nominal), names, names),
+        confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
+        unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
+        members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
+        draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
+        precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), causes, prior.severity),
+        p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
+        misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
+        records=records,
+        prior=prior,
+    )
+
+
+def p_of_misfit(misfit: float, n_causes: int, observed: Observed, freedom: float) -> float:
+    """Probability (F) of a larger misfit by chance; NaN without more observations than causes."""
+    rest = len(observed.measured) - n_causes
+    return float(stats.f.sf(misfit / rest, rest, freedom)) if rest > 0 else float("nan")
+
+
+def two_errors(freedom: float) -> float:
+    """Half of what holds as much of Student's law as two standard deviations hold of the normal law."""
+    return float(stats.t.isf(stats.norm.sf(2.0), freedom)) / 2
+
+
+def _shift_table(shift: FrequencyShift, explained: Array, factor: float) -> pd.DataFrame:
+    known = np.flatnonzero(~np.isnan(shift.mean))
+    values = np.full(len(shift.mean), np.nan)
+    values[known] = explained[: len(known)]
+    return pd.DataFrame(
+        {
+            "measured": np.expm1(shift.mean),
+            "explained": np.expm1(values),
+            "standard_error": np.where(np.isnan(shift.mean), np.nan, factor * np.sqrt(np.diag(shift.covariance))),
+            "n_records": shift.n_records,
+            "n_independent": shift.n_independent,
+        },
+        index=list(shift.modes),
+    )

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from skthermo._arrays import Array
-from skthermo.studies.identification.weighing import Cause
+from skthermo._tables.arrays import Array
+from skthermo.studies.identification._causes import Cause
 
 VISIBLE = 0.1  # largest standard error with which a severity counts as known
 IMITATING_SHARE = 0.25  # smallest share in the reproduced effect with which a group counts as imitating another

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
+from skthermo.studies.identification import Effects, cubic
 
 SEVERITIES = np.array([0.0, 0.3, 0.6, 0.9])
 PLACES = -np.log1p(-SEVERITIES)
 """Between these logarithms of 1 - severity effects are smooth enough for cubic polynomials."""
 
-Effects = Callable[[Array], tuple[Array, Array]]
-
 
 @dataclass(frozen=True)
-class Curves:
+class StretchCurves:
     """Change of each observation, (n_causes, n_severities, n_observed), and its slopes by ``PLACES``.
 
     ``rotation`` leads to the coordinates in which errors of the observations are independent, with unit variance.
@@ -29,7 +27,7 @@ class Curves:
     rotation: Array
 
     @classmethod
-    def of(cls, effects: Effects, incidence: NDArray[np.bool_], rotation: Array) -> Curves:
+    def of(cls, effects: Effects, incidence: NDArray[np.bool_], rotation: Array) -> StretchCurves:
         """Of causes that each damage some groups by one severity; incidence is (n_causes, n_groups)."""
         sets = incidence[:, np.newaxis] * SEVERITIES[:, np.newaxis]
         sets = np.vstack([np.zeros((1, incidence.shape[1])), sets[:, 1:].reshape(-1, incidence.shape[1])])
@@ -59,14 +57,4 @@ class Curves:
 
     def single(self, causes: NDArray[np.intp], severities: Array) -> tuple[Array, Array]:
         """Changes by causes (...,) of some severities (...,), and their derivatives, both (..., n_observed)."""
-        place = -np.log1p(-severities)
-        left = np.clip(np.searchsorted(PLACES, place, side="right") - 1, 0, len(PLACES) - 2)
-        width = (PLACES[left + 1] - PLACES[left])[..., np.newaxis]
-        x = (place - PLACES[left])[..., np.newaxis] / width
-        low, high = self.changes[causes, left], self.changes[causes, left + 1]
-        start, end = self.slopes[causes, left] * width, self.slopes[causes, left + 1] * width
-        rise = high - low
-        square, cube = 3 * rise - 2 * start - end, start + end - 2 * rise
-        changes = low + x * (start + x * (square + x * cube))
-        slopes = (start + x * (2 * square + x * 3 * cube)) / (width * (1 - severities[..., np.newaxis]))
-        return changes, slopes
+        return cubic(PLACES, self.changes, self.slopes, causes, -np.log1p(-severities), 1 - severities)

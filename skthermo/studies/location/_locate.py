@@ -9,17 +9,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arrays import as_random_state
-from skthermo._frequency_effects import read_groups
-from skthermo._warnings import told_around, warn_user, without_warnings
+from skthermo._effects.frequencies import read_groups
+from skthermo._estimators.warnings import told_around, warn_user, without_warnings
+from skthermo._tables.arrays import as_random_state
 from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
-from skthermo.studies.location._division import Division
-from skthermo.studies.location._lines import lines_of
-from skthermo.studies.location._located import LIKELY, LocatedDamage, fewest, located_damage
-from skthermo.studies.location._places import Places
-from skthermo.studies.location._question import PLAUSIBLE, members_of
-from skthermo.studies.location._weighing import Explained, MeasuredShift
+from skthermo.studies.location._division import Division, lines_of
+from skthermo.studies.location._located import LIKELY, LocatedDamage, Places, fewest, located_damage
+from skthermo.studies.location._question import PLAUSIBLE, Explained, MeasuredShift, members_of
 from skthermo.studies.scenarios import check_chain
 
 MOST_PIECES, MOST_SLOW_PIECES = 16, 8

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._arguments import as_mapping
-from skthermo._arrays import real_array
+from skthermo._estimators.arguments import as_mapping
+from skthermo._tables.arrays import real_array
 from skthermo._validation import check_is_fitted
 
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent

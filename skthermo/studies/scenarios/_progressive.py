@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._times import row_times, time_of
+from skthermo._tables.times import row_times, time_of
 from skthermo.studies.scenarios._base import BaseScenario, check_name, only_group, severities_of
 
 

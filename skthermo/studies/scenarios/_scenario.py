@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arguments import as_mapping, check_names
-from skthermo._arrays import HUGE, is_real, real_array
+from skthermo._estimators.arguments import as_mapping, check_names
+from skthermo._tables.arrays import HUGE, is_real, real_array
 from skthermo.studies.scenarios._base import (
     BaseScenario,
     check_groups,

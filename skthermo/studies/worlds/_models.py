@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import as_floats
-from skthermo._warnings import without_warnings
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import as_floats
 from skthermo.updating import ModelUpdater
 
 DEVIATION = 0.005  # relative, of measured mean frequencies from those of a perfect model

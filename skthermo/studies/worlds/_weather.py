@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import column_names, frame_like
-from skthermo._times import has_stamps, row_times
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.times import has_stamps, row_times
 
 DAY = 24 * 3600e9  # ns
 YEAR = 365  # days, so that seasons and whole days are kept

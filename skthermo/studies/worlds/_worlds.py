@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._arrays import positive_integer
-from skthermo._warnings import warn_user
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import positive_integer
 from skthermo.studies.worlds._models import checked_models, drawn_models
 from skthermo.studies.worlds._weather import other_years, resampled_days
 

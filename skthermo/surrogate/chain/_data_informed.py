@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypeAlias, overload
+from typing import Any, Literal, Self, TypeAlias, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
 from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 
-from skthermo._arguments import as_mapping, check_flag, check_noise, integer_row
-from skthermo._arrays import HUGE, Array, MatrixLike, as_columns, as_floats, as_random_state, is_real, real_array
-from skthermo._frames import check_same_rows, column_names, frame_like, like_targets, row_weights
-from skthermo._regressors import (
+from skthermo._estimators.arguments import check_flag, integer_row
+from skthermo._estimators.regressors import (
     check_takes_weights,
     fit_weighted,
     inputs_of_last_step,
     offers,
-    predicted_covariance,
-    reach_of,
     told_by_fleet,
-    warn_of_fleet,
 )
-from skthermo._saved_frames import SavesFrames
-from skthermo._times import row_times
+from skthermo._estimators.warnings import findings_of, warn_each, warn_user
+from skthermo._tables.arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, is_real
+from skthermo._tables.frames import check_same_rows, column_names, frame_like, like_targets, row_weights
+from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import (
     CallbackSupport,
     Estimator,
@@ -44,35 +40,49 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
-from skthermo._warnings import findings_of, warn_each, warn_user
-from skthermo._weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._box import Box
-from skthermo.surrogate._simulator import tolerance
-from skthermo.surrogate.chain._estimates import Estimates, shape_inputs_of, shape_warnings, with_shapes
-from skthermo.surrogate.chain._faults import Faults
+from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.surrogate._simulator import Box, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
+from skthermo.surrogate.chain._intervals import PredictionIntervals
 from skthermo.surrogate.chain._parts import (
+    Estimates,
     clone_parts,
     default_part,
     known_findings,
     part_of,
     read_records,
+    shape_inputs_of,
+    shape_warnings,
     simulator_of,
     surrogates_in,
     warn_of_inert,
     with_means,
     with_quick_start,
+    with_shapes,
     without_outliers,
 )
-from skthermo.surrogate.chain._records import TrainingRecords, WeatherResiduals, measurement_noise
-from skthermo.surrogate.chain._service import ServiceRecords, places_of
+from skthermo.surrogate.chain._recorder import RecordSimulator
+from skthermo.surrogate.chain._records import TrainingRecords, measurement_noise
+from skthermo.surrogate.chain._service import ServiceRecords
+from skthermo.surrogate.chain._thermal_model import ThermalModel, Weather, frequencies_of, possible
 
-LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
-ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
-POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
+
+
+class Simulated(TypedDict, total=False):
+    """Options of `DataInformedFEM.simulate`, for checkers of types."""
+
+    damage: Mapping[str, float | ArrayLike] | None
+    parameters: Mapping[str, float] | None
+    stiffness: MatrixLike | None
+    mass: MatrixLike | None
+    noise: ArrayLike | Literal["fitted"]
+    gaps: float | Literal["fitted"] | None
+    outliers: ArrayLike | Literal["fitted"] | None
+    random_state: int | np.random.RandomState | None
 
 
 class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
@@ -142,7 +152,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ``discrepancy_(T)``, (n_samples, n_modes), is the logarithm of measured over modelled frequencies at
         temperatures T; 0 with ``discrepancy=None``.
     records_ : TrainingRecords
-        The training records, what M2 learned from them, and its residuals.
+        The training records, and what M2 learned from them.
+    thermal_ : ThermalModel
+        What predicts: mapper, simulator, aligner and discrepancy, together and unchangeable.
+    recorder_ : RecordSimulator
+        Draws noise, gaps and outliers as the training records have them.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -309,25 +323,34 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             aligned = self._fit_inverse(T, usable, shapes)
         with stages.stage("parameters of the records"):
             estimates = Estimates.of(self.inverse_, aligned, self.parameter_names_)
-            self.parameters_ = frame_like(T, estimates.theta, self.parameter_names_)
         with stages.stage("temperature mapper", self.mapper_):
-            fit_weighted(self.mapper_, filled, self._named(T, estimates.theta), weights)
+            fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-            self.simulator_ = simulator_of(self, learned)
-            self.records_ = TrainingRecords(
-                T,
-                F,
-                as_floats(inputs),
-                estimates.theta,
-                learned,
-                as_floats(usable),
-                self._frequencies(learned),
-                weights,
-                self.parameter_names_,
+            simulator = simulator_of(self, learned)
+            records = TrainingRecords(
+                temperatures=T,
+                frequencies=F,
+                inputs=as_floats(inputs),
+                targets=estimates.theta,
+                learned=learned,
+                usable=as_floats(usable),
+                modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
+                weights=weights,
+                parameter_names=self.parameter_names_,
             )
-            self.training_range_ = TrainingRange.of(inputs, self.records_.trained)
-            self.discrepancy_ = self.records_.learns(part_of(self, "discrepancy"), self.mapper_, self.sensors_)
+            thermal = ThermalModel(
+                mapper=self.mapper_,
+                simulator=simulator,
+                aligner=self.aligner_,
+                discrepancy=records.learns(part_of(self, "discrepancy"), self.mapper_, self.sensors_),
+                sensors=self.sensors_,
+                training_range=TrainingRange.of(inputs, records.trained),
+                parameter_names=self.parameter_names_,
+                mode_names=self.mode_names_,
+                n_jobs=self.n_jobs,
+            )
+            self._hold(thermal, RecordSimulator(thermal, records))
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -428,17 +451,34 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         True
         """
         check_is_fitted(self)
-        chain, random = copy(self), as_random_state(random_state)
-        records = self.records_.resampled(self.residuals_, self.discrepancy_, random)
+        records = self.records_.resampled(self.residuals_, self.discrepancy_, as_random_state(random_state))
         filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
-        named = self._named(filled, records.targets)
-        chain.mapper_ = fit_weighted(clone(self.mapper_), filled, named, records.weights)
-        learned = possible(chain.mapper_.predict(filled))[0]
-        modelled = self._frequencies(learned)
-        chain.records_ = replace(records, learned=learned, modelled=modelled, service=self.service_records())
-        chain.discrepancy_ = chain.records_.learns(self.discrepancy_.regressor, chain.mapper_, self.sensors_)
-        chain.parameters_ = frame_like(filled, records.targets, self.parameter_names_)
-        return chain
+        targets = named(filled, records.targets, self.parameter_names_)
+        mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
+        learned = possible(mapper.predict(filled))[0]
+        records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
+        discrepancy = records.learns(self.discrepancy_.regressor, mapper, self.sensors_)
+        thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
+        return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.service_records()))
+
+    def with_model(self, model: FEModel) -> DataInformedFEM:
+        """This fitted chain with another model of the same frequencies, such as one with divided damage groups.
+
+        Parameters
+        ----------
+        model : FE model
+            With the parameters and modes of this one's. It is not reduced.
+
+        Returns
+        -------
+        DataInformedFEM
+            All that was learned is this chain's, and so are the records.
+        """
+        check_is_fitted(self)
+        simulator = replace(self.simulator_, model=model, reduced=None, box=None)
+        twin = copy(self)
+        twin.model = model
+        return twin._hold(replace(self.thermal_, simulator=simulator), self.recorder_)
 
     @overload
     def estimate_parameters(self, F: pd.DataFrame, shapes: ArrayLike | None = None) -> pd.DataFrame: ...
@@ -497,7 +537,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             records, or a sensor departs from what the others foretell, as one that drifts or is stuck does; `predict`,
             `predict_interval` and `simulate` warn of the same.
         """
-        return frame_like(X, self._predict_theta(X)[0], self.parameter_names_)
+        weather = self._weather(X)
+        return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
 
     @overload
     def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
@@ -530,12 +571,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             costs, and what `predict_covariance` says where the mapper knows it.
         """
         check_flag(return_std, "return_std")
-        frequencies = self._simulate(X)
+        weather = self._weather(X)
+        frequencies = self.thermal_.simulated(weather)
         predicted = self._as_targets(X, frequencies)
         if not return_std:
             return predicted
-        std = np.hypot(self.residuals_.spread(self._weather(X)), np.hypot(self._cost_of_gaps(X), self._uncertainty(X)))
-        return predicted, self._as_targets(X, frequencies * std)
+        return predicted, self._as_targets(X, frequencies * self._intervals.deviations(weather))
 
     def predict_covariance(self, X: ArrayLike) -> Array:
         """Covariance of predicted frequencies, because the temperature mapper is uncertain.
@@ -583,10 +624,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 f"{type(last_step(self.mapper_)).__name__} does not state how uncertain it is; expected a mapper with "
                 "predict_covariance, such as FleetPrior().fit(bridges).mapper()"
             )
-        T = self._temperatures(X)[0]
-        theta, inputs = self._mapped(T), as_floats(inputs_of_last_step(self.mapper_, T))
-        predicted = self._frequencies(theta) * np.exp(self.discrepancy_.at(inputs))
-        relative = self._propagated(theta, predicted_covariance(self.mapper_, T))
+        weather = self._weather(X)
+        predicted, relative = self.thermal_.predicted(weather), self._intervals.of_mapper(weather)
         return relative * predicted[:, :, np.newaxis] * predicted[:, np.newaxis]
 
     @overload
@@ -653,42 +692,16 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
-        frequencies = self._simulate(X)
-        margin = self.residuals_.quantiles(confidence) * self.residuals_.spread(self._weather(X))
-        known = np.hypot(self._cost_of_gaps(X), self._uncertainty(X))
-        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * known)
+        weather = self._weather(X)
+        frequencies, margin = self.thermal_.simulated(weather), self._intervals.margins(weather, confidence)
         bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
         lowest, highest = (self._as_targets(X, bound) for bound in bounds)
         return lowest, highest
 
     @overload
-    def simulate(
-        self,
-        X: pd.DataFrame,
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-        noise: ArrayLike | Literal["fitted"] = 0.0,
-        gaps: float | Literal["fitted"] | None = None,
-        outliers: ArrayLike | Literal["fitted"] | None = None,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> pd.DataFrame: ...
+    def simulate(self, X: pd.DataFrame, **options: Unpack[Simulated]) -> pd.DataFrame: ...
     @overload
-    def simulate(
-        self,
-        X: ArrayLike,
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-        noise: ArrayLike | Literal["fitted"] = 0.0,
-        gaps: float | Literal["fitted"] | None = None,
-        outliers: ArrayLike | Literal["fitted"] | None = None,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> Array: ...
+    def simulate(self, X: ArrayLike, **options: Unpack[Simulated]) -> Array: ...
     def simulate(
         self,
         X: ArrayLike,
@@ -759,10 +772,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Politis & Romano, The stationary bootstrap, Journal of the American Statistical Association 89 (1994) 1303-1313
         [PR94]_, for runs of consecutive residuals.
         """
-        check_is_fitted(self)
-        frequencies = self._simulate(X, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
-        noise = self.draw_noise(X, noise, gaps=gaps, outliers=outliers, random_state=random_state)
-        frequencies *= 1 + noise
+        weather = self._weather(X)
+        change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        frequencies = self.thermal_.simulated(weather, **change)
+        frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
         return frame_like(X, frequencies, self.mode_names_)
 
     def draw_noise(
@@ -799,19 +812,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             If the noise is neither "fitted" nor relative standard deviations; if gaps or outliers are no shares.
         """
-        check_is_fitted(self)
-        random, faults = as_random_state(random_state), Faults.asked(gaps, outliers)
-        streams = faults.streams(random)
-        shape = (len(self._temperatures(X)[0]), len(self.mode_names_))
-        is_fitted = isinstance(noise, str)
-        if is_fitted and noise != "fitted":
-            raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        if is_fitted:
-            order = np.argsort(row_times(X), kind="stable")
-            values = faults.noise(self.residuals_, self._weather(X)[order], random)[np.argsort(order)]
-        else:
-            values = check_noise(noise, shape[1], self.mode_names_) * random.standard_normal(shape)
-        return faults.added(values, is_fitted, lambda: self._service_of(X, faults, streams[0]), streams)
+        weather = self._weather(X)
+        return self.recorder_.noise(weather, noise, gaps, outliers, random_state)
 
     def draw_gaps(
         self,
@@ -848,21 +850,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             If gaps or outliers are no shares.
         """
-        check_is_fitted(self)
-        if gaps is None:
-            raise ValueError("gaps is None; expected 'fitted', or the share of the values that are missing")
-        faults = Faults.asked(gaps, outliers)
-        streams = faults.streams(as_random_state(random_state))
-        n_rows, n_sensors, n_modes = len(self._temperatures(X)[0]), self.n_features_in_, len(self.mode_names_)
-        missing = np.zeros((n_rows, n_sensors + n_modes), dtype=bool)
-        if faults.raw is not None:
-            self.service_records(faults.raw)  # which refuses what is not of the training records
-        if faults.gaps == "fitted":
-            service, taken = self._service_of(X, faults, streams[0])
-            missing = service.missing[taken]
-        else:
-            missing[:, n_sensors:] = faults.single_gaps((n_rows, n_modes), streams)
-        of_sensors, of_modes = missing[:, :n_sensors], missing[:, n_sensors:]
+        weather = self._weather(X)
+        of_sensors, of_modes = self.recorder_.gaps(weather, gaps, outliers, random_state)
         return frame_like(X, of_sensors, column_names(X, "T")), frame_like(X, of_modes, self.mode_names_)
 
     def service_records(self, F: ArrayLike | None = None) -> ServiceRecords:
@@ -884,20 +873,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             If the frequencies are not of the training records.
         """
-        residuals = self.residuals_
-        if F is not None:
-            predicted = self.records_.modelled * np.exp(self.discrepancy_.at(self.records_.inputs))
-            return ServiceRecords.of_raw(self.records_, residuals, F, predicted)
-        if self.records_.service is None:
-            self.records_.service = ServiceRecords.of(self.records_, residuals)
-        return self.records_.service
-
-    def _service_of(self, X: Any, faults: Faults, stream: np.random.RandomState) -> tuple[ServiceRecords, Any]:
-        """Gaps and outliers of the training records, and those of which records the rows have."""
-        service = faults.service if faults.service is not None else self.service_records(faults.raw)
-        order = np.argsort(row_times(X), kind="stable")
-        taken = service.draw(places_of(self.residuals_, self._weather(X)[order]), stream)
-        return service, taken[np.argsort(order)]
+        check_is_fitted(self)
+        return self.recorder_.service_of(F)
 
     def simulate_modes(
         self,
@@ -934,9 +911,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             As in `simulate`; if the model has no such modes.
         """
-        check_is_fitted(self)
+        weather = self._weather(X)
         integer_row(modes, "modes")
-        return self._simulate(X, modes, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass)
+        change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        return self.thermal_.simulated(weather, modes, **change)
 
     @overload
     def expected_residuals(self, X: pd.DataFrame, return_number: Literal[False] = False) -> pd.DataFrame: ...
@@ -968,7 +946,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             number of training records if the rows have little variety of weather.
         """
         check_flag(return_number, "return_number")
-        weather = self._weather(X)
+        weather = self._weather(X).inputs
         expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
         return (expected, self.residuals_.n_expected(weather)) if return_number else expected
 
@@ -987,7 +965,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ndarray of shape (n_records, n_modes)
             For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
         """
-        weather = self._weather(X)
+        weather = self._weather(X).inputs
         return self.residuals_.shares(weather if rows is None else weather[np.asarray(rows)])
 
     @property
@@ -997,17 +975,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self.records_.temperatures, self.records_.frequencies
 
     @property
-    def residuals_(self) -> WeatherResiduals:
-        """Out-of-fold residuals of the training records by weather, computed on first use."""
+    def residuals_(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records by weather."""
         check_is_fitted(self)
-        if self.records_.residuals is None:
-            self.records_.residuals = self.records_.out_of_fold(
-                self.mapper_,
-                self._frequencies,
-                self.discrepancy_,
-                propagated=self._propagated,
-            )
-        return self.records_.residuals
+        return self.recorder_.residuals
 
     def applicability(self, X: ArrayLike) -> pd.DataFrame:
         """How far inputs and parameters are outside the training range, row by row.
@@ -1025,14 +996,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             parameter is outside the bounds of the inverse. Where the mapper has learned from a fleet, a last column,
             ``from_fleet``, is True in weather that the fleet has seen, and the training rows have not.
         """
-        T = self._temperatures(X)[0]
-        inputs = inputs_of_last_step(self.mapper_, T)
-        excess = pd.DataFrame(self.training_range_.excess(inputs), columns=self.training_range_.names)
+        weather = self._weather(X)
+        excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = self._mapped(T)
+        theta = as_columns(self.mapper_.predict(weather.filled))
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         excess = excess.assign(outside_bounds=outside)
-        return excess.assign(from_fleet=self._from_fleet(T)) if offers(self.mapper_, "from_fleet") else excess
+        if offers(self.mapper_, "from_fleet"):
+            return excess.assign(from_fleet=told_by_fleet(self.mapper_, weather.filled))
+        return excess
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -1118,188 +1090,30 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             warn_each(shape_warnings(self.inverse_, aligned))
         return aligned
 
-    def _temperatures(self, X: ArrayLike) -> tuple[Any, Array]:
-        """Temperatures, checked and filled, a frame as a frame; standard deviations of what was filled."""
+    def _hold(self, thermal: ThermalModel, recorder: RecordSimulator) -> Self:
+        """Hold what was learned, and its parts by the names that users know."""
+        self.thermal_, self.recorder_, self.records_ = thermal, recorder, recorder.records
+        self.mapper_, self.aligner_, self.simulator_ = thermal.mapper, thermal.aligner, thermal.simulator
+        self.discrepancy_, self.training_range_ = thermal.discrepancy, thermal.training_range
+        self.parameters_ = frame_like(self.records_.temperatures, self.records_.targets, self.parameter_names_)
+        return self
+
+    def _weather(self, X: ArrayLike) -> Weather:
+        """Temperatures, checked and filled, and what M2 sees of them."""
         check_is_fitted(self)
         values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
         filled, deviations = self.sensors_.fill(values)
-        return frame_like(X, filled), deviations
+        return Weather(X, frame_like(X, filled), deviations, self.mapper_)
 
-    def _weather(self, X: ArrayLike) -> Array:
-        """Inputs of M2."""
-        T = self._temperatures(X)[0]
-        return as_floats(inputs_of_last_step(self.mapper_, T))
-
-    def _cost_of_gaps(self, X: ArrayLike) -> Array:
-        """Relative standard deviations of predictions because temperatures were filled, (n_samples, n_modes).
-
-        The change of the prediction when those of a sensor are wrong by their standard deviation, in quadrature.
-        """
-        T = self._temperatures(X)[0]
-        std = np.zeros((len(T), len(self.mode_names_)))
-        n_parameters = len(self.parameter_names_)
-        cost = PredictionError.of_fills(
-            self.sensors_,
-            X,
-            T,
-            lambda filled: np.hstack([self._mapped(filled), self.discrepancy_(filled)]),
-            lambda both: np.log(self._frequencies(both[:, :n_parameters])) + both[:, n_parameters:],
-        )
-        if len(cost.rows):
-            std[cost.rows] = np.sqrt(np.einsum("ijj->ij", cost.covariances))
-        return std
-
-    def _from_fleet(self, T: Any) -> NDArray[np.bool_]:
-        """Rows of filled temperatures in weather that only a fleet has seen."""
-        return told_by_fleet(self.mapper_, T)
-
-    def _named(self, T: Any, theta: Array) -> pd.DataFrame:
-        """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
-        return pd.DataFrame(theta, index=getattr(T, "index", None), columns=self.parameter_names_, copy=False)
-
-    def _uncertainty(self, X: ArrayLike) -> Array:
-        """Relative standard deviations of predictions as the mapper knows them; zero where it does not."""
-        if not offers(self.mapper_, "predict_covariance"):
-            return np.zeros((len(self._temperatures(X)[0]), len(self.mode_names_)))
-        T = self._temperatures(X)[0]
-        relative = self._propagated(self._mapped(T), predicted_covariance(self.mapper_, T))
-        return np.sqrt(np.einsum("ijj->ij", relative))
-
-    def _propagated(self, theta: Array, covariances: Array) -> Array:
-        """Covariances of ln f in the measured domain, G C G' with G = d ln f / d theta, (n, n_modes, n_modes)."""
-        frequencies, jacobian = self.simulator_.linearise(possible(theta)[0], self.n_jobs)
-        sides = [as_floats(self.aligner_.inverse_transform(frequencies * (1 + side))) for side in (-ALIGNED, ALIGNED)]
-        slopes = np.log(sides[1] / sides[0]) / (2 * ALIGNED * frequencies)
-        effects = slopes[:, :, np.newaxis] * jacobian
-        return effects @ covariances @ effects.swapaxes(1, 2)
+    @property
+    def _intervals(self) -> PredictionIntervals:
+        return PredictionIntervals(self.thermal_, self.residuals_)
 
     def _as_targets(self, X: Any, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
-    def _mapped(self, T: Any) -> Array:
-        return as_columns(self.mapper_.predict(T))
 
-    def _predict_theta(self, X: ArrayLike) -> tuple[Array, Array]:
-        """Parameters and inputs of M2 at given temperatures.
-
-        It warns of what was filled, unknown weather and impossible parameters.
-        """
-        T, deviations = self._temperatures(X)
-        inputs = inputs_of_last_step(self.mapper_, T)
-        warn_each(gap_warnings(T, deviations, as_floats(inputs)))
-        reach = reach_of(self.mapper_, T)
-        outside = self.training_range_.warning(inputs) if reach is None else reach[0].warning(reach[1])
-        if outside:
-            warn_user(outside, "weather outside the training range")
-        warn_of_fleet(self._from_fleet(T), "standard deviations and intervals say how uncertain that is")
-        apart = self.sensors_.warning(X)
-        if apart:
-            warn_user(apart, "sensor apart from others")
-        theta, impossible = possible(self.mapper_.predict(T))
-        if impossible.any():
-            row = np.flatnonzero(impossible)[0]
-            warn_user(
-                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
-                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
-                "impossible parameters",
-            )
-        return theta, as_floats(inputs)
-
-    def _frequencies(self, theta: Array) -> Array:
-        """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
-        frequencies = self.simulator_.frequencies(possible(theta)[0], self.n_jobs, warn=False)
-        return as_floats(self.aligner_.inverse_transform(frequencies))
-
-    def _simulate(
-        self,
-        X: ArrayLike,
-        modes: Sequence[int] | None = None,
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-    ) -> Array:
-        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
-        check_is_fitted(self)
-        simulator = self.simulator_ if modes is None else self.simulator_.changed("with_modes", modes)
-        if stiffness is not None or mass is not None:
-            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
-        theta, inputs = self._predict_theta(X)
-        theta = theta * factors_of(parameters, self.parameter_names_)
-        fixed, growing = split_damage(damage, X)
-        simulator = simulator.damaged(fixed)
-        if growing:
-            severities = np.column_stack(list(growing.values()))
-            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
-            theta = np.hstack([theta, 1 - severities])
-        frequencies = simulator.frequencies(theta, self.n_jobs)
-        if modes is not None:
-            return frequencies
-        return as_floats(self.aligner_.inverse_transform(frequencies)) * np.exp(self.discrepancy_.at(inputs))
-
-
-def gap_warnings(T: Any, deviations: Array, inputs: Array) -> Iterator[tuple[str, str]]:
-    """Warnings about temperatures that were filled, and rows that cannot be predicted: kind and text of each."""
-    consequence = "standard deviations and intervals of predictions are widened by what that costs"
-    message = told_fills(deviations, column_names(T, "T"), consequence)
-    if message:
-        yield "filled temperatures", message
-    message = told_unpredicted(np.isnan(inputs).any(axis=1), as_floats(T))
-    if message:
-        yield "rows that cannot be predicted", message
-
-
-def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-    """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
-    theta = as_columns(theta).copy()
-    impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
-    theta[impossible] = np.nan
-    return theta, impossible
-
-
-def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
-    """The factor of every parameter, 1 where none is given."""
-    factors = dict.fromkeys(names, 1.0)
-    parameters = {} if parameters is None else as_mapping(parameters)
-    if not isinstance(parameters, Mapping):
-        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
-    for name, factor in parameters.items():
-        if name not in factors:
-            raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
-        if not is_real(factor) or not 0 < factor < HUGE:
-            raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
-        if factor > LARGE_FACTOR:
-            warn_user(
-                f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
-                "and not percent",
-                "large factor",
-            )
-        factors[name] = float(factor)
-    return np.array(list(factors.values()))
-
-
-def split_damage(
-    damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
-) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
-    """Severities that are the same in all rows, and those with a value for each row."""
-    damage = as_mapping(damage)
-    if damage is not None and not isinstance(damage, Mapping):
-        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
-    fixed: dict[str, Any] = {}
-    growing: dict[str, NDArray[np.float64]] = {}
-    n_rows = np.shape(X)[0]
-    for group, severity in (damage or {}).items():
-        if np.ndim(severity) == 0:
-            fixed[group] = severity
-            continue
-        values = real_array(severity, f"damage of group {group!r}")
-        if values.shape != (n_rows,) or not (values < 1).all() or not np.isfinite(values).all():
-            raise ValueError(
-                f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
-                f"expected one severity or {n_rows}, one for each row, finite and below 1"
-            )
-        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
-        growing[group] = values
-    return fixed, growing
+def named(T: Any, theta: Array, names: Sequence[str]) -> pd.DataFrame:
+    """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
+    return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)

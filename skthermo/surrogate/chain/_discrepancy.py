@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array, as_columns, as_floats, median, patterns, robust_deviation, spread_evenly
-from skthermo._frames import frame_like
-from skthermo._regressors import fit_outputs, inputs_of_last_step
-from skthermo._warnings import without_warnings
-from skthermo._weather import SensorRegression
+from skthermo._estimators.regressors import fit_outputs, inputs_of_last_step
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array, as_columns, as_floats, median, patterns, robust_deviation, spread_evenly
+from skthermo._tables.frames import frame_like
+from skthermo.residuals.weather import SensorRegression
 from skthermo.surrogate._mapper import TemperatureMapper
-from skthermo.surrogate._networks import default_lines
+from skthermo.surrogate._regression import default_lines
 
 PENALTIES = np.logspace(-1, 5, 7)  # few, because it is fitted often; below them, rounding errors would show
 FEWEST = 30  # records of a mode, below which its discrepancy counts as 0

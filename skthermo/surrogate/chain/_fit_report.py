@@ -11,18 +11,19 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._arguments import seem_rad_per_s
-from skthermo._arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._frames import column_names, columns_by_sensor
-from skthermo._regressors import offers, reach_of
-from skthermo._saved_frames import SavesFrames
-from skthermo._times import has_stamps, row_times
+from skthermo._estimators.arguments import seem_rad_per_s
+from skthermo._estimators.regressors import offers, reach_of
+from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
+from skthermo._tables.frames import column_names, columns_by_sensor
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import last_step
-from skthermo._weather import SensorRegression
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
-from skthermo.surrogate.chain._estimates import Estimates
+from skthermo.residuals.weather import SensorRegression
+from skthermo.surrogate._fitted_chain import FittedChain
+from skthermo.surrogate.chain._parts import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
@@ -164,11 +165,7 @@ class FitReport(SavesFrames):
             f"{when}."
             for name, rows, deviation, when in self.filled.itertuples()
         ]
-        if self.has_hidden_offsets:
-            lines.append(
-                f"The aligner hides offsets between measurement and model, {self._listed_offsets()}, that weather does "
-                "not explain: the model is not calibrated to these records."
-            )
+        lines += [f"{text[0].upper()}{text[1:]}." for _, text in self.warnings()]
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
             lines.append(
@@ -202,10 +199,6 @@ class FitReport(SavesFrames):
         """Whether the aligner hides offsets between measurement and model that weather does not explain."""
         return self.unexplained_offset > 1
 
-    def _listed_offsets(self) -> str:
-        large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
-        return ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
-
     def _listed_weather(self) -> str:
         """The inputs that the fleet has seen farthest beyond these records."""
         own = self.fleet["highest"] - self.fleet["lowest"]
@@ -237,88 +230,121 @@ class FitReport(SavesFrames):
         Yields
         ------
         kind, text : str
-            What the warning is about, and what it says.
+            What the warning is about, and what it says; the report has the same sentences.
         """
+        yield from self._few_trained()
+        yield from self._few_for_parameters()
+        yield from self._mostly_filled()
+        yield from self._worse_than_mean()
+        yield from self._hidden()
+        yield from self._many_outliers()
+        yield from self._large_discrepancy()
+        yield from self._poor_round_trip()
+
+    def _few_trained(self) -> Iterator[tuple[str, str]]:
+        if 2 * self.n_trained >= self.n_rows:
+            return
+        reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
+        yield (
+            "half of the rows",
+            f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
+            "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
+        )
+
+    def _few_for_parameters(self) -> Iterator[tuple[str, str]]:
         n_parameters = len(self.deviations)
-        if 2 * self.n_trained < self.n_rows:
-            reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
-            yield (
-                "half of the rows",
-                f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected "
-                "records at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
-            )
-        if self.n_trained < ROWS_PER_PARAMETER * n_parameters and self.fleet is None:
-            yield (
-                "few rows",
-                f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least "
-                f"{ROWS_PER_PARAMETER} rows for each",
-            )
-        mostly = self.filled[2 * self.filled["rows"] > self.n_rows]
-        for name, rows, deviation, when in mostly.itertuples():
+        if self.n_trained >= ROWS_PER_PARAMETER * n_parameters or self.fleet is not None:
+            return
+        yield (
+            "few rows",
+            f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
+            "rows for each",
+        )
+
+    def _mostly_filled(self) -> Iterator[tuple[str, str]]:
+        for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples():
             yield (
                 f"mostly filled {name}",
-                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the "
-                f"others ({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it "
-                "out",
+                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the others "
+                f"({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
             )
+
+    def _worse_than_mean(self) -> Iterator[tuple[str, str]]:
         chain, mean = self.errors.mean()
-        if chain > WORSE_THAN_MEAN * mean:
-            worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
+        if not chain > WORSE_THAN_MEAN * mean:
+            return
+        worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
+        yield (
+            "worse than the mean",
+            f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
+            f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
+            "see report_.offsets, update the model, or use the default aligner and discrepancy",
+        )
+
+    def _hidden(self) -> Iterator[tuple[str, str]]:
+        if not self.has_hidden_offsets:
+            return
+        large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
+        told = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+        yield (
+            "hidden offsets",
+            f"the aligner hides offsets between measurement and model that weather does not explain ({told}): "
+            "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
+            "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
+            "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
+        )
+
+    def _many_outliers(self) -> Iterator[tuple[str, str]]:
+        far = np.zeros(0, dtype=bool) if self.findings is None else self.findings.outliers.to_numpy()
+        if far.sum() <= MANY_OUTLIERS * far.size:
+            return
+        yield (
+            "many outliers",
+            f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
+            "by one way of identification: see report_.findings",
+        )
+
+    def _large_discrepancy(self) -> Iterator[tuple[str, str]]:
+        if self.variation is None:
+            return
+        weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
+        large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
+        told = ", ".join(
+            f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
+        )
+        if told:
             yield (
-                "worse than the mean",
-                f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
-                f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these "
-                "modes: see report_.offsets, update the model, or use the default aligner and discrepancy",
-            )
-        if self.has_hidden_offsets:
-            yield (
-                "hidden offsets",
-                f"the aligner hides offsets between measurement and model that weather does not explain "
-                f"({self._listed_offsets()}): simulated damage then moves the modes too much or too little, and rates "
-                "of detection and severities are wrong by more than their noise; expected a model updated to these "
-                "records (ModelUpdater), and models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
-            )
-        n_outliers = 0 if self.findings is None else int(self.findings.outliers.to_numpy().sum())
-        if self.findings is not None and n_outliers > MANY_OUTLIERS * self.findings.outliers.size:
-            yield (
-                "many outliers",
-                f"{n_outliers} of {self.findings.outliers.size} frequencies are outliers and train nothing; expected "
-                "records of one structure by one way of identification: see report_.findings",
-            )
-        if self.variation is not None:
-            weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
-            large = discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)
-            if large.any():
-                listed = ", ".join(
-                    f"{name!r} {discrepancy[name]:.2g} % beside {weather[name]:.2g} % by the model"
-                    for name in discrepancy.index[large]
-                )
-                yield (
-                    "large discrepancy",
-                    f"the FE model cannot follow what the weather does to {listed}: predictions rely on the "
-                    "discrepancy, and simulated damage on a model that is not calibrated; expected a model updated to "
-                    "these records (ModelUpdater), or parameters that this weather changes",
-                )
-        round_trip = pd.Series(dtype=float) if self.round_trip is None else self.round_trip.abs()
-        if (round_trip > self.scatter.clip(lower=UNSEEN)).any():
-            worst = (round_trip / self.scatter.clip(lower=UNSEEN)).idxmax()
-            yield (
-                "round trip",
-                f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
-                f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
-                f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
-                "refines its estimates, narrow_bounds=True, or more samples",
+                "large discrepancy",
+                f"the FE model cannot follow what the weather does to {told}: predictions rely on the discrepancy, and "
+                "simulated damage on a model that is not calibrated; expected a model updated to these records "
+                "(ModelUpdater), or parameters that this weather changes",
             )
 
+    def _poor_round_trip(self) -> Iterator[tuple[str, str]]:
+        if self.round_trip is None:
+            return
+        shares = self.round_trip.abs() / self.scatter.clip(lower=UNSEEN)
+        if not (shares > 1).any():
+            return
+        worst = shares.idxmax()
+        yield (
+            "round trip",
+            f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
+            f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
+            f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
+            "refines its estimates, narrow_bounds=True, or more samples",
+        )
 
-def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> FitReport:
+
+def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
     """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
     measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
     hidden = hidden_offsets(chain.aligner_, records.frequencies)
-    unexplained = unexplained_offset(hidden, predicted, records.temperatures, errors_of_means(chain.noise_, F))
+    errors_of_means = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
+    unexplained = unexplained_offset(hidden, predicted, records.temperatures, errors_of_means)
     predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
@@ -362,7 +388,7 @@ def report_of(chain: Any, estimates: Estimates, findings: RecordFindings) -> Fit
     )
 
 
-def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
+def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
     """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
@@ -435,11 +461,6 @@ def hidden_offsets(aligner: Any, F: Any) -> pd.Series:
     """Mean measured frequency against the mean that the model sees behind an aligner, by mode, in percent."""
     seen = np.nanmean(as_floats(aligner.transform(F)), axis=0)
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
-
-
-def errors_of_means(noise: Array, F: Array) -> Array:
-    """Standard deviations of the logarithms of mean frequencies, in percent."""
-    return 100 * noise / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
 
 
 def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Array) -> float:

@@ -1,28 +1,34 @@
-"""Records that `DataInformedFEM` is fitted to, checked, and its parts: clones, the inverse inside, inputs of M2."""
+"""Records that `DataInformedFEM` is fitted to, its parts, and what the inverse among them finds for each record."""
 
 import re
 import sys
+import warnings
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._arguments import check_model, is_auto
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._validation import check_array, seed_parts, seeded, validate_data
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import check_model, is_auto
+from skthermo._estimators.regressors import inputs_of_last_step
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
+from skthermo._validation import check_array, last_step, seed_parts, seeded, validate_data
+from skthermo.fem import shape_components
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.surrogate._mapper import TemperatureMapper
 from skthermo.surrogate._memory import remembered
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._discrepancy import ratio_regressor
 from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
 """Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
@@ -168,3 +174,111 @@ def simulator_of(chain: Any, theta: Array) -> Simulator:
     """What a fitted chain simulates with; where it is reduced, by M1's reduced model if that covers what M2 gives."""
     inverse = next(surrogates_in(chain.inverse_), None)
     return Simulator.around(chain.model, theta, chain.reduce, getattr(inverse, "simulator_", None))
+
+
+SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
+FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
+UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What M1 finds for each training record: parameters and, where it refines, how the steps ended.
+
+    ``full_solves`` tells how often the full model was solved for each because its steps left the box of the reduced
+    model.
+    """
+
+    theta: Array
+    n_unconverged: int | None = None
+    full_solves: NDArray[np.intp] | None = None
+
+    @classmethod
+    def of(cls, inverse: Any, aligned: Any, parameter_names: list[str]) -> "Estimates":
+        """What a fitted inverse finds for aligned records, with warnings where they tell little."""
+        last = refining_step(inverse)
+        if last is None:
+            theta = as_floats(inverse.transform(aligned))
+            if theta.shape[1] != len(parameter_names):
+                raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {parameter_names}")
+            return cls(theta)
+        found = last.invert(inputs_of_last_step(inverse, aligned))
+        last.warn_of(found)
+        weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
+        if weight < SCARCE:
+            warn_user(
+                f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
+                "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
+                "imputer=KNNGapImputer()",
+                "scarce modes",
+            )
+        return cls(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
+
+
+def refining_step(inverse: Any) -> InverseSurrogate | None:
+    """The fitted `InverseSurrogate` that an inverse is or ends with, if it refines its estimates."""
+    last = last_step(inverse)
+    return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+
+
+def shape_inputs_of(inverse: Any) -> ShapeInputs | None:
+    """How an inverse reads shapes; None for one without ``dofs``."""
+    part = next((part for part in surrogates_in(inverse) if part.dofs is not None), None)
+    return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
+
+
+def with_shapes(inverse: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    """Frequencies with the columns of shapes that an inverse expects; NaN there without shapes."""
+    inputs = shape_inputs_of(inverse)
+    if inputs is None:
+        if shapes is not None:
+            raise ValueError("shapes are given, but the inverse has no dofs; expected InverseSurrogate(dofs=...)")
+        return F
+    components = np.full((len(F), inputs.n_columns - inputs.n_modes), np.nan)
+    if shapes is not None:
+        components = shape_components(shapes, inputs.reference)
+        if len(components) != len(F):
+            raise ValueError(f"shapes have {len(components)} rows and frequencies {len(F)}; expected the same number")
+    modes = [str(name) for name in column_names(F, "f")]
+    if hasattr(F, "columns"):
+        F = F.set_axis(modes, axis=1)
+    names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
+    return frame_like(F, np.hstack([as_floats(F), components]), names)
+
+
+def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
+    """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+    inverse = refining_step(inverse)
+    if inverse is None:
+        return
+    inputs, values = inverse.shape_inputs_, as_floats(aligned)
+    n_modes, n_sensors = inputs.n_modes, inputs.n_sensors
+    components = values[:, n_modes:].reshape(len(values), n_modes, n_sensors)
+    found = ~np.isnan(values[:, :n_modes])
+    n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
+    names = column_names(aligned, "f")[:n_modes]
+    if n_shapes < FEW_SHAPES * found.sum():
+        yield (
+            "few shapes",
+            f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the {n_sensors} "
+            "sensors; the other shapes are not used: expected dofs without sensors that failed",
+        )
+    if not n_shapes or "shapes" not in inverse.samples_:
+        return
+    possible = shape_components(inverse.samples_.shapes.swapaxes(1, 2), inputs.reference).reshape(
+        -1, n_modes, n_sensors
+    )
+    lowest, highest = possible.min(axis=0), possible.max(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a mode without any shape
+        median = np.nanmedian(components, axis=0)
+    excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
+    mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
+    if excess[mode, sensor] > UNLIKE:
+        yield (
+            "shapes unlike the model's",
+            f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
+            f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} to "
+            f"{highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, with the "
+            "signs and gains of the model's axes, or a shape_noise that covers the model's error",
+        )

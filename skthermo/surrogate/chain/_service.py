@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from skthermo._arrays import Array, as_floats, patterns
-from skthermo._frames import check_same_rows
-from skthermo._times import row_times
+from skthermo._tables.arrays import Array, as_floats, patterns
+from skthermo._tables.frames import check_same_rows
+from skthermo._tables.times import row_times
 
 MEAN_LENGTH = 25  # of runs of consecutive training records, before records of similar weather take over
 TAKEN_FROM = 25  # number of records with the most similar weather, and the same faults, that take over

@@ -10,8 +10,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import Bunch
 
-from skthermo._arrays import Array, as_floats
-from skthermo._frames import column_names
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import column_names
 from skthermo._validation import validate_data
 from skthermo.fem import add_noise, evaluate
 from skthermo.surrogate.refinement import ShapeInputs

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._arguments import check_model, check_noise, check_theta
-from skthermo._arrays import Array, Bounds, as_floats
-from skthermo._frames import frame_like
+from skthermo._estimators.arguments import check_model, check_noise, check_theta
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, Bounds, as_floats
+from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     CallbackSupport,
     HasMethods,
@@ -26,11 +27,9 @@ from skthermo._validation import (
     _fit_context,
     check_is_fitted,
 )
-from skthermo._warnings import warn_user
 from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
-from skthermo.surrogate._networks import default_network
-from skthermo.surrogate._regression import MultiplierRegressor
+from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
 from skthermo.surrogate.inverse._inversions import Inversions

@@ -9,7 +9,7 @@ import numpy as np
 from joblib import Memory
 from sklearn.utils import Bunch
 
-from skthermo._arrays import Array
+from skthermo._tables.arrays import Array
 from skthermo.surrogate._memory import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.refinement import Refinement, ResponseSurface

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils import Bunch
 
-from skthermo._arguments import is_auto, tolerance
-from skthermo._arrays import Array
-from skthermo._warnings import warn_user
+from skthermo._estimators.arguments import is_auto, tolerance
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
 from skthermo.fem import sample, share_reordered
-from skthermo.surrogate._box import Box
 from skthermo.surrogate._memory import remembered
-from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Simulator, reason_of
+from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
 
 ORDER_CHECKS = 256  # number of samples whose modes are looked at for another order
 MANY_REORDERED = 0.1  # share of them that gives a warning: 5 % does not harm the truss, 29 % doubles the error of Z24

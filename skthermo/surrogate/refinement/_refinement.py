@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
-from skthermo._arguments import check_bounds, check_prior
-from skthermo._arrays import Array, robust_deviation, spread_evenly
+from skthermo._estimators.arguments import check_bounds, check_prior
 from skthermo._io import with_progress
+from skthermo._tables.arrays import Array, robust_deviation, spread_evenly
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.refinement._levenberg_marquardt import Refined, minimise, refine
-from skthermo.surrogate.refinement._posterior import Linearise, Objective, Prior
+from skthermo.surrogate.refinement._posterior import Linearise, Objective, Prior, Refined, minimise, refine
 from skthermo.surrogate.refinement._response_surface import ResponseSurface
 from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
 

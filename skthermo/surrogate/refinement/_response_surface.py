@@ -7,8 +7,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._arrays import Array
-from skthermo._threads import single_blas_thread
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._tables.arrays import Array
 
 SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
 ROWS_PER_CHUNK = 1024

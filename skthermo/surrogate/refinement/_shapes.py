@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._arguments import by_mode, check_dofs
-from skthermo._arrays import Array, real_array
+from skthermo._estimators.arguments import by_mode, check_dofs
+from skthermo._tables.arrays import Array, real_array
 from skthermo.fem import evaluate_modes, shape_components
 
 NODE = 1e-6

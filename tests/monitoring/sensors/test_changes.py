@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from skthermo.monitoring.sensors._changes import BEYOND, LONGEST, SEASONAL, DailyNoise, Departures
+from skthermo.monitoring.sensors._changes import BEYOND, LONGEST, SEASONAL, Departures, ThermometerNoise
 
 
 def departures(random, n, correlation):
@@ -17,7 +17,7 @@ def departures(random, n, correlation):
 
 def test_a_change_is_what_dense_least_squares_finds():
     random = np.random.default_rng(0)
-    noise = DailyNoise(1.2, 0.5, 0.3, 4.0)
+    noise = ThermometerNoise(1.2, 0.5, 0.3, 4.0)
     given = departures(random, 40, 0.5)
     given.values[25:] += 3.0 / given.deviations[25:]
     found = noise.change(given)
@@ -38,6 +38,6 @@ def test_a_change_is_what_dense_least_squares_finds():
 
 
 def test_noise_is_learned():
-    noise = DailyNoise.of(departures(np.random.default_rng(1), 4000, 0.6), 0.1)
+    noise = ThermometerNoise.of(departures(np.random.default_rng(1), 4000, 0.6), 0.1)
     assert_allclose([noise.scale, noise.correlation], [1.0, 0.6], atol=0.05)
     assert noise.wander < 0.1

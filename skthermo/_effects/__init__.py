@@ -1,0 +1,1 @@
+"""What changes of a structure do to its parameters and to its frequencies."""

@@ -1,0 +1,1 @@
+"""What every estimator shares: checks of arguments, regressors, warnings, threads."""

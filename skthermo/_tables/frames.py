@@ -1,0 +1,231 @@
+"""Tables of records: pandas frames in and out, and checks of rows and columns."""
+
+import re
+from collections.abc import Hashable, Iterable
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, as_floats, median, real_array
+from skthermo._validation import _num_samples
+
+PREFIXES = {"temperature": "T", "frequency": "f"}
+ABSOLUTE_ZERO = -273.15  # degrees Celsius
+ABSURD = 20  # robust standard deviations from the median
+MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
+
+
+def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
+    """Values as a frame with X's index (and by default X's columns) if X is a frame, else unchanged."""
+    if not isinstance(X, pd.DataFrame):
+        return values
+    return pd.DataFrame(values, index=X.index, columns=X.columns if columns is None else list(columns), copy=False)
+
+
+def like_targets(X: Any, values: Array, names: Iterable[Hashable] | None, *, is_vector: bool) -> Any:
+    """Predictions, (n_samples, n_targets), as a vector or a frame if the targets that were learned were."""
+    if is_vector:
+        return values[:, 0]
+    return values if names is None else frame_like(X, values, names)
+
+
+def column_names(X: Any, default: str) -> list[Hashable]:
+    """Names of X's columns, for messages and outputs: a frame's own, else default1, default2, ..."""
+    if hasattr(X, "columns"):
+        return list(X.columns)
+    return [f"{default}{i + 1}" for i in range(np.shape(X)[1])]
+
+
+def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
+    """Positions of each sensor's columns: its own, and its lags and means where `LagFeatures` and
+    `ExponentialMeans` made columns of them."""
+    columns: dict[Hashable, list[int]] = {}
+    for position, name in enumerate(column_names(T, PREFIXES["temperature"])):
+        sensor = re.sub(r"_(lag\d+|mean\d+[A-Za-z]*)$", "", name) if isinstance(name, str) else name
+        columns.setdefault(sensor, []).append(position)
+    return columns
+
+
+def check_positions_are_names(targets: Any, columns: Any) -> None:
+    """Refuse integer targets where they could be names of columns as well as positions."""
+    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
+    if integers and list(columns) not in ([], list(range(len(columns)))):
+        raise ValueError(
+            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
+            "; expected columns named by text, or 0, 1, 2, ..."
+        )
+
+
+def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
+    """Positions of the targets, which are given by name or by position."""
+    targets = list(targets)
+    if targets and all(isinstance(target, str) for target in targets):
+        if names is None:
+            raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
+        columns = list(names)
+        unknown = [target for target in targets if columns.count(target) != 1]
+        if unknown:
+            raise ValueError(f"targets {unknown} are not columns of X, or more than one; expected some of {columns}")
+        positions = [columns.index(target) for target in targets]
+    elif all(isinstance(target, Integral) and not isinstance(target, bool) for target in targets):
+        positions = [int(target) for target in targets]
+        outside = [position for position in positions if not 0 <= position < n_columns]
+        if outside:
+            raise ValueError(f"targets {outside} are not columns of X; expected indexes from 0 to {n_columns - 1}")
+    else:
+        raise ValueError(f"targets is {targets}; expected names of columns, or integers that are their indexes")
+    if len(set(positions)) < len(positions):
+        raise ValueError(f"targets {targets} repeat a column; expected each once")
+    if not 0 < len(positions) < n_columns:
+        raise ValueError(
+            f"targets are {len(positions)} of the {n_columns} columns of X; expected at least one, and at least one "
+            "other column to predict them from"
+        )
+    return np.array(positions, dtype=np.intp)
+
+
+def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
+    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal."""
+    for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
+        present = column[~np.isnan(column)]
+        if not present.size:
+            raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
+        if varying and len(column) > 1 and np.ptp(present) == 0:
+            raise ValueError(
+                f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
+                "expected one that varies: leave it out"
+            )
+
+
+def check_temperatures(T: ArrayLike) -> None:
+    """Raise an error for temperatures in kelvin, and for numbers that stand for a missing value, such as -999.
+
+    Numbers above 100 or below -80 count as missing values if they differ by more than 100 from the rest of their
+    column; so does any number below absolute zero.
+    """
+    for name, column in zip(column_names(T, PREFIXES["temperature"]), as_floats(T).T, strict=True):
+        if np.fmin.reduce(column) >= -80 and np.fmax.reduce(column) <= 100:
+            continue  # nothing to sort for
+        values, counts = np.unique(column[np.isfinite(column)], return_counts=True)
+        if not values.size:
+            continue
+        gap = np.diff(values) > 100
+        above = np.logical_or.accumulate(gap & (values[1:] > 100))
+        below = np.logical_or.accumulate((gap & (values[:-1] < -80))[::-1])[::-1]
+        marker = (values < ABSOLUTE_ZERO) | np.append(False, above) | np.append(below, False)
+        if (values > 150).all():
+            raise ValueError(
+                f"temperature column {name!r} lies between {values[0]:g} and {values[-1]:g}, all above 150: kelvin? "
+                "expected degrees Celsius"
+            )
+        if marker.any():
+            marks = values[marker]
+            others = "" if len(marks) == 1 else f" to {marks[-1]:g}"
+            kelvin = " (kelvin?)" if marks[0] >= -80 - ABSOLUTE_ZERO and marks[-1] <= 100 - ABSOLUTE_ZERO else ""
+            raise ValueError(
+                f"temperature column {name!r} is {marks[0]:g}{others} in {counts[marker].sum()} of {len(column)} rows"
+                f"{kelvin}; expected degrees Celsius, and NaN where a value is missing"
+            )
+
+
+def warn_of_markers(X: ArrayLike) -> None:
+    """Warn of numbers that probably stand for a missing value, such as -999, in columns of any quantity."""
+    values = as_floats(X)
+    marked = np.isin(values, MARKERS)
+    if marked.any():
+        row, column = np.argwhere(marked)[0]
+        warn_user(
+            f"{marked.sum()} of {marked.size} values look as if they stood for missing ones, the first "
+            f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
+            "markers",
+        )
+
+
+def warn_of_absurd(X: ArrayLike) -> None:
+    """Warn of values that are absurdly far from the median of their column."""
+    values = as_floats(X)
+    values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
+    if np.isnan(values).all(axis=0).any():
+        return
+    distances = np.abs(values - median(values))
+    middle = median(distances)
+    far = distances > ABSURD * 1.4826 * middle
+    if (far & (middle > 0)).any():
+        row, column = np.argwhere(far)[0]
+        warn_user(
+            f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "
+            f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
+            f"damage; expected NaN where a value is wrong (absurd is more than {ABSURD} robust deviations away)",
+            "absurd values",
+        )
+
+
+def warn_of_disorder(X: Any) -> None:
+    """Warn of a frame whose stamps are not in order."""
+    row = first_disorder(X)
+    if row:
+        warn_user(
+            f"row {row} ({X.index[row]}) is earlier than the row before it: folds are periods of time only for rows in "
+            "order; expected X.sort_index()",
+            "rows in disorder",
+        )
+
+
+def first_disorder(X: Any) -> int:
+    """Position of the first row of a frame that is earlier than the row before it; 0 if there is none."""
+    times = getattr(X, "index", None)
+    if not isinstance(times, pd.DatetimeIndex) or times.is_monotonic_increasing:
+        return 0
+    return int(np.argmax(times[1:] < times[:-1])) + 1
+
+
+def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
+    """Raise an error if two tables differ in length or, where both are frames, in index."""
+    if _num_samples(X) != _num_samples(y):
+        raise ValueError(
+            f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
+        )
+    if not all(isinstance(table, pd.DataFrame | pd.Series) for table in (X, y)) or X.index.equals(y.index):
+        return
+    for row, (left, right) in enumerate(zip(X.index, y.index, strict=True)):
+        if left != right:
+            raise ValueError(
+                f"{names[0]} and {names[1]} have different indices (row {row}: {left} and {right}); expected the same"
+            )
+
+
+def row_weights(sample_weight: Any, X: Any) -> Array | None:
+    """A weight for each row of X, or None; those of a series are matched to the rows of a frame by index."""
+    if sample_weight is None:
+        return None
+    n_rows = _num_samples(X)
+    if isinstance(sample_weight, pd.Series) and isinstance(X, pd.DataFrame | pd.Series):
+        unknown, missing = (
+            a.difference(b) for a, b in ((sample_weight.index, X.index), (X.index, sample_weight.index))
+        )
+        repeats = not sample_weight.index.equals(X.index) and not sample_weight.index.is_unique
+        if len(unknown) or len(missing) or repeats:
+            raise ValueError(
+                f"sample_weight has {len(sample_weight)} rows, {len(unknown)} of them unknown to X, and lacks "
+                f"{len(missing)} of its {n_rows}{', and labels repeat' if repeats else ''}; expected the index of X"
+            )
+        sample_weight = sample_weight if sample_weight.index.equals(X.index) else sample_weight.reindex(X.index)
+    given = sample_weight if hasattr(sample_weight, "dtype") else np.asarray(sample_weight)
+    is_mask = getattr(given.dtype, "kind", "") == "b"  # which rows count
+    weights = real_array(given.astype(float) if is_mask else given, "sample_weight")
+    weights = np.full(n_rows, weights) if weights.ndim == 0 else weights
+    if weights.shape != (n_rows,):
+        raise ValueError(f"sample_weight has shape {weights.shape}; expected ({n_rows},), a weight for each row of X")
+    wrong = np.flatnonzero(~np.isfinite(weights) | (weights < 0))
+    if wrong.size:
+        raise ValueError(
+            f"sample_weight is {weights[wrong[0]]:g} in row {wrong[0]}, and negative, NaN or infinite in {wrong.size} "
+            f"of {n_rows} rows; expected numbers from 0"
+        )
+    if not weights.any():
+        raise ValueError(f"sample_weight is zero in all {n_rows} rows; expected a positive weight in some")
+    return weights

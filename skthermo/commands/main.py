@@ -1,0 +1,194 @@
+"""Commands of nightly jobs: a monitor in service.
+
+    python -m skthermo update bridge.skops new.csv --report status.html
+    python -m skthermo status bridge.skops
+    python -m skthermo acknowledge bridge.skops 3 --harmless --note "a special transport"
+
+Exit codes of update and status: 0 healthy, 1 alarm, 2 not judged (also if there was no new record), 3 an error, and
+the monitor's file is as it was. An alarm is 1 also if its report cannot be written. acknowledge: 0 done, 3 an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pandas as pd
+
+from skthermo._estimators.warnings import told_around
+from skthermo._io import alone_with
+from skthermo.commands._record_files import ISO, read_file
+from skthermo.monitoring import Monitor, load_monitor
+
+HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
+CODES = {"healthy": HEALTHY, "alarm": ALARM, "not judged": NOT_JUDGED}
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose exit code for wrong arguments is not that of a monitor that was not judged."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print usage and message, and end the program."""
+        self.print_usage(sys.stderr)
+        self.exit(FAILED, f"error: {message}\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; its exit code."""
+    options = _parser().parse_args(arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", UserWarning)  # once for each line of code, whatever the environment says
+        warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
+        try:
+            return options.command(options)
+        except Exception as error:  # Python's own exit code of an error would be that of an alarm
+            _complain(error)
+            return FAILED
+
+
+def _parser() -> Parser:
+    parser = Parser("python -m skthermo", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for command, text in ((_update, "take in new records"), (_status, "say how things stand"), (_acknowledge, "")):
+        name = command.__name__[1:]
+        one = commands.add_parser(name, help=text or "say what an event was", formatter_class=parser.formatter_class)
+        one.set_defaults(command=command)
+        one.add_argument("monitor", type=Path, help="the monitor's file, .skops or .joblib")
+        if command is not _acknowledge:
+            one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, written anew")
+            one.add_argument("--title", help="heading of the page")
+        if command is not _status:
+            one.add_argument(
+                "--wait", type=float, default=60.0, metavar="SECONDS", help="for another command at work (default: 60)"
+            )
+        if command is _update:
+            _add_records(one)
+        if command is _acknowledge:
+            one.add_argument("event", type=int, help="its number")
+            kinds = one.add_mutually_exclusive_group(required=True)
+            kinds.add_argument("--harmless", action="store_true", help="its records may train the monitor anew")
+            kinds.add_argument("--damage", action="store_true", help="its records may not")
+            one.add_argument("--note", default="", help="what was found")
+    return parser
+
+
+def _add_records(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("records", type=Path, help="new records, CSV or parquet; the first column holds the stamps")
+    parser.add_argument("--separator", default=",", help="between values of a CSV file (default: a comma)")
+    parser.add_argument("--decimal", default=".", help="decimal sign of a CSV file (default: a point)")
+    parser.add_argument(
+        "--stamps", default=ISO, metavar="FORMAT", help='such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)'
+    )
+
+
+def _update(options: argparse.Namespace) -> int:
+    """Judge new records, and save the monitor."""
+    with alone_with(options.monitor, options.wait):
+        monitor = load_monitor(options.monitor)
+        form = {name: getattr(options, name) for name in ("separator", "decimal", "stamps")}
+        records = read_file(options.records, **form, zone=monitor.last_.tz)
+        records.index.name = monitor.baseline_.index.name
+        before = dict(monitor.counts_)
+        with told_around({"records not judged"}):  # said below, with all reasons
+            judged = monitor.update(records) if len(records) else None
+        code = _code(monitor, judged)
+        print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, judged)]))
+        if judged is not None:
+            code = _also(code, lambda: monitor.save(options.monitor))
+    print("\n".join(_standing(monitor)))
+    return _reported(monitor, options, code)
+
+
+def _status(options: argparse.Namespace) -> int:
+    """Say how things stand; the file is whole at any time, and needs no lock to be read."""
+    monitor = load_monitor(options.monitor)
+    print(monitor.summary())
+    return _reported(monitor, options, CODES[monitor.state()])
+
+
+def _acknowledge(options: argparse.Namespace) -> int:
+    """Say what an event was, and save the monitor."""
+    with alone_with(options.monitor, options.wait):
+        monitor = load_monitor(options.monitor)
+        monitor.acknowledge(options.event, harmless=options.harmless, note=options.note)
+        monitor.save(options.monitor)
+    print(f"event {options.event} is acknowledged as {'harmless' if options.harmless else 'damage'}")
+    print("\n".join(_standing(monitor)))
+    return 0
+
+
+def _reported(monitor: Monitor, options: argparse.Namespace, code: int) -> int:
+    """Write the report that was asked for; the exit code."""
+    if options.report is None:
+        return code
+    from skthermo.reporting import owner_report  # a job without a report needs no drawings
+
+    return _also(code, lambda: owner_report(monitor, options.report, title=options.title))
+
+
+def _also(code: int, action: Callable[[], Any]) -> int:
+    """Exit code if this was tried, too: what fails is told, but does not hide an alarm."""
+    try:
+        action()
+    except Exception as error:
+        _complain(error)
+        return code if code == ALARM else FAILED
+    return code
+
+
+def _complain(error: Exception) -> None:
+    if not isinstance(error, ValueError | OSError | ImportError):  # these explain themselves
+        traceback.print_exception(error)
+    print(f"error: {error}", file=sys.stderr)
+
+
+def _code(monitor: Monitor, judged: pd.DataFrame | None) -> int:
+    """Exit code of an update: an alarm that has ended again counts, and without a new judgement nothing is healthy."""
+    states = set() if judged is None else set(judged["state"])
+    if "alarm" in states or monitor.state() == "alarm":
+        return ALARM
+    is_judged = judged is not None and (~judged["revised"] & (judged["state"] == "healthy")).any()
+    return CODES[monitor.state()] if is_judged else NOT_JUDGED
+
+
+def _read(file: Path, records: pd.DataFrame) -> str:
+    period = f", {records.index.min()} to {records.index.max()}" if len(records) else ""
+    return f"read from {file}: {len(records)}{period}"
+
+
+def _taken_in(before: dict[str, int], after: dict[str, int], judged: pd.DataFrame | None) -> list[str]:
+    """What became of the records."""
+    names = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
+    others = ", ".join(f"{after[name] - before[name]} {text}" for name, text in names.items())
+    if judged is None:
+        return [f"new: 0; {others}"]
+    new, revised = judged[~judged["revised"]], judged["revised"].sum()
+    states = ", ".join(f"{(new['state'] == state).sum()} {state}" for state in CODES)
+    lines = [f"new: {len(new)} ({states}); {others}"]
+    lines += [f"judged anew, as records came late: {revised}"] if revised else []
+    reasons = new.loc[new["state"] == "not judged", "reason"].value_counts()
+    return lines + [f"not judged, {reason}: {number}" for reason, number in reasons.items()]
+
+
+def _standing(monitor: Monitor) -> list[str]:
+    """State of the monitor, its open events and its faulty sensors."""
+    events, faults = monitor.events_, monitor.faults_
+    lines = [f"state: {monitor.state()} (newest record {monitor.last_})"]
+    opened = events[events["end"].isna()]
+    lines += [
+        f"open event {number}: {event['kind']} since {event['start']}, {event['modes'] or 'no mode named'}, "
+        f"index up to {event['peak']:.4g} on {event['peak_time']}{', acknowledged' if event['acknowledged'] else ''}"
+        for number, event in opened.iterrows()
+    ] or ["open events: none"]
+    waiting = events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
+    lines += [f"ended, not acknowledged: event {', '.join(map(str, waiting))}"] if waiting else []
+    lasting = faults[faults["until"].isna()] if faults is not None else []
+    return lines + [
+        f"sensor: {fault.column} {fault.kind} since {fault.since}" for fault in pd.DataFrame(lasting).itertuples()
+    ]

@@ -1,0 +1,507 @@
+"""Removes the effect of temperature from frequencies by regression."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from functools import partial
+from typing import Any, Literal, overload
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.model_selection import BaseCrossValidator
+
+from skthermo._estimators.regressors import warn_of_fleet
+from skthermo._estimators.warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import (
+    check_columns,
+    check_positions_are_names,
+    check_temperatures,
+    column_names,
+    frame_like,
+    positions_of,
+    warn_of_disorder,
+    warn_of_markers,
+)
+from skthermo._tables.times import has_stamps
+from skthermo._validation import (
+    Estimator,
+    HasMethods,
+    StrOptions,
+    TransformerMixin,
+    _check_feature_names_in,
+    _fit_context,
+    check_is_fitted,
+    last_step,
+    validate_data,
+)
+from skthermo.detection._complete_rows import Regression, has_lags_behind
+from skthermo.detection._likelihood import mean_log_density, with_log_volumes
+from skthermo.preprocessing import RecordFindings, check_records
+from skthermo.residuals.folds import Folds
+from skthermo.residuals.local_covariance import rows_near_in_time
+from skthermo.residuals.spread import Spread
+from skthermo.residuals.weather import (
+    PredictionError,
+    SensorRegression,
+    TrainingRange,
+    told_fills,
+    told_unpredicted,
+    warn_of_unseen,
+)
+
+AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
+
+
+class TemperatureCompensator(TransformerMixin, Estimator):
+    """Residuals of frequencies: measured minus predicted from temperatures.
+
+    Parameters
+    ----------
+    estimator : regressor
+        Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
+        target is fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
+    targets : sequence of str or sequence of int
+        Names of the frequency columns in a frame, or their positions counted from 0, in the order of
+        the output.
+    cv : "contiguous", int, cross-validation splitter or iterable, default=None
+        Folds by which the baseline is predicted:
+
+        - ``None``: blocks of a week (without stamps, of a 52nd of the rows), dealt in turn to five folds, so that each
+          fold sees each season. Blocks are longer where five correlation times of the residuals are.
+        - ``"contiguous"``: five periods of time, each predicted from the others. An int gives that many.
+        - A splitter, or pairs of training and test rows: every row must be in exactly one test fold, or all but the
+          first rows, as with ``TimeSeriesSplit``: the residuals of those are NaN.
+    scale : {None, "global", "local"}, default=None
+        What the residuals are divided by:
+
+        - ``None``: nothing; they are in Hz.
+        - ``"global"``: their covariance. They are then in standard deviations, and uncorrelated.
+        - ``"local"``: the covariance that they have in similar weather. Frost that makes residuals scatter then no
+          longer hides damage on warm days.
+
+    Attributes
+    ----------
+    estimator_, regression_ : regressor
+        Clone of ``estimator``, fitted on all rows that it can take: alone, and with what rows with gaps need.
+    folds_ : ndarray of int
+        The fold of each row of the baseline, -1 where no fold tests it.
+    block_ : timedelta64, int or None
+        Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
+    sensors_ : object
+        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
+        their standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
+    spread_ : object
+        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
+        of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+    training_range_ : object
+        Lowest and highest values of the other columns.
+    targets_ : ndarray of int
+        Positions of the targets.
+    n_features_in_ : int
+        Number of columns, targets included.
+    feature_names_in_ : ndarray of str
+        Their names, where `fit` saw a frame with such names.
+
+    See Also
+    --------
+    MahalanobisDetector : Raises alarms on the residuals.
+    OutlierDetector : The same with any of scikit-learn's outlier detectors.
+
+    Notes
+    -----
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
+    it was fitted on: their residuals are smaller than those of new records, and a threshold set on them gives too many
+    false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
+    the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
+
+    Rows should be in order of time, so that folds are made of periods of time: with random folds, a row would be
+    predicted by its neighbours in time, which are nearly the same record. Blocks are a compromise: as short as needed
+    for each fold to see all seasons, and long beside the memory of the residuals. Contiguous folds of a single year
+    predict each season from the others; residuals and the threshold are then too large, and hide damage. A warning
+    says so where 10 % of a fold's records lie outside the weather of the others.
+
+    Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
+    each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
+    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
+    pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
+    given the others, records of the same day (at least 24 rows around each) left out; such records are left out too
+    where the baseline itself is scaled. Of more than 5000 baseline records, as many, evenly spaced in time, teach the
+    covariances. A new record takes S from the baseline record with the most similar weather; where a value is missing
+    that no sensor tells, from all records. Where its temperatures lie outside the baseline's by e ranges of their
+    columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the
+    regression says there is less certain.
+
+    An estimator that states how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
+    n_targets, n_targets) in Hz squared, such as `~skthermo.fleet.FleetMapper` or a ``DataInformedFEM`` with one, has
+    residuals r with the covariance S + C: S, which the baseline's out-of-fold residuals teach once what C explains of
+    them is taken away, is the scatter of the measurement, and C that of each row. Scaled residuals are divided by the
+    root of S + C; residuals in Hz are shrunk towards their mean by the root of S over that of S + C, so that a detector
+    behind keeps its rate of false alarms. "local" then adds nothing for temperatures beyond the baseline's. What is not
+    known yet of a structure stays the same for a season: alarms that it causes come in runs, and damage that is smaller
+    than C cannot be seen there. Where each target has a clone of its own, C is diagonal. Weather that a fleet has seen
+    (``reach_`` and ``from_fleet`` of the estimator) counts as known.
+
+    Missing values:
+
+    - A missing temperature is filled by a linear regression on the other sensors of its row, learned in `fit`, whatever
+      the estimator would do with NaN; one warning counts what was filled. The deviation by which a residual is divided
+      is widened by what the filling costs: the change of the prediction when what was filled moves by one standard
+      deviation, added in quadrature over the sensors. Residuals in Hz are shrunk by as much, towards their mean, so
+      that a detector behind keeps its rate of false alarms. Records whose prediction hangs on a filled value do not
+      teach the spread, unless they are the half of all. Only a row without any temperature has NaN.
+    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) are fitted to all rows,
+      so that lags are the true ones whatever the folds. What follows is fitted to the rows that they give to the rest.
+    - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
+      estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
+      also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
+    - A row with a value that is still missing, such as a lag that finds no record, is used if the estimator accepts
+      NaN. Otherwise the row does not train, and its residuals are NaN. To judge the records of a day with lags of 24
+      hours, give `transform` the records of the day before as well.
+    - Lags elsewhere, such as in the mapper of a ``DataInformedFEM``, see the rows of their folds only. On a
+      ``DatetimeIndex`` they go by time: a lag whose record is in another fold takes the last record before it, or NaN
+      if that is older than the tolerance of ``LagFeatures``. Without stamps, folds are then contiguous, with a warning.
+
+    Examples
+    --------
+    >>> from sklearn.neighbors import KNeighborsRegressor
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+    >>> healthy, later = (make_truss_campaign(2, random_state=seed) for seed in (0, 1))
+    >>> baseline = healthy.temperatures.join(healthy.frequencies)
+    >>> unseen = later.temperatures.join(later.frequencies)
+    >>> compensator = TemperatureCompensator(KNeighborsRegressor(), targets=list(healthy.frequencies))
+    >>> detector = make_pipeline(compensator, MahalanobisDetector()).fit(baseline)
+    >>> print(f"{(detector.predict(unseen) == -1).mean():.0%} false alarms")
+    2% false alarms
+
+    A threshold set on residuals of rows that the regressor was fitted on is too low:
+
+    >>> in_sample = MahalanobisDetector().fit(compensator.fit(baseline).transform(baseline))
+    >>> print(f"{(in_sample.predict(compensator.transform(unseen)) == -1).mean():.0%} false alarms")
+    14% false alarms
+    """
+
+    _parameter_constraints: dict = {
+        "estimator": [HasMethods(["fit", "predict"])],
+        "targets": ["array-like"],
+        "cv": ["cv_object", StrOptions({"contiguous"})],
+        "scale": [StrOptions({"global", "local"}), None],
+    }
+
+    def __init__(
+        self,
+        estimator: BaseEstimator,
+        *,
+        targets: Sequence[Hashable],
+        cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
+        scale: Literal["global", "local"] | None = None,
+    ):
+        self.estimator = estimator
+        self.targets = targets
+        self.cv = cv
+        self.scale = scale
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: ArrayLike, y: None = None) -> TemperatureCompensator:
+        """Fit the regression of the targets on the other columns.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures in degrees Celsius and frequencies in Hz of the healthy structure, side by side.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        TemperatureCompensator
+            The fitted transformer.
+
+        Raises
+        ------
+        ValueError
+            If a target is not among the columns or is named twice; if the targets are all of the columns
+            or none; if a target is NaN in every row, or in every row that the estimator can learn from; if the
+            residuals that are to be scaled have a singular covariance; if there are fewer rows than folds, or ``cv``
+            does not test every row exactly once.
+
+        Warns
+        -----
+        UserWarning
+            If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999; for
+            each kind of fault that `~skthermo.preprocessing.check_records` finds; if stamps are not in order; if
+            temperatures are missing, with what they were filled with; if a fold has weather that the others do not
+            know; if rows without stamps have lags inside an estimator.
+        """
+        self._learn(*self._read_baseline(X))
+        return self
+
+    @overload
+    def fit_transform(self, X: pd.DataFrame, y: None = None) -> pd.DataFrame: ...
+    @overload
+    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
+        """Fit on all rows of a baseline, and give its out-of-fold residuals.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures in degrees Celsius and frequencies in Hz of the healthy structure, side by side.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_targets)
+            In Hz, or dimensionless if scaled; each row predicted by a clone that was not fitted on its fold.
+
+        Raises
+        ------
+        ValueError
+            As in `fit`.
+
+        Warns
+        -----
+        UserWarning
+            As in `fit`.
+        """
+        temperatures, frequencies, findings = self._read_baseline(X)
+        return frame_like(frequencies, self._learn(temperatures, frequencies, findings))
+
+    @overload
+    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Residuals of new records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_targets)
+            Measured minus predicted, in Hz, or dimensionless if scaled. For the rows of `fit` they are too small: use
+            `fit_transform` there.
+
+        Raises
+        ------
+        ValueError
+            If columns differ from `fit`, or the estimator predicts another number of targets.
+
+        Warns
+        -----
+        UserWarning
+            As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
+            foretell, as one that drifts or is stuck does; if lags find no record in most rows.
+        """
+        frequencies, weather, residuals, errors, unknown = self._residuals(X)
+        if self.scale is None:
+            scaled = self.spread_.shrunk(residuals, errors)
+            volumes = partial(self._log_volumes_shrunk, weather, residuals, errors)
+        else:
+            scaled = self.spread_.whiten(weather, residuals, errors)
+            volumes = partial(self.spread_.log_volumes, weather, residuals, errors)
+        return explain_rows(frame_like(frequencies, with_log_volumes(scaled, volumes)), unknown)
+
+    def score(self, X: ArrayLike, y: None = None) -> float:
+        """Mean log-likelihood of healthy records that `fit` has not seen, per value.
+
+        The distribution is the normal one with the mean and the covariance of the baseline's out-of-fold residuals,
+        with ``scale="local"`` the covariance in similar weather. It is wider where predictions are uncertain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies of the healthy structure, in the columns of `fit`.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        float
+            Natural logarithm of a density per Hz, averaged over the targets that are there: higher is better, and a
+            residual twice as small gains 0.69. Settings of all parameters, ``scale`` included, can be compared. NaN
+            if no row has a residual; a warning counts the rows scored if they are fewer than half.
+        """
+        _, weather, residuals, errors, _ = self._residuals(X)
+        residuals = self._with_spread(residuals)
+        white, present = self.spread_.whiten(weather, residuals, errors), ~np.isnan(residuals)
+        densities = self.spread_.log_volumes(weather, residuals, errors) - 0.5 * np.nansum(white**2, axis=1)
+        return mean_log_density(densities - 0.5 * np.log(2 * np.pi) * present.sum(axis=1), present)
+
+    @overload
+    def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def applicability(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def applicability(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """How far the temperatures of records lie outside those of the baseline.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features - n_targets)
+            In units of the range of each column in the baseline; 0 inside it, NaN where the value is missing.
+        """
+        check_is_fitted(self)
+        temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        return frame_like(temperatures, self.training_range_.excess(temperatures))
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the targets.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Names of all columns; by default those seen in `fit`.
+
+        Returns
+        -------
+        ndarray of str
+            Names of the targets.
+        """
+        check_is_fitted(self)
+        return _check_feature_names_in(self, input_features)[self.targets_]
+
+    def _residuals(self, X: ArrayLike) -> tuple[Any, Array, Array, PredictionError, NDArray[np.bool_]]:
+        """Frequencies and weather of new records, residuals in Hz, errors of predictions, rows without a prediction."""
+        check_is_fitted(self)
+        temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        filled = fill_temperatures(self.sensors_, temperatures)
+        weather = as_floats(filled)
+        reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
+        outside = reach.warning(inputs)
+        if outside:
+            warn_user(outside, "weather outside the training range")
+        warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
+        apart = self.sensors_.warning(temperatures)
+        if apart:
+            warn_user(apart, "sensor apart from others")
+        predicted = self.regression_.predict(filled)
+        predicted[np.isnan(weather).all(axis=1)] = np.nan
+        unknown = warn_of_unpredicted(predicted, weather)
+        residuals = as_floats(frequencies) - predicted
+        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
+        errors = self.regression_.errors(filled).plus(fills, len(residuals))
+        return frequencies, weather, residuals, errors, unknown
+
+    def _with_spread(self, residuals: Array) -> Array:
+        """Residuals without those of targets that had none in the baseline."""
+        return np.where(np.diag(self.spread_.overall.covariance) > 0, residuals, np.nan)
+
+    def _log_volumes_shrunk(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
+        """As `Spread.log_volumes`, of residuals in Hz that are shrunk where predictions are uncertain."""
+        known = self._with_spread(residuals)
+        certain = self.spread_.log_volumes(weather, known, PredictionError.none())
+        return self.spread_.log_volumes(weather, known, errors) - certain
+
+    def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
+        if isinstance(self.estimator, type):
+            raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
+        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
+        check_positions_are_names(self.targets, getattr(X, "columns", ()))
+        self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+        names = _check_feature_names_in(self, None)[self.targets_]
+        check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
+        temperatures, frequencies = split_columns(X, values, self.targets_)
+        warn_of_disorder(X)
+        named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
+        return temperatures, frequencies, findings_of(check_records, pd.DataFrame(temperatures), named)
+
+    def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
+        """Learn from all rows; residuals of each from a clone fitted on the other folds."""
+        self.sensors_ = SensorRegression.of(temperatures)
+        filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
+        folds = Folds.of(self._wanted_folds(filled), filled)
+        self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
+        with warnings_once():
+            self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
+            predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
+            longer = folds.longer(filled, measured - predicted)
+            if longer is not None:
+                folds = longer
+                predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
+        self.estimator_ = self.regression_.estimator
+        self.folds_ = folds.of_row(len(measured))
+        if not self.regression_.tells_errors:
+            warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
+        length = None if folds.blocks is None else folds.blocks.length(filled)
+        self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
+        predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
+        warn_of_unpredicted(predicted[self.folds_ >= 0], as_floats(filled)[self.folds_ >= 0])
+        residuals = measured - predicted
+        fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
+        errors = told.plus(fills, len(residuals))
+        taught = residuals.copy()
+        if len(fills.rows) < len(residuals) / 2:
+            taught[fills.rows] = np.nan
+        if self.scale is None:
+            self.spread_ = Spread.of_all(taught, told)
+            return self.spread_.shrunk(residuals, errors)
+        empty = np.isnan(taught).all(axis=0)
+        if empty.any():
+            name = self.get_feature_names_out()[empty][0]
+            raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
+        size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
+        local, widens, near = self.scale == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
+        self.spread_, white = Spread.of(weather, taught, size, told, local=local, widens=widens, near=near)
+        if not len(fills.rows):
+            return white
+        untaught = np.isnan(taught).all(axis=1)
+        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white)
+
+    def _wanted_folds(self, temperatures: Any) -> Any:
+        """The folds that are asked for; rows without stamps stay together where lags need them to."""
+        if self.cv is not None or has_stamps(temperatures) or not has_lags_behind(self.estimator):
+            return self.cv
+        warn_user(
+            f"rows have no stamps, and lags inside {type(last_step(self.estimator)).__name__} would take rows of other "
+            "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
+            "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
+            "lags without stamps",
+        )
+        return "contiguous"
+
+
+def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
+    """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
+    filled, deviations = sensors.fill(temperatures)
+    consequence = "the spread of residuals is widened by what that costs"
+    message = told_fills(deviations, column_names(temperatures, "x"), consequence)
+    if message:
+        warn_user(message, "filled temperatures")
+    return frame_like(temperatures, filled)
+
+
+def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
+    """Rows of which nothing is predicted, so that they are not judged; a warning counts those not yet explained."""
+    unknown = np.isnan(predicted).all(axis=1)
+    others = "of which the estimator predicts nothing, as where lags reach to no record"
+    message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
+    if message:
+        warn_user(message, "rows that cannot be predicted")
+    return unknown
+
+
+def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[Any, Any]:
+    """The other columns and the targets, as frames if X is one."""
+    columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
+    others = np.delete(np.arange(len(columns)), targets)
+    temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, targets))
+    warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[targets], axis=1))
+    try:
+        check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
+    except ValueError as error:  # only a warning, as another column may be something else than a temperature
+        warn_user(str(error), "temperatures")
+    return temperatures, frequencies

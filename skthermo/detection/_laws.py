@@ -1,0 +1,101 @@
+"""Damage indices of windows: of the mean of their records, or of how many of them are far from the baseline."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, betaincinv
+from scipy.stats import chi
+
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array
+from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.detection._patterns import as_if_complete
+from skthermo.detection._windows import Windows
+from skthermo.residuals.gaussian import Gaussian, check_invertible
+
+SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
+
+
+@dataclass(frozen=True)
+class MeanLaw:
+    """Length of the mean of whitened records, over its standard deviation.
+
+    It grows with the mean ``correlation`` of two whitened records in one window, mode by mode.
+    """
+
+    records: Gaussian
+    correlation: Array
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp]) -> MeanLaw:
+        """Learned from the records in some rows, and from the windows that end there."""
+        records = Gaussian.of(windows.rows[rows])
+        check_invertible(records.covariance, windows.rows[rows])
+        white = records.whiten(windows.rows)
+        sums, counts = windows.sums(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
+        squares = windows.sums(np.nan_to_num(white) ** 2)
+        excess, pairs = (sums**2 - squares)[rows].sum(axis=0), (counts**2 - counts)[rows].sum(axis=0)
+        return cls(records, np.clip(excess / np.maximum(pairs, 1), 0.0, 1.0))
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window; NaN where no record has a mode."""
+        white = self.records.whiten(windows.rows)
+        sums, counts = windows.sums_apart(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
+        variances = (1 - self.correlation) * counts + self.correlation * counts**2
+        known = counts > 0
+        squared = np.where(known, sums**2, 0.0) / np.where(known, variances, 1.0)
+        return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), sums.shape[1])
+
+
+@dataclass(frozen=True)
+class CountLaw:
+    """The m-th largest damage index of the n records in a window: it exceeds a threshold where m records do.
+
+    In a window with gaps, the index is the one that is as unlikely in a full window of independent records, by the
+    binomial law.
+    """
+
+    detector: MahalanobisDetector
+    n: int
+    m: int
+
+    @classmethod
+    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> CountLaw:
+        """Learned from the records in some rows."""
+        detector = MahalanobisDetector(contamination, threshold="quantile")
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"\d+ of \d+ (baseline )?values")  # the whole baseline has been checked
+            detector.fit(windows.rows[rows])
+        n = int(np.median(windows.sizes))
+        if m is not None and m > n:
+            raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")
+        return cls(detector, n, (n + 1) // 2 if m is None else m)
+
+    def index(self, windows: Windows) -> Array:
+        """Damage index of every window; NaN where no record has a mode."""
+        with without_warnings():  # the alarm counts windows that are not judged
+            single = self.detector.damage_index(windows.rows)
+        padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
+        last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)
+        inside = np.arange(windows.longest) >= windows.longest - windows.sizes[:, np.newaxis]
+        return self._as_if_full(np.where(inside, last, np.nan), windows.rows.shape[1])
+
+    def _as_if_full(self, single: Array, n_modes: int) -> Array:
+        """The m-th largest index of each row, m in proportion to the records that are there."""
+        count = (~np.isnan(single)).sum(axis=1)
+        m = np.maximum(np.rint(self.m * count / self.n), 1).astype(int)
+        value = -np.take_along_axis(np.sort(-single, axis=1), np.minimum(m, single.shape[1])[:, np.newaxis] - 1, axis=1)
+        value, partial = value[:, 0], (count != self.n) & (count > 0)
+        value[partial] = self._equally_likely(value[partial], m[partial], count[partial], n_modes)
+        return value
+
+    def _equally_likely(self, value: Array, m: NDArray[np.intp], count: NDArray[np.intp], n_modes: int) -> Array:
+        """Indices in a full window that are as unlikely as these, the m-th of ``count``."""
+        farthest = chi.isf(betaincinv(m, count - m + 1, SMALLEST_CHANCE), n_modes)
+        chance = betainc(m, count - m + 1, chi.sf(np.minimum(value, farthest), n_modes))
+        full = chi.isf(betaincinv(self.m, self.n - self.m + 1, np.maximum(chance, SMALLEST_CHANCE)), n_modes)
+        return np.maximum(value / farthest, 1.0) * full

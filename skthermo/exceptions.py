@@ -1,0 +1,47 @@
+"""Kinds of warnings, which Python's own filters can tell apart."""
+
+__all__ = [
+    "FewRecordsWarning",
+    "ModelWarning",
+    "RecordsWarning",
+    "ResultWarning",
+    "SkthermoWarning",
+    "UnevaluatedRowsWarning",
+    "WeatherWarning",
+]
+
+
+class SkthermoWarning(UserWarning):
+    """Any warning of skthermo.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from skthermo.exceptions import SkthermoWarning
+    >>> warnings.filterwarnings("error", category=SkthermoWarning)  # to stop a script at the first one
+    >>> warnings.filterwarnings("default", category=SkthermoWarning)
+    """
+
+
+class RecordsWarning(SkthermoWarning):
+    """Records that look wrong, such as numbers in place of missing values, sensors that are stuck, exchanged modes."""
+
+
+class FewRecordsWarning(SkthermoWarning):
+    """Fewer records than what is asked for needs: rows to train, records before the first for lags."""
+
+
+class WeatherWarning(SkthermoWarning):
+    """Weather, or a season, that the training records have not seen."""
+
+
+class UnevaluatedRowsWarning(SkthermoWarning):
+    """Rows or poles that are left out or NaN, because they lack what their evaluation needs."""
+
+
+class ModelWarning(SkthermoWarning):
+    """An FE model, its parameters or its modes that are doubtful, or calculations with it that failed."""
+
+
+class ResultWarning(SkthermoWarning):
+    """A result that is doubtful although its records and the model are not, or of something else than one may think."""

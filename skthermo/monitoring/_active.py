@@ -1,0 +1,298 @@
+"""The detector in charge: damage indices of records, the modes that drive them, and why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.pipeline import Pipeline
+
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import DAY
+from skthermo._validation import BaseSearchCV, last_step
+from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.monitoring._corrections import Corrections
+from skthermo.monitoring._direction import Direction
+from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
+from skthermo.preprocessing.checks import Plausible
+from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
+
+DECIMALS = 6  # of a damage index
+CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
+MATTERS = 2.0  # standard deviations from which a mode drives an alarm
+MOST_MODES = 3  # that are named
+N_CHECKED = 5  # baseline records that are judged alone and among others
+N_AROUND = 100  # records before their memory, and after them
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Steps up to a compensator, that compensator, and the detector behind; without one, the detector alone."""
+
+    before: list[Any]
+    compensator: TemperatureCompensator | None
+    last: Any
+
+    @classmethod
+    def all_of(cls, detector: Any) -> Iterator[Branch]:
+        """The one of a fitted detector, or those of each that a fused detector holds."""
+        last = last_step(detector)
+        if isinstance(last, FusedDetector):
+            for inner in last.detectors_:
+                yield from cls.all_of(inner)
+            return
+        steps = list(_steps(detector))
+        places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
+        compensator = steps[places[0]] if places else None
+        yield cls(steps[: places[0]] if places else [], compensator, last)
+
+    def standard(self, records: pd.DataFrame, usual: tuple[Array, Array], targets: list[Any]) -> Array:
+        """Residuals of records in standard deviations, or frequencies where there is no compensator."""
+        if self.compensator is None:
+            mean, deviation = usual
+            return (as_floats(records[targets]) - mean) / deviation
+        table: Any = records
+        for step in self.before:
+            table = step.transform(table)
+        residuals = as_floats(self.compensator.transform(table))
+        if self.compensator.scale is not None:
+            return residuals
+        overall = self.compensator.spread_.overall
+        deviation = np.sqrt(np.diag(overall.covariance))
+        return (residuals - overall.mean) / np.where(deviation > 0, deviation, 1.0)
+
+
+def _steps(detector: Any) -> Iterator[Any]:
+    """The fitted steps of a detector, one after the other."""
+    if isinstance(detector, BaseSearchCV):
+        yield from _steps(detector.best_estimator_)
+    elif isinstance(detector, Pipeline):
+        for _, step in detector.steps:
+            yield from _steps(step)
+    elif detector is not None and detector != "passthrough":
+        yield detector
+
+
+@dataclass(frozen=True)
+class ActiveDetector(SavesFrames):
+    """A fitted detector, and all by which it judges. It does not change: another one takes its place.
+
+    ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
+    the frequencies; records go through ``plausible`` and ``corrections`` before. Without a direction, all changes are
+    damage. There is a promise for each kind of event.
+    """
+
+    detector: Any
+    trained: pd.DataFrame
+    memory: Memory
+    columns: list[Any]
+    temperatures: list[Any]
+    targets: list[Any]
+    usual: tuple[Array, Array]
+    weather: TrainingRange
+    plausible: Plausible
+    corrections: Corrections
+    direction: Direction | None
+    promises: dict[str, Promise]
+
+    @classmethod
+    def of(
+        cls,
+        detector: Any,
+        trained: pd.DataFrame,
+        columns: list[Any],
+        targets: list[Any],
+        corrections: Corrections,
+        memory: Memory,
+        *,
+        by_direction: bool,
+        per_year: float,
+    ) -> ActiveDetector:
+        """Learned from what the detector was fitted on; ``by_direction`` tells softening from stiffening."""
+        temperatures = [name for name in trained.columns if name not in targets]
+        frequencies = as_floats(trained[targets])
+        deviation = np.nanstd(frequencies, axis=0)
+        usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
+        weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
+        index = pd.Series(last_step(detector).baseline_index_, trained.index)
+        direction, by_kind = None, {"damage": index}
+        if by_direction:
+            direction = Direction.of(detector, trained[columns], targets)
+            stiffer = direction.of_rows(trained[columns]) < 0
+            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
+            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
+        release = release_level(index, DAY)
+        promises = {kind: promised_rule(one, per_year, hold=DAY, release=release) for kind, one in by_kind.items()}
+        plausible = Plausible.of(trained, targets)
+        parts = (memory, columns, temperatures, targets, usual, weather, plausible, corrections, direction, promises)
+        return cls(detector, trained, *parts)
+
+    @property
+    def rules(self) -> dict[str, EventRule]:
+        """By which events of each kind open and close."""
+        return {kind: promise.rule for kind, promise in self.promises.items()}
+
+    @property
+    def threshold(self) -> float:
+        """A damage event opens with an index above it."""
+        return self.promises["damage"].rule.threshold
+
+    @property
+    def baseline_index(self) -> pd.Series:
+        """Damage indices of what it was fitted on, each record judged by others."""
+        return pd.Series(last_step(self.detector).baseline_index_, self.trained.index)
+
+    def ratio(self, records: pd.DataFrame) -> Array:
+        """Damage index over threshold."""
+        return self._exact(records) / self.threshold
+
+    def own_ratio(self, times: pd.DatetimeIndex) -> Array:
+        """The same of records that it was fitted on, each judged by the others."""
+        return (self.baseline_index / self.threshold).reindex(times).to_numpy()
+
+    def by_kind(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
+        """Index of the records from a position on for each kind of event.
+
+        It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
+        """
+        if self.direction is None:
+            return {"damage": index}
+        with np.errstate(invalid="ignore"):
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.promises["damage"].rule.release)
+        stiffer = np.zeros(len(index), dtype=bool)
+        if wanted.any():
+            begin = self.memory.start(records.index.asi8, first)
+            signs = self.direction.of_rows(records.iloc[begin:][self.columns], wanted[begin:])
+            stiffer = signs[first - begin :] < 0
+        softer = wanted[first:] & ~stiffer
+        return {"damage": np.where(stiffer, np.nan, index), "stiffening": np.where(softer, np.nan, index)}
+
+    def index(self, records: pd.DataFrame, first: int) -> Array:
+        """Damage index of the records from a position on, in order of time, rounded; those before are their memory.
+
+        The number of records in a call moves the last bits of an index. Where they decide how it is rounded, the one
+        of the record alone with its memory counts.
+        """
+        times = records.index.asi8
+        start = self.memory.start(times, first)
+        exact = self._exact(records.iloc[start:])[first - start :]
+        scaled = exact * 10.0**DECIMALS
+        from_edge = np.abs(np.abs(scaled - np.floor(scaled)) - 0.5)
+        close = np.flatnonzero(from_edge <= CLOSE * np.maximum(np.abs(exact), 1.0) * 10.0**DECIMALS)
+        for row in close:
+            exact[row] = self.alone(records, times, first + row)
+        return np.round(exact, DECIMALS)
+
+    def alone(self, records: pd.DataFrame, times: NDArray[np.int64], row: int) -> float:
+        """Damage index of one record by a call with just its memory."""
+        return self._exact(records.iloc[self.memory.start(times, row) : row + 1])[-1]
+
+    def check_memory(self) -> None:
+        """Refuse a detector that looks at later records, or farther back than its memory: it would judge batches
+        differently from all records at once."""
+        baseline, times = self.trained, self.trained.index.asi8
+        rows = np.linspace(len(times) // 2, min(len(times) // 2 + N_AROUND, len(times) - 1), N_CHECKED).astype(np.intp)
+        start = max(self.memory.start(times, int(rows[0])) - N_AROUND, 0)
+        whole = self._exact(baseline.iloc[start : rows[-1] + N_AROUND])[rows - start]
+        alone = np.array([self.alone(baseline, times, int(row)) for row in rows])
+        same = np.isclose(whole, alone, rtol=1e-6, atol=1e-9, equal_nan=True)
+        if not same.all():
+            row = int(np.argmin(same))
+            raise ValueError(
+                f"the damage index of {baseline.index[rows[row]]} is {whole[row]:.6g} among all records and "
+                f"{alone[row]:.6g} with the records of {self.memory} before it: the detector looks at later records, "
+                "or farther back; expected steps that look back only, and memory='48h' where that is how far"
+            )
+
+    def _exact(self, records: pd.DataFrame) -> Array:
+        with without_warnings():
+            return -np.asarray(self.detector.score_samples(records[self.columns]), dtype=float)
+
+    def drivers(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
+        """Names of the modes that drive the damage index of some records, the worst first."""
+        if not len(rows):
+            return []
+        times = records.index.asi8
+        start = self.memory.start(times, rows[0])
+        part = records.iloc[start : rows[-1] + 1]
+        places = rows - start
+        sizes = []
+        for branch in Branch.all_of(self.detector):
+            with without_warnings():
+                standard = branch.standard(part[self.columns], self.usual, self.targets)
+            if isinstance(branch.last, WindowedAlarm):
+                standard = _window_means(standard, branch.last, times[start : rows[-1] + 1], places)
+            else:
+                standard = standard[places]
+            sizes.append(np.nan_to_num(np.abs(standard)))
+        size = np.round(np.mean(sizes, axis=0), 2)
+        names = []
+        for row in size:
+            worst = np.argsort(-row, kind="stable")[:MOST_MODES]
+            names.append(", ".join(str(self.targets[k]) for n, k in enumerate(worst) if n == 0 or row[k] > MATTERS))
+        return names
+
+    def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
+        """Why some records have no damage index."""
+        if not len(rows):
+            return []
+        branches = list(Branch.all_of(self.detector))
+        start = self.memory.start(records.index.asi8, rows[0])
+        part, places = records.iloc[start : rows[-1] + 1], rows - start
+        with without_warnings():
+            standards = [branch.standard(part[self.columns], self.usual, self.targets)[places] for branch in branches]
+        F, T = (as_floats(part[names])[places] for names in (self.targets, self.temperatures))
+        compensates = any(branch.compensator is not None for branch in branches)
+        unknown = np.isnan(np.concatenate(standards, axis=1)).all(axis=1)
+        causes = []
+        for n in range(len(rows)):
+            missing = [str(name) for name, value in zip(self.targets, F[n], strict=True) if np.isnan(value)]
+            if len(missing) == len(self.targets):
+                causes.append("no mode has a value")
+            elif compensates and np.isnan(T[n]).all():
+                causes.append("no temperature has a value")
+            elif unknown[n]:
+                causes.append("lags find no record, or a value before it is missing")
+            elif missing and all(isinstance(branch.last, OutlierDetector) for branch in branches):
+                causes.append(f"{', '.join(missing)} missing, and the detector needs every mode")
+            elif any(isinstance(branch.last, WindowedAlarm) for branch in branches):
+                fewest = min(branch.last.fewest_ for branch in branches if isinstance(branch.last, WindowedAlarm))
+                causes.append(f"its window holds fewer than {fewest} records with a value")
+            else:
+                causes.append("the detector gives no damage index")
+        return causes
+
+    def reasons(self, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str]) -> list[str]:
+        """Why records from a position on are not judged, and what else is worth saying of them, beside their marks."""
+        unknown = np.flatnonzero(np.isnan(index))
+        causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
+        outside = self.far_outside(records.iloc[first:])
+        phrases = (
+            [causes.get(n, ""), mark, "temperatures far outside those of the baseline" if far else ""]
+            for n, (mark, far) in enumerate(zip(marks, outside, strict=True))
+        )
+        return ["; ".join(filter(None, parts)) for parts in phrases]
+
+    def far_outside(self, records: pd.DataFrame) -> NDArray[np.bool_]:
+        """Which records have a temperature far outside those of the baseline."""
+        if not self.temperatures:
+            return np.zeros(len(records), dtype=bool)
+        excess = self.weather.excess(records[self.temperatures])
+        return (np.nan_to_num(excess) > FAR_OUTSIDE).any(axis=1)
+
+
+def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:
+    """Means over the windows that end with some records; in their own standard deviations under the rule "mean"."""
+    memory, correlation = Memory.of(alarm), getattr(alarm.law_, "correlation", 1.0)
+    windows = [standard[memory.start(times, row) : row + 1] for row in rows]
+    with without_warnings():  # a mode that has no value in a window
+        means = np.array([np.nanmean(window, axis=0) for window in windows])
+    counts = np.array([np.maximum((~np.isnan(window)).sum(axis=0), 1) for window in windows])
+    return means / np.sqrt((1 - correlation) / counts + correlation)

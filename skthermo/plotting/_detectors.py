@@ -1,0 +1,466 @@
+"""Several detectors beside each other: their ranking, and measured rates of alarms beside simulated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pandas as pd
+from scipy.stats import spearmanr
+
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import percent, printable, share_text
+from skthermo.plotting._axes import LETTER, figure_legend
+from skthermo.plotting._display import Display
+from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, plain, shortened
+from skthermo.plotting._tables import check_study
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
+    from matplotlib.container import BarContainer
+
+    from skthermo.studies import DetectabilityStudy
+
+SIMULATED, REFERENCE = "data-informed", "reference"
+OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "band_lowest", "band_highest"]
+OF_RANKING = [
+    *("false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit", "pod", "pod_lowest", "pod_highest"),
+    *("pod_equal", "behind", "behind_lowest", "behind_highest", "clearly_behind"),
+]
+LEVEL, ONE_REPEAT = "best, or not clearly behind", "order not sure: one repeat"
+BEHIND, FAILED = "clearly behind", "failed"
+FEWEST = 3  # detectors from which on their ranks are compared
+
+ROW, MARGINS = 0.26, 1.5
+"""Inches that a row takes, and all that is above and below the rows."""
+
+PERCENT = (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100)  # ticks of an axis of small rates
+MARGIN = 0.02  # share of an axis of small rates that is below 0
+CLOSEST = 0.07  # share of the axis that two ticks are apart at least
+LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
+RATES = ["low", "high", "value", "mark"]
+
+
+@dataclass(frozen=True, eq=False)
+class RatesPanel:
+    """What one panel shows of each detector: ``rates``, indexed by detector, has the columns ``low``, ``high``,
+    ``value``, ``mark`` (in percent) and ``is_open``, whether the mark is not filled; ``notes`` are by detector. An axis
+    of small rates is even in their square root, one of shares goes to 100 %."""
+
+    title: str
+    label: str
+    rates: pd.DataFrame
+    notes: Mapping[Hashable, str] = field(default_factory=dict)
+    axis: Literal["small", "shares", "free"] = "shares"
+    limit: float | None = None
+
+
+@dataclass(eq=False, repr=False)
+class DetectorsDisplay(Display):
+    """Detectors beside each other, a row for each: their ranking, or measured rates beside simulated ones.
+
+    Of a ranking, three panels show false alarms with their limit; found damage, the mean over all damaged scenarios, at
+    the detector's own threshold and, as circles, with thresholds moved to equal false alarms; and how much less than
+    the best each one finds, with bounds for all comparisons together. Headings say which detectors are not clearly
+    behind the best, which are (grey), which raise clearly more false alarms than the limit (orange), and which failed.
+
+    Of results with measured records, there is a panel for each scenario: false alarms of the healthy structure, and
+    found damage. A bar is the band in which the rate of one measured campaign should lie, the line in it the mean of
+    all simulated ones, a dot the measured rate; a reference of several repeats is a mean, too, and not compared with
+    the band. Detectors are in the order of the damage that they find in simulation.
+
+    Failures, and shares of records that are not judged, which count neither as healthy nor as alarms, are told in
+    words. The axis of false alarms is even in their square root, so that small ones are told apart.
+
+    It is best made by `from_estimator` or `from_predictions`.
+
+    Parameters
+    ----------
+    panels : dict of str to RatesPanel
+        What is drawn, by name.
+    places : dict of (heading, detector) to int
+        Rows from above; a heading is in the row (heading, None).
+    colours : dict of str to str
+        Colour of each detector's bounds.
+    labels : sequence of str
+        Legend of bounds, values, filled marks and open marks.
+    agreement : DataFrame, optional
+        By scenario, over the detectors that have both rates: their number ``n_detectors``, how many measured rates lie
+        in the band, ``n_inside``, of how many that have one, ``n_bands``, and Spearman's ``rank_correlation`` of the
+        measured rates with the simulated ones (NaN for less than three detectors).
+
+    Attributes
+    ----------
+    axes_ : ndarray of Axes of shape (n_panels,)
+        One for each panel.
+    figure_ : Figure
+        Their figure.
+    bars_ : dict of str to BarContainer
+        Bounds or bands, by panel.
+    values_ : dict of str to PathCollection
+        Rates, by panel.
+    marks_ : dict of str to list of PathCollection
+        Filled and open marks, by panel.
+
+    See Also
+    --------
+    skthermo.studies.DetectabilityStudy.labelled_scores : Scores for ROC curves, which scikit-learn draws.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import pandas as pd
+    >>> from skthermo.plotting import DetectorsDisplay
+    >>> ranking = pd.DataFrame(
+    ...     {"false_alarms": [0.01, 0.02], "false_alarms_lowest": [0.0, 0.01], "false_alarms_highest": [0.02, 0.03],
+    ...      "keeps_limit": True, "pod": [0.9, 0.5], "pod_lowest": [0.8, 0.4], "pod_highest": [1.0, 0.6],
+    ...      "pod_equal": [0.92, 0.5], "behind": [0.0, 0.42], "behind_lowest": [0.0, 0.3], "behind_highest": [0.0, 0.5],
+    ...      "clearly_behind": [False, True]}, index=["whitened", "raw"])
+    >>> display = DetectorsDisplay.from_predictions(ranking)
+    >>> [text.get_text() for text in display.axes_[0].get_yticklabels()]
+    ['best, or not clearly behind', 'whitened', 'clearly behind', 'raw']
+    >>> plt.close(display.figure_)
+    """
+
+    panels: Mapping[str, RatesPanel]
+    places: Mapping[tuple[Hashable, Hashable], int]
+    _: KW_ONLY
+    colours: Mapping[Hashable, str]
+    labels: Sequence[str]
+    agreement: pd.DataFrame | None = None
+
+    @classmethod
+    def from_estimator(
+        cls,
+        study: DetectabilityStudy,
+        what: Literal["ranking", "agreement"] = "ranking",
+        *,
+        max_false_alarms: float = 0.02,
+        source: str = SIMULATED,
+        by: Literal["pod", "pod_equal"] = "pod",
+        **options: object,
+    ) -> DetectorsDisplay:
+        """Draw the ranking of the detectors of a study, or its simulated rates beside measured ones.
+
+        Parameters
+        ----------
+        study : DetectabilityStudy
+            With results.
+        what : {"ranking", "agreement"}, default="ranking"
+            What is drawn; "agreement" needs a run with a ``reference``.
+        max_false_alarms : float, default=0.02
+            Limit of the share of false alarms in a ranking.
+        source : str, default="data-informed"
+            Records of a ranking: "data-informed" (simulated) or "reference".
+        by : {"pod", "pod_equal"}, default="pod"
+            What a ranking compares: detectors as they are, or with thresholds moved to equal false alarms.
+        **options : dict
+            Options of `from_predictions` and of `plot`.
+
+        Returns
+        -------
+        DetectorsDisplay
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If ``what`` is something else, or the study has no healthy scenario to rank by, or no measured records.
+        """
+        check_study(study)
+        if what not in ("ranking", "agreement"):
+            raise ValueError(f"what is {what!r}; expected 'ranking' or 'agreement'")
+        if what == "agreement":
+            return cls.from_predictions(study.results_, **options)
+        ranking = study.ranking(max_false_alarms, source, by=by)
+        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, by=by, **options)
+
+    @classmethod
+    def from_predictions(
+        cls,
+        table: pd.DataFrame,
+        *,
+        max_false_alarms: float = 0.02,
+        by: Literal["pod", "pod_equal"] = "pod",
+        scenarios: Sequence[str] | None = None,
+        groups: Mapping[str, str] | None = None,
+        **options: object,
+    ) -> DetectorsDisplay:
+        """Draw a ranking, or results with measured records.
+
+        Parameters
+        ----------
+        table : DataFrame
+            What `~skthermo.studies.DetectabilityStudy.ranking` or `~skthermo.studies.DetectabilityStudy.run` returned,
+            or rows of several results, for example false alarms in one weather and found damage in another.
+        max_false_alarms : float, default=0.02
+            Limit of the share of false alarms with which a ranking was made.
+        by : {"pod", "pod_equal"}, default="pod"
+            What was compared with the best in a ranking.
+        scenarios : sequence of str, optional
+            Scenarios of results that are drawn, in this order. By default all, false alarms first.
+        groups : mapping of str to str, optional
+            Group of each detector of results, such as "raw" or "compensated", which becomes a heading.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        DetectorsDisplay
+
+        Raises
+        ------
+        ValueError
+            If the table lacks columns; if no scenario has both simulated and measured records, or a detector has two
+            rates of one scenario; if a scenario or a detector of a group is not in the table.
+        """
+        columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
+        needed = OF_RANKING if "keeps_limit" in columns else OF_RESULTS
+        missing = [name for name in needed if name not in columns]
+        if missing or not len(table):
+            got = f"lacks the columns {missing}" if columns and missing else f"is {table!r:.200}"
+            raise ValueError(f"table {got}; expected a ranking, or results with {OF_RESULTS}, and one row or more")
+        if needed is OF_RANKING:
+            return cls(**of_ranking(table, max_false_alarms, by)).plot(**options)
+        return cls(**of_results(table, scenarios, groups or {})).plot(**options)
+
+    def plot(self, ax: Axes | np.ndarray | None = None, *, n_columns: int | None = None) -> DetectorsDisplay:
+        """Draw into axes.
+
+        Parameters
+        ----------
+        ax : matplotlib's Axes or array of Axes, optional
+            One for each panel. A new figure by default.
+        n_columns : int, optional
+            Panels beside each other in a new figure; by default 3 of a ranking, and else 2.
+
+        Returns
+        -------
+        DetectorsDisplay
+            Itself.
+        """
+        n_columns = min(n_columns or (3 if self.agreement is None else 2), len(self.panels))
+        n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
+        size = 3.6 + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
+        self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
+        self.bars_: dict[str, BarContainer] = {}
+        self.values_: dict[str, PathCollection] = {}
+        self.marks_: dict[str, list[PathCollection]] = {}
+        for one, (name, panel) in zip(self.axes_, self.panels.items(), strict=True):
+            name_rows(one, self.places)
+            self._draw_rates(one, name, panel)
+            self._write_notes(one, panel)
+        figure_legend(self.axes_, ax is None)
+        return self
+
+    def _draw_rates(self, ax: Axes, name: str, panel: RatesPanel) -> None:
+        heights = {detector: height for (_, detector), height in self.places.items() if detector is not None}
+        y = panel.rates.index.map(heights).to_numpy(dtype=float)
+        low, high, value, mark = panel.rates[RATES].to_numpy(dtype=float).T
+        colours = [self.colours[detector] for detector in panel.rates.index]
+        if panel.axis == "small":
+            small_rates(ax, np.append(np.r_[high, value, mark], panel.limit or 0.0))
+        elif panel.axis == "shares":
+            ax.set_xlim(-1, 101)
+        ax.set_title(panel.title, fontsize="medium")
+        ax.set_xlabel(panel.label)
+        if panel.limit is not None:
+            ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of false alarms")
+        bounds, mean, filled, empty = self.labels
+        self.bars_[name] = ax.barh(y, high - low, 0.62, low, color=colours, alpha=0.35, label=bounds)
+        style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": mean}
+        self.values_[name] = ax.scatter(value, y, **style)
+        self.marks_[name] = []
+        is_open = panel.rates["is_open"].to_numpy(dtype=bool)
+        for rows, face, label in ((~is_open, BLUE, filled), (is_open, "white", empty)):
+            rows = rows & np.isfinite(mark)
+            style = {"s": 30, "edgecolors": BLUE, "facecolors": face, "zorder": 4}
+            self.marks_[name].append(ax.scatter(mark[rows], y[rows], **style, label=label if rows.any() else None))
+
+    def _write_notes(self, ax: Axes, panel: RatesPanel) -> None:
+        """Small texts at that end of their rows where there is more room."""
+        for (_, detector), height in self.places.items():
+            text = printable(panel.notes.get(detector, ""))
+            if not text:
+                continue
+            text = text if len(text) <= LONGEST_NOTE else f"{text[:LONGEST_NOTE].rstrip()} ..."
+            is_right = False
+            if detector in panel.rates.index:
+                drawn = panel.rates.loc[detector, RATES].astype(float)
+                is_right = bool(ax.get_xlim()[1] - drawn.max() > drawn.min())
+            place = {"x": 0.99 if is_right else 0.01, "ha": "right" if is_right else "left"}
+            style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True, "in_layout": False}
+            ax.text(y=height, s=plain(text), transform=ax.get_yaxis_transform(), **place, **style)
+
+
+def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
+    """What a display of a ranking is made of."""
+    level = LEVEL if ranking["behind_lowest"].notna().any() else ONE_REPEAT
+    loud = f"more than {percent(limit)} false alarms"
+    is_tested = np.isfinite(ranking["false_alarms"].astype(float))
+    kinds = ranking["clearly_behind"].astype(bool).map({True: BEHIND, False: level})
+    kinds = kinds.where(ranking["keeps_limit"].astype(bool), loud).where(is_tested, FAILED)
+    kinds = kinds.sort_values(key=lambda names: names.map([level, BEHIND, loud, FAILED].index), kind="stable")
+    tested = ranking[is_tested]
+
+    def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:
+        table = tested[[f"{name}_lowest", f"{name}_highest", name]].set_axis(RATES[:3], axis=1)
+        return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
+
+    errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
+    unjudged = tested["not_judged"] if "not_judged" in tested else pd.Series(dtype=float)
+    notes = {name: f"{share_text(share)} not judged" for name, share in unjudged.items() if share > 0}
+    label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
+    false, found = "healthy records in alarm (%)", "damaged records in alarm (%)"
+    panels = {
+        "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
+        "pod": RatesPanel("damage found", found, rates("pod", tested["pod_equal"]), notes),
+        "behind": RatesPanel("less found than by the best", label, rates("behind"), axis="free"),
+    }
+    colours = {name: {LEVEL: BLUE, ONE_REPEAT: BLUE, BEHIND: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
+    labels = ["bounds", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
+    places = places_of(list(ranking.index), kinds.to_dict())
+    return {"panels": panels, "places": places, "colours": colours, "labels": labels}
+
+
+def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: Mapping[str, str]) -> dict[str, object]:
+    """What a display of measured rates beside simulated ones is made of."""
+    failed = results["scenario"].isna()
+    errors = {row["detector"]: f"failed: {row.get('error', '')}" for _, row in results[failed].iterrows()}
+    table = both_rates(results[~failed])
+    measures = table.groupby("scenario", sort=False)["measure"].first()
+    known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index.tolist()
+    names = known if scenarios is None else [scenarios] if isinstance(scenarios, str) else list(scenarios)
+    if not names or not set(names) <= set(known):
+        raise ValueError(f"scenarios is {names}; expected some of {known}, which have simulated and measured rates")
+    rows = table[table["scenario"].isin(names)]
+    rows = rows[rows["measure"] == "POD"] if (rows["measure"] == "POD").any() else rows
+    found = rows.groupby("detector", sort=False)["value"].mean().sort_values(ascending=False, kind="stable")
+    order = list(dict.fromkeys([*found.index, *table["detector"], *errors]))
+    agreement = pd.DataFrame([_agreement(table[table["scenario"] == name]) for name in names])
+    agreement.index = pd.Index(names, name="scenario")
+    is_only = (measures[names] == "PFA").sum() == 1
+    panels = {}
+    for number, name in enumerate(names):
+        rates = table[table["scenario"] == name].set_index("detector")
+        lacking = [one for one in order if one not in rates.index and (number == 0 or one in set(table["detector"]))]
+        notes = {one: _unjudged(rates.loc[one]) for one in rates.index}
+        notes |= {one: errors.get(one, "no measured records") for one in lacking}
+        is_healthy = measures[name] == "PFA"
+        title = "false alarms" if is_healthy else "damage found"
+        title = title if is_healthy and is_only else f"{title}: {shortened(name)}"
+        rates = rates.assign(is_open=rates["inside"] == 0)
+        rates[RATES] *= 100
+        title = f"{title}\n{_words(agreement.loc[name])}".rstrip()
+        panels[name] = RatesPanel(title, "records in alarm (%)", rates, notes, "small" if is_healthy else "shares")
+    labels = ["band of single simulated campaigns", "simulated, mean", "measured", "measured, not in the band"]
+    return {
+        "panels": panels,
+        "places": places_of(order, groups),
+        "colours": dict.fromkeys(order, ORANGE),
+        "labels": labels,
+        "agreement": agreement,
+    }
+
+
+def _agreement(rows: pd.DataFrame) -> dict[str, float]:
+    rows = rows.dropna(subset=["value", "mark"])
+    pairs, inside = rows[["value", "mark"]].to_numpy(), rows["inside"].dropna()
+    can_rank = len(rows) >= FEWEST and (np.ptp(pairs, axis=0) > 0).all()
+    correlation = float(spearmanr(*pairs.T)[0]) if can_rank else float("nan")
+    numbers = {"n_detectors": len(rows), "n_inside": int(inside.sum()), "n_bands": len(inside)}
+    return numbers | {"rank_correlation": correlation}
+
+
+def _words(row: pd.Series) -> str:
+    """How many measured rates lie in their bands, and how well the ranks agree."""
+    texts = [f"{row['n_inside']:.0f} of {row['n_bands']:.0f} in the band"] if row["n_bands"] else []
+    if np.isfinite(row["rank_correlation"]):
+        texts.append(f"rank correlation {row['rank_correlation']:.2f}")
+    return ", ".join(texts)
+
+
+def both_rates(results: pd.DataFrame) -> pd.DataFrame:
+    """Simulated rates with their bands (value, low, high) and measured ones (mark), of scenarios that have both."""
+    keys = ["detector", "scenario"]
+    twice = results[results.duplicated([*keys, "source"], keep=False)]
+    if len(twice):
+        first = twice.iloc[0]
+        n_rows = int((twice[[*keys, "source"]] == first[[*keys, "source"]]).all(axis=1).sum())
+        raise ValueError(
+            f"detector {first['detector']!r} has {n_rows} rows of scenario {first['scenario']!r}, source "
+            f"{first['source']!r}; expected one: of each study, keep the scenarios that are to be compared"
+        )
+    share = np.nan
+    if {"n_records", "n_not_judged"} <= set(results.columns):
+        share = results["n_not_judged"] / (results["n_records"] + results["n_not_judged"])
+    results = results.assign(not_judged=share)
+    simulated, measured = (results[results["source"] == source] for source in (SIMULATED, REFERENCE))
+    both = set(simulated["scenario"]) & set(measured["scenario"])
+    if not both:
+        raise ValueError(
+            f"no scenario of {results['scenario'].unique().tolist()} has both simulated and measured records; expected "
+            "the results of a run with a reference"
+        )
+    left = simulated.rename(columns={"rate": "value", "band_lowest": "low", "band_highest": "high"})
+    right = measured.set_index(keys)
+    is_single = right.get("n_repeats", pd.Series(1, right.index)) == 1
+    right = right[["rate", "not_judged"]].set_axis(["mark", "not_judged_measured"], axis=1).assign(single=is_single)
+    left = left.loc[left["scenario"].isin(both), [*keys, "measure", "value", "low", "high", "not_judged"]]
+    table = left.join(right, on=keys).reset_index(drop=True)
+    known = table[["low", "high", "mark"]].notna().all(axis=1) & (table.pop("single") == 1)
+    inside = table["mark"].between(table["low"], table["high"]).astype(float)
+    return table.assign(inside=inside.where(known))
+
+
+def _unjudged(row: pd.Series) -> str:
+    """What share of the measured and of the simulated records is not judged; nothing if all are."""
+    measured, simulated = row["not_judged_measured"], row["not_judged"]
+    if measured > 0:
+        return f"{share_text(measured)} not judged{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
+    return f"{share_text(simulated)} of simulated not judged" if simulated > 0 else ""
+
+
+def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) -> dict[tuple[Hashable, Hashable], int]:
+    """Height of each row from above by group and detector; the row (group, None) is the heading of a group.
+
+    Groups come in the order of their names in the mapping, detectors without a group before them.
+    """
+    unknown = [name for name in groups if name not in names]
+    if unknown:
+        raise ValueError(f"groups names the detectors {unknown}; expected some of {list(names)}")
+    rows: list[tuple[Hashable, Hashable]] = [(None, name) for name in names if name not in groups]
+    for group in dict.fromkeys(groups.values()):
+        rows += [(group, None), *((group, name) for name in names if groups.get(name) == group)]
+    return {row: height for height, row in enumerate(rows)}
+
+
+def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None:
+    """Names of the detectors, headings of groups in bold type, and an empty frame; names stand left of the panels."""
+    texts = [label_of(group) if name is None else label_of(name) for group, name in places]
+    ax.set_yticks(list(places.values()), texts)
+    for text, (_, name) in zip(ax.get_yticklabels(), places, strict=True):
+        text.set_fontweight("bold" if name is None else "normal")
+    ax.set_ylim(len(places) - 0.4, -0.6)
+    cell = ax.get_subplotspec()
+    ax.tick_params(axis="y", length=0, labelleft=cell is None or cell.is_first_col())
+    ax.spines[["top", "right", "left"]].set_visible(False)
+    ax.grid(axis="x", color="#DDDDDD", linewidth=0.6)
+    ax.set_axisbelow(True)
+
+
+def small_rates(ax: Axes, drawn: Array) -> None:
+    """An axis from 0 to the largest of some rates in percent, whose square root is even: small ones are told apart."""
+    largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
+    functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
+    ticks: list[float] = []
+    for value in PERCENT:
+        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > CLOSEST * np.sqrt(largest)):
+            ticks.append(value)
+    ax.set_xscale("function", functions=functions)
+    ax.set_xlim(-(MARGIN**2) * largest, largest)
+    ax.set_xticks(ticks, [f"{value:g}" for value in ticks])

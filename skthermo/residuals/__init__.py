@@ -1,0 +1,3 @@
+"""Residuals of healthy records on the weather: their covariance, the range of weather that they know."""
+
+__all__: list[str] = []

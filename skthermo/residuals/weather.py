@@ -1,0 +1,349 @@
+"""Weather of records: its range, similar records, and temperatures that other sensors foretell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.decomposition import PCA
+from sklearn.neighbors import NearestNeighbors
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skthermo._estimators.warnings import warn_user, without_warnings
+from skthermo._tables.arrays import Array, as_floats, range_sums
+from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.times import has_stamps, row_times
+from skthermo.residuals.gaussian import Gaussian
+
+FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
+EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
+NUMBERS_AT_ONCE = 4_000_000  # held in memory
+BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
+UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
+MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
+LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
+JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
+FEWEST = 36  # records in a mean departure of a sensor
+LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
+TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
+MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
+A_DEGREE = 1.0  # below which thermometers may differ without a fault
+
+
+@dataclass(frozen=True)
+class TrainingRange:
+    """Lowest and highest value of every input of the rows that trained a mapper."""
+
+    lowest: Array
+    highest: Array
+    names: Sequence[Any]
+
+    @classmethod
+    def of(cls, inputs: Any, trained: Array) -> TrainingRange:
+        """The range of a mapper's inputs, over the rows that trained it."""
+        values = as_floats(inputs)[trained]
+        return cls(np.fmin.reduce(values), np.fmax.reduce(values), column_names(inputs, "T"))
+
+    def excess(self, inputs: Any) -> Array:
+        """How far each value is outside, in units of the range of its column; 0 inside, NaN where it is missing."""
+        values, width = as_floats(inputs), self.highest - self.lowest
+        beyond = np.maximum(np.maximum(self.lowest - values, values - self.highest), 0.0)
+        return beyond / np.where(width > 0, width, 1.0) + np.where(np.isnan(values), np.nan, 0.0)
+
+    def warning(self, inputs: Any) -> str:
+        """Text of the warning if rows are far outside the range, else an empty string."""
+        values = as_floats(inputs)
+        known = ~np.isnan(values).any(axis=1)
+        if not known.any():
+            return ""
+        limits = np.array([np.fmin.reduce(values), np.fmax.reduce(values)])
+        if (np.nan_to_num(self.excess(limits)) <= FAR_OUTSIDE).all():
+            return ""
+        excess = np.where(known[:, np.newaxis], self.excess(inputs), 0.0)
+        rows = (excess > FAR_OUTSIDE).any(axis=1)
+        if not rows.any():
+            return ""
+        column = int(excess.max(axis=0).argmax())
+        row = int(excess[:, column].argmax())
+        kelvin = " (these look like kelvin)" if np.nanmin(values[known]) > 150 else ""
+        value, lowest, highest = values[row, column], self.lowest[column], self.highest[column]
+        return (
+            f"{rows.sum()} of {len(rows)} rows have temperatures far outside those of the training records: "
+            f"{self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} to {highest:.4g}; expected "
+            f"degrees Celsius{kelvin}, and records of such weather to train on"
+        )
+
+
+def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
+    """Warn of the fold that has most records in weather that the other folds, from 0, have not seen."""
+    values, worst, text = as_floats(weather), UNSEEN, ""
+    for fold in np.unique(folds[folds >= 0]):
+        test = folds == fold
+        known = TrainingRange.of(weather, ~test)
+        excess = np.nan_to_num(known.excess(values[test]))
+        unseen = (excess > BEYOND).any(axis=1)
+        if unseen.mean() > worst and unseen.sum() >= LEAST_UNSEEN:
+            worst, column = unseen.mean(), int(excess.max(axis=0).argmax())
+            seen = values[test, column]
+            text = (
+                f"{unseen.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
+                f"the other folds have not seen: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
+                f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}: "
+                f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
+            )
+    if text:
+        warn_user(text, "weather of folds")
+
+
+@dataclass(frozen=True)
+class SensorRegression:
+    """What each sensor shows, given any others, as learned from records.
+
+    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records.
+    """
+
+    gaussian: Gaussian
+    learned: Array
+    reach: TrainingRange
+    usual: Mapping[int, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, temperatures: Any) -> SensorRegression:
+        """Learn from records; a sensor without any value is not learned."""
+        values = as_floats(temperatures)
+        telling = _telling_rows(values)
+        learned = ~np.isnan(telling).all(axis=0)
+        found = Gaussian.of(telling[:, learned])
+        variances = np.diag(found.covariance)
+        own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
+        reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
+        sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
+        departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
+        lengths = [length for length in FEWEST << np.arange(20) if length <= LARGEST * len(values)]
+        usual = {length: np.fmax.reduce(np.abs(_running_means(departures, length))) for length in lengths}
+        return replace(sensors, usual=usual)
+
+    def fill(self, temperatures: Any) -> tuple[Array, Array]:
+        """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
+
+        These are zero where a sensor has a value. Rows without any value stay NaN.
+        """
+        values = as_floats(temperatures).copy()
+        deviations = np.where(np.isnan(values), np.nan, 0.0)
+        gaps = np.flatnonzero(np.isnan(values[:, self.learned]).any(axis=1))
+        for part in parts(len(gaps), self.learned.sum() ** 2):
+            rows = np.ix_(gaps[part], self.learned)
+            values[rows], deviations[rows] = self.gaussian.completed(values[rows])
+        return values, deviations
+
+    def departures(self, temperatures: Any) -> Array:
+        """What each sensor shows minus what the others of its record foretell; NaN in records with gaps."""
+        values = as_floats(temperatures)
+        departures = np.full(values.shape, np.nan)
+        if self.learned.sum() > 1:
+            precision = np.linalg.inv(self.gaussian.covariance)
+            centred = values[:, self.learned] - self.gaussian.mean
+            departures[:, self.learned] = centred @ precision / np.diag(precision)
+        return departures
+
+    def warning(self, temperatures: Any) -> str:
+        """Text of the warning if a sensor departs from the others as it did not in training, else an empty string.
+
+        Records count in which the others are within their training range and it is not far outside, if these are most.
+        """
+        order = np.argsort(row_times(temperatures), kind="stable")
+        lengths = [length for length in self.usual if length <= len(order)]
+        if not lengths:
+            return ""
+        values, length = as_floats(temperatures)[order], max(lengths)
+        beyond = np.nan_to_num(self.reach.excess(values))
+        outside = beyond > 0
+        judged = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
+        departures = np.where(judged, self.departures(values), np.nan)
+        departures[:, judged.mean(axis=0) < 0.5] = np.nan
+        means, usual = _running_means(departures, length), self.usual[length]
+        least = np.maximum(MATTERS * (self.reach.highest - self.reach.lowest), A_DEGREE)
+        limits = np.maximum(TIMES_USUAL * usual, least)
+        excess = np.nan_to_num(np.abs(means) / limits)
+        place, sensor = np.unravel_index(excess.argmax(), excess.shape)
+        if excess[place, sensor] <= 1:
+            return ""
+        rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
+        first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
+        return (
+            f"{self.reach.names[int(sensor)]!r} departs from what the other sensors foretell in {len(rows)} of "
+            f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
+            f"records, where training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, "
+            "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other sensors "
+            "fill"
+        )
+
+    def errors(self, temperatures: Any) -> Iterator[Array]:
+        """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
+
+        There is one for each sensor with gaps; zero where a sensor has a value.
+        """
+        values = as_floats(temperatures)
+        missing = np.isnan(values[:, self.learned])
+        gaps = missing.any(axis=1) & ~missing.all(axis=1)
+        roots, of_row = self.gaussian.error_roots(values[np.ix_(gaps, self.learned)])
+        for sensor in np.flatnonzero(missing[gaps].any(axis=0)):
+            error = np.zeros_like(values)
+            error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
+            yield error
+
+
+@dataclass(frozen=True)
+class PredictionError:
+    """Covariance of the error of predictions that is known of each row, (n_rows, n_modes, n_modes).
+
+    ``rows`` are those with such an error.
+    """
+
+    rows: NDArray[np.intp]
+    covariances: Array
+
+    @classmethod
+    def of_rows(cls, covariances: Array) -> PredictionError:
+        """That of rows with a covariance each; zero where it is unknown."""
+        known = np.nan_to_num(covariances)
+        rows = np.flatnonzero(known.any(axis=(1, 2)))
+        return cls(rows, known[rows])
+
+    @classmethod
+    def of_fills(
+        cls,
+        sensors: SensorRegression,
+        raw: Any,
+        filled: Any,
+        predict: Callable[[Any], Array],
+        outcome: Callable[[Array], Array] = np.asarray,
+    ) -> PredictionError:
+        """What filled temperatures bring into predictions.
+
+        What was filled is moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
+        is that of the ``outcome`` of each prediction.
+        """
+        with without_warnings():
+            middle = np.empty(0)
+            moved: list[Array] = []
+            for error in sensors.errors(raw):
+                middle = middle if moved else predict(filled)
+                moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
+            if not moved:
+                return cls.none()
+            rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
+            start = outcome(middle[rows])
+            changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
+        return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
+
+    @classmethod
+    def none(cls) -> PredictionError:
+        """That of predictions of which no error is known."""
+        return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
+
+    def of_all(self, n_rows: int, n_modes: int) -> Array:
+        """The covariance of each row of a table, zero where nothing is known."""
+        covariances = np.zeros((n_rows, n_modes, n_modes))
+        if len(self.rows):
+            covariances[self.rows] = self.covariances
+        return covariances
+
+    def plus(self, other: PredictionError, n_rows: int) -> PredictionError:
+        """The error of two independent causes in a table of so many rows."""
+        if not len(other.rows):
+            return self
+        if not len(self.rows):
+            return other
+        n_modes = other.covariances.shape[1]
+        return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
+
+
+def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str:
+    """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
+    filled = deviations > 0
+    sensors = [
+        f"{name!r} in {rows.sum()} of {len(rows)} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
+        for name, rows, sizes in zip(names, filled.T, deviations.T, strict=True)
+        if rows.any()
+    ]
+    if not sensors:
+        return ""
+    return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
+
+
+def told_unpredicted(
+    unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach where none is"
+) -> str:
+    """Text of the warning that counts rows that cannot be predicted, for want of weather or as ``others`` says."""
+    if not unknown.any():
+        return ""
+    empty = np.isnan(weather).all(axis=1)
+    causes = {"without any temperature": unknown & empty, others: unknown & ~empty}
+    counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
+    return (
+        f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}; expected the records "
+        "before them, too, and at least one sensor that works"
+    )
+
+
+def _running_means(columns: Array, length: int) -> Array:
+    """Means of so many consecutive values, NaN where most are missing."""
+    first = np.arange(len(columns) - length + 1)
+    sums, counts = (range_sums(part, first, first + length) for part in (np.nan_to_num(columns), ~np.isnan(columns)))
+    return np.where(2 * counts > length, sums / np.maximum(counts, 1), np.nan)
+
+
+def _telling_rows(values: Array) -> Array:
+    """Records to learn from: the complete ones where most are, or where gaps would take long; else any."""
+    n_rows, n_sensors = values.shape
+    complete = np.flatnonzero(~np.isnan(values).any(axis=1))
+    most = int(np.clip(LONGEST_STEP / n_sensors**3, 3 * n_sensors, MOST_LEARNED))
+    if 2 * len(complete) >= n_rows or (most < n_rows and len(complete) >= 10 * n_sensors):
+        return values[complete[one_in_each_part(len(complete), MOST_LEARNED)]]
+    return values[one_in_each_part(n_rows, most)]
+
+
+def weather_coordinates(weather: Array) -> Pipeline:
+    """Principal components of the standardised weather, in which similar records are near each other."""
+    return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(weather)
+
+
+def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
+    """Distances and positions of the places nearest to each wanted one."""
+    return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
+
+
+def nearest_in_parts(places: Array, wanted: Array, number: int) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
+    """Distances and positions of the nearest places for some of the wanted ones after others: memory is bounded."""
+    number = min(number, len(places))
+    tree = NearestNeighbors(n_neighbors=number).fit(places)
+    for part in parts(len(wanted), number):
+        yield part, *tree.kneighbors(wanted[part])
+
+
+def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:
+    """Slices of rows of which all numbers together need little memory."""
+    step = max(NUMBERS_AT_ONCE // int(numbers_per_row), 1)
+    return (slice(first, min(first + step, n_rows)) for first in range(0, n_rows, step))
+
+
+def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
+    """Positions of all records or, if there are more, of one by chance in each of that many equal parts of them.
+
+    Every so-manieth record could always be that of the same hour.
+    """
+    if n_records <= most:
+        return np.arange(n_records)
+    shares = np.arange(most) + np.random.RandomState(0).uniform(size=most)
+    return (shares * n_records / most).astype(np.intp)
+
+
+def order_statistic(scores: Array, confidence: float) -> float:
+    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
+    rank = int(np.ceil((len(scores) + 1) * confidence))
+    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf

@@ -1,0 +1,150 @@
+"""Measured shifts beside the effects of causes, exact and tabulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._tables.arrays import Array
+from skthermo.studies.identification._causes import Cause
+from skthermo.studies.identification._evidence import Observed
+
+Effects = Callable[[Array], tuple[Array, Array]]
+
+SHARES = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6, 11 / 12, 1.0])  # of the bounds, where effects are tabulated
+N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them
+
+
+@dataclass(frozen=True)
+class Part:
+    """Shifts of one kind, of frequencies or of mode shapes: NaN where nothing was measured; (n_observed,) each.
+
+    Effects are a function from amounts of all causes, (..., n_causes), to the change and its derivatives. Errors follow
+    Student's law with ``freedom``.
+    """
+
+    effects: Effects
+    measured: Array
+    covariance: Array
+    freedom: float = np.inf
+
+    @property
+    def known(self) -> NDArray[np.intp]:
+        return np.flatnonzero(~np.isnan(self.measured))
+
+
+@dataclass(frozen=True)
+class ShiftComparison:
+    """All measured shifts, and the effects of all causes on them."""
+
+    parts: list[Part]
+
+    def observed(self, model_error: float = 0.0) -> Observed:
+        """What was measured."""
+        return Observed.of(
+            [(p.measured[p.known], p.covariance[np.ix_(p.known, p.known)], p.freedom) for p in self.parts],
+            model_error,
+        )
+
+    def effects(self, amounts: Array) -> tuple[Array, Array]:
+        """Changes, (..., n_observed), and their derivatives, (..., n_observed, n_causes)."""
+        solved = [part.effects(amounts) for part in self.parts]
+        changes = [change[..., part.known] for (change, _), part in zip(solved, self.parts, strict=True)]
+        slopes = [slope[..., part.known, :] for (_, slope), part in zip(solved, self.parts, strict=True)]
+        return np.concatenate(changes, axis=-1), np.concatenate(slopes, axis=-2)
+
+    def slopes(self, n_causes: int) -> Array:
+        """Effects of small amounts in standard errors, (n_observed, n_causes)."""
+        return self.observed().rotation @ self.effects(np.zeros(n_causes))[1]
+
+
+@dataclass(frozen=True)
+class CauseCurves:
+    """Effects of each cause at shares of its bound, in the coordinates of what was observed.
+
+    ``values`` and ``slopes``, by that share, have the shape (n_causes, n_nodes, n_observed); beyond a third of the
+    bound they are extrapolated unless ``is_whole``. ``first``, (n_observed, n_causes), are the derivatives of what was
+    observed itself, where nothing has changed.
+    """
+
+    bounds: Array
+    values: Array
+    slopes: Array
+    first: Array
+    is_whole: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, effects: Effects, causes: Sequence[Cause], observed: Observed) -> CauseCurves:
+        """Curves of exact effects of small amounts."""
+        bounds = np.array([cause.highest if cause.highest > 0 else cause.lowest for cause in causes])
+        columns = np.arange(len(causes))
+        solved, slopes = effects(np.vstack([np.zeros(len(causes)), _alone(bounds, columns, SHARES[1:N_SMALL])]))
+        values = np.zeros((len(causes), len(SHARES), solved.shape[1]))
+        tangents = np.zeros_like(values)
+        tangents[:, 0] = slopes[0].T * bounds[:, np.newaxis]
+        values[:, 1:N_SMALL], tangents[:, 1:N_SMALL] = _by_share(solved[1:], slopes[1:], bounds, columns)
+        beyond = (SHARES[N_SMALL:] - SHARES[N_SMALL - 1])[:, np.newaxis]
+        last = tangents[:, N_SMALL - 1 : N_SMALL]
+        values[:, N_SMALL:] = values[:, N_SMALL - 1 : N_SMALL] + beyond * last
+        tangents[:, N_SMALL:] = last
+        turned = (array @ observed.rotation.T for array in (values, tangents))
+        return cls(bounds, *turned, slopes[0], np.zeros(len(causes), dtype=bool))
+
+    def whole(self, effects: Effects, columns: Sequence[int], observed: Observed) -> CauseCurves:
+        """The same with exact effects of large amounts of some causes."""
+        values, tangents, is_whole = self.values.copy(), self.slopes.copy(), self.is_whole.copy()
+        found = _by_share(*effects(_alone(self.bounds, columns, SHARES[N_SMALL:])), self.bounds, columns)
+        values[columns, N_SMALL:], tangents[columns, N_SMALL:] = (array @ observed.rotation.T for array in found)
+        is_whole[columns] = True
+        return replace(self, values=values, slopes=tangents, is_whole=is_whole)
+
+    def are_small(self, causes: Sequence[int], amounts: Array) -> NDArray[np.bool_]:
+        """Whether amounts of causes, (n_causes,), are within those that all causes are tabulated for."""
+        return np.abs(amounts) <= SHARES[N_SMALL - 1] * np.abs(self.bounds[list(causes)])
+
+    def at(self, sets: Array, amounts: Array) -> tuple[Array, Array]:
+        """Changes by sets (n_sets, k) of amounts (n_sets, n_errors, k), and their derivatives."""
+        shape = (*amounts.shape[:-1], self.values.shape[-1])
+        change, slopes = np.zeros(shape), []
+        for i in range(sets.shape[-1]):
+            column = sets[:, i, np.newaxis]
+            share = amounts[..., i] / self.bounds[column]
+            values, slope = cubic(SHARES, self.values, self.slopes, column, share, self.bounds[column])
+            change += values
+            slopes.append(slope)
+        return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0))
+
+
+def _alone(bounds: Array, columns: Sequence[int], shares: Array) -> Array:
+    """Amounts with one of some causes alone, at shares of its bound, a row each."""
+    single = np.diag(bounds)[columns]
+    return (shares[:, np.newaxis] * single[:, np.newaxis]).reshape(-1, len(bounds))
+
+
+def _by_share(changes: Array, slopes: Array, bounds: Array, columns: Sequence[int]) -> tuple[Array, Array]:
+    """Changes by single causes, (n_columns, n_shares, n_observed), and their slopes by the share of the bound."""
+    own = slopes.reshape(len(columns), -1, *slopes.shape[1:])[np.arange(len(columns)), ..., columns]
+    return changes.reshape(len(columns), -1, changes.shape[1]), own * bounds[columns, np.newaxis, np.newaxis]
+
+
+def cubic(nodes: Array, values: Array, slopes: Array, rows: Array, places: Array, units: Array) -> tuple[Array, Array]:
+    """Values in rows of a table at some places, (..., n_observed), by cubic polynomials, and derivatives by amounts.
+
+    ``values`` and ``slopes``, (n_rows, n_nodes, n_observed), are those at the nodes; ``units`` are amounts by place.
+    """
+    left = np.searchsorted(nodes[1:-1], places, side="right")
+    width = (nodes[left + 1] - nodes[left])[..., np.newaxis]
+    t = (places - nodes[left])[..., np.newaxis] / width
+    low, high = values[rows, left], values[rows, left + 1]
+    start, end = slopes[rows, left] * width, slopes[rows, left + 1] * width
+    found = (
+        (2 * t**3 - 3 * t**2 + 1) * low
+        + (t**3 - 2 * t**2 + t) * start
+        + (3 * t**2 - 2 * t**3) * high
+        + (t**3 - t**2) * end
+    )
+    slope = (6 * t**2 - 6 * t) * (low - high) + (3 * t**2 - 4 * t + 1) * start + (3 * t**2 - 2 * t) * end
+    return found, slope / (width * units[..., np.newaxis])

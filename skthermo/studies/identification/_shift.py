@@ -1,0 +1,119 @@
+"""Shift of measured frequencies from the healthy structure's in the same weather, and its error."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from skthermo._effects.frequencies import healthy_frequencies
+from skthermo._estimators.arguments import check_noise
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.times import has_stamps, row_times
+
+FEWEST_TO_JUDGE = 8  # records among which one may be called far from the others
+OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
+FAR = 6.0  # standard deviations beyond which a record is far from the others
+MAD_TO_DEVIATION = 1.4826
+WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
+
+
+@dataclass(frozen=True)
+class FrequencyShift:
+    """Mean relative shift of each mode, and what it stands on; NaN for a mode that was not measured or is not known.
+
+    It is the mean of ln(measured / predicted), less what the training records in similar weather show. Its errors have
+    the given covariance, and Student's t law with the degrees of ``freedom``. ``n_records`` is the number of records
+    of each mode, ``n_independent`` that of independent ones that would determine the mean as well, and ``wider`` how
+    many times as widely they scatter as the training records, 1 unless clearly more. These are worth ``n_trained``
+    independent ones.
+    """
+
+    mean: Array
+    covariance: Array
+    freedom: float
+    n_records: NDArray[np.intp]
+    n_independent: Array
+    wider: Array
+    n_trained: float
+    modes: Sequence[Any]
+
+
+def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
+    """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
+    residuals = as_floats(fem.expected_residuals(T))
+    return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals))) - fem.discrepancy_(T)
+
+
+def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
+    """Records far from the others in a mode, in units of their scatter or of the known one where that is larger.
+
+    None are if there are too few to tell, or if more than half of them would be.
+    """
+    if len(shifts) < FEWEST_TO_JUDGE or np.isnan(shifts).all():
+        return np.zeros(len(shifts), dtype=bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of modes that were not measured
+        usual = np.nanmedian(shifts, axis=0)
+        away = np.abs(shifts - usual)
+        scale = np.fmax(MAD_TO_DEVIATION * np.nanmedian(away, axis=0), np.hypot(deviations, OF_WEATHER * usual))
+    rows = (np.nan_to_num(away) > FAR * scale).any(axis=1)
+    return rows if rows.sum() < len(rows) / 2 else np.zeros(len(rows), dtype=bool)
+
+
+def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["fitted"]) -> FrequencyShift:
+    """The mean of shifts of records at temperatures T, and its covariance from the training records."""
+    scatter = scatter_of(fem, noise)
+    shifts = np.where(scatter.variances > 0, shifts, np.nan)
+    order, places = _places(fem.training_records_[0], T)
+    n_records, mean = (~np.isnan(shifts)).sum(axis=0), _mean(shifts)
+    new = scatter.of_sums(~np.isnan(shifts[order]) / np.maximum(n_records, 1), places)
+    n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
+    within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
+    spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
+    shares, judged, factor = fem.training_shares(T, (~np.isnan(shifts)).any(axis=1)), ~np.isnan(mean), 1.0
+    wider = np.ones(len(mean))
+    if isinstance(noise, str):
+        limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
+        wider = np.where(spread**2 > limit, spread, 1.0)
+        new = new * np.outer(wider, wider)
+    parts = new + scatter.of_sums(shares, np.arange(len(shares)))
+    freedom = scatter.freedom(parts)
+    if isinstance(noise, str):  # Hotelling: the covariance is not known, either
+        n_judged, of_correlations = judged.sum(), freedom + scatter.n_pseudo
+        factor = of_correlations / max(of_correlations - n_judged + 1, 1.0)
+        freedom = max(freedom - n_judged + 1, 1.0)
+    covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
+    return FrequencyShift(
+        mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_
+    )
+
+
+def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
+    """How records scatter: as in training, or as stated."""
+    if isinstance(noise, str):
+        if noise != "fitted":
+            raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
+        return fem.residuals_.scatter
+    deviations = check_noise(noise, len(fem.mode_names_), fem.mode_names_)
+    if (deviations == 0).any():
+        raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
+    return fem.residuals_.independent_scatter(deviations)
+
+
+def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:
+    """Order of rows in time, and their times in steps of the training records, or their numbers without stamps."""
+    if not (has_stamps(trained) and has_stamps(T)):
+        return np.arange(len(T)), np.arange(len(T), dtype=float)
+    times, step = row_times(T), np.median(np.diff(np.unique(row_times(trained))))
+    order = np.argsort(times, kind="stable")
+    return order, times[order] / step
+
+
+def _mean(values: Array) -> Array:
+    known = ~np.isnan(values)
+    sums = np.where(known, values, 0.0).sum(axis=0)
+    return np.divide(sums, known.sum(axis=0), out=np.full(len(sums), np.nan), where=known.any(axis=0))

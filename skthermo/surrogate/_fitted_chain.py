@@ -1,0 +1,107 @@
+"""What studies, monitors and fleets need of a chain that has been fitted."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
+
+from skthermo._tables.arrays import Array
+from skthermo.fem import FEModel
+from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.surrogate._simulator import Box, Simulator
+
+
+class FittedChain(Protocol):
+    """A fitted `DataInformedFEM`, or anything that predicts and simulates as it does.
+
+    Attributes
+    ----------
+    model : FE model
+        What turns parameters into frequencies.
+    n_jobs : int or None
+        Number of parallel jobs.
+    n_features_in_ : int
+        Number of temperature columns.
+    mode_names_, parameter_names_ : list of str
+        Columns of the frequencies and of the parameters.
+    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, box_
+        What the chain has learned, as `DataInformedFEM` describes it.
+    parameters_, noise_, records_, report_
+        What it has found in the training records.
+
+    See Also
+    --------
+    DataInformedFEM : The class of skthermo with this interface.
+    """
+
+    model: FEModel
+    n_jobs: int | None
+    n_features_in_: int
+    mode_names_: list[Any]
+    parameter_names_: list[str]
+    inverse_: Any
+    mapper_: Any
+    aligner_: Any
+    discrepancy_: Any
+    simulator_: Simulator
+    sensors_: SensorRegression
+    training_range_: TrainingRange
+    box_: Box | None
+    parameters_: Any
+    noise_: Array
+    records_: Any
+    report_: Any
+
+    @property
+    def training_records_(self) -> tuple[Any, Any]:
+        """Temperatures and frequencies that ``fit`` was given."""
+
+    @property
+    def residuals_(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records."""
+
+    def predict(self, X: ArrayLike) -> Any:
+        """Frequencies of the healthy structure.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz.
+        """
+
+    def predict_parameters(self, X: ArrayLike) -> Any:
+        """Parameters of the FE model.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters.
+        """
+
+    def simulate(self, X: ArrayLike, **options: Any) -> Any:
+        """Frequencies of the structure, healthy or damaged, as monitoring would record them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        **options : dict
+            Damage, noise, gaps and outliers, as `DataInformedFEM.simulate` takes them.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_modes)
+            In Hz.
+        """

@@ -1,0 +1,205 @@
+"""The FE model that knows the weather: temperatures in, frequencies out, equations (7) and (8)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._estimators.arguments import as_mapping
+from skthermo._estimators.regressors import inputs_of_last_step, reach_of, told_by_fleet, warn_of_fleet
+from skthermo._estimators.warnings import warn_each, warn_user
+from skthermo._tables.arrays import HUGE, Array, MatrixLike, as_columns, as_floats, is_real, real_array
+from skthermo._tables.frames import check_same_rows, column_names
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo.residuals.weather import SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.chain._discrepancy import Discrepancy
+
+LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
+ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
+POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Weather:
+    """Temperatures as they were ``given``, and ``filled`` from the other sensors, with the deviations of the fills.
+
+    ``mapper`` is the fitted M2 whose last step sees them as ``inputs``, lags included.
+    """
+
+    given: Any
+    filled: Any
+    deviations: Array
+    mapper: Any
+
+    def __len__(self) -> int:
+        return len(self.filled)
+
+    @cached_property
+    def columns(self) -> Any:
+        """Inputs of the last step of M2, a frame as a frame."""
+        return inputs_of_last_step(self.mapper, self.filled)
+
+    @cached_property
+    def inputs(self) -> Array:
+        """Inputs of the last step of M2."""
+        return as_floats(self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalModel(SavesFrames):
+    """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
+
+    ``parameter_names`` and ``mode_names`` are the columns of theta and of the frequencies. ``sensors`` and
+    ``training_range`` tell unusual weather.
+    """
+
+    mapper: Any
+    simulator: Simulator
+    aligner: Any
+    discrepancy: Discrepancy
+    sensors: SensorRegression
+    training_range: TrainingRange
+    parameter_names: Sequence[str]
+    mode_names: Sequence[Any]
+    n_jobs: int | None
+
+    def parameters(self, weather: Weather) -> Array:
+        """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
+        warn_each(self._warnings(weather))
+        theta, impossible = possible(self.mapper.predict(weather.filled))
+        if impossible.any():
+            row = np.flatnonzero(impossible)[0]
+            warn_user(
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                "impossible parameters",
+            )
+        return theta
+
+    def _warnings(self, weather: Weather) -> Iterator[tuple[str, str]]:
+        """What is unusual about weather: kind and text of each warning."""
+        filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
+        consequence = "standard deviations and intervals of predictions are widened by what that costs"
+        message = told_fills(weather.deviations, column_names(filled, "T"), consequence)
+        if message:
+            yield "filled temperatures", message
+        message = told_unpredicted(unknown, as_floats(filled))
+        if message:
+            yield "rows that cannot be predicted", message
+        learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
+        message = learned.warning(inputs)
+        if message:
+            yield "weather outside the training range", message
+        consequence = "standard deviations and intervals say how uncertain that is"
+        warn_of_fleet(told_by_fleet(self.mapper, filled), consequence)
+        message = self.sensors.warning(weather.given)
+        if message:
+            yield "sensor apart from others", message
+
+    def frequencies(self, theta: Array) -> Array:
+        """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
+        return frequencies_of(self.simulator, self.aligner, theta, self.n_jobs)
+
+    def predicted(self, weather: Weather) -> Array:
+        """Frequencies of the healthy structure, without warnings."""
+        theta = as_columns(self.mapper.predict(weather.filled))
+        return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
+
+    def simulated(
+        self,
+        weather: Weather,
+        modes: Sequence[int] | None = None,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        simulator = self.simulator if modes is None else self.simulator.changed("with_modes", modes)
+        if stiffness is not None or mass is not None:
+            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
+        theta = self.parameters(weather) * factors_of(parameters, self.parameter_names)
+        fixed, growing = split_damage(damage, weather.given)
+        simulator = simulator.damaged(fixed)
+        if growing:
+            severities = np.column_stack(list(growing.values()))
+            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+            theta = np.hstack([theta, 1 - severities])
+        frequencies = simulator.frequencies(theta, self.n_jobs)
+        if modes is not None:
+            return frequencies
+        return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(self.discrepancy.at(weather.inputs))
+
+    def propagated(self, theta: Array, covariances: Array) -> Array:
+        """Covariances of ln f in the measured domain, G C G' with G = d ln f / d theta, (n, n_modes, n_modes)."""
+        frequencies, jacobian = self.simulator.linearise(possible(theta)[0], self.n_jobs)
+        sides = [as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-ALIGNED, ALIGNED)]
+        slopes = np.log(sides[1] / sides[0]) / (2 * ALIGNED * frequencies)
+        effects = slopes[:, :, np.newaxis] * jacobian
+        return effects @ covariances @ effects.swapaxes(1, 2)
+
+
+def frequencies_of(simulator: Simulator, aligner: Any, theta: Array, n_jobs: int | None) -> Array:
+    """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
+    return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
+
+
+def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
+    theta = as_columns(theta).copy()
+    impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+    theta[impossible] = np.nan
+    return theta, impossible
+
+
+def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
+    """The factor of every parameter, 1 where none is given."""
+    factors = dict.fromkeys(names, 1.0)
+    parameters = {} if parameters is None else as_mapping(parameters)
+    if not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    for name, factor in parameters.items():
+        if name not in factors:
+            raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
+        if not is_real(factor) or not 0 < factor < HUGE:
+            raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
+        if factor > LARGE_FACTOR:
+            warn_user(
+                f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
+                "and not percent",
+                "large factor",
+            )
+        factors[name] = float(factor)
+    return np.array(list(factors.values()))
+
+
+def split_damage(
+    damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
+) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    """Severities that are the same in all rows, and those with a value for each row."""
+    damage = as_mapping(damage)
+    if damage is not None and not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    fixed: dict[str, Any] = {}
+    growing: dict[str, NDArray[np.float64]] = {}
+    n_rows = np.shape(X)[0]
+    for group, severity in (damage or {}).items():
+        if np.ndim(severity) == 0:
+            fixed[group] = severity
+            continue
+        values = real_array(severity, f"damage of group {group!r}")
+        if values.shape != (n_rows,) or not (values < 1).all() or not np.isfinite(values).all():
+            raise ValueError(
+                f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
+                f"expected one severity or {n_rows}, one for each row, finite and below 1"
+            )
+        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
+        growing[group] = values
+    return fixed, growing

@@ -1,0 +1,305 @@
+"""The command of nightly jobs: what it says, its exit codes, and what a crash leaves."""
+
+import contextlib
+import io
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import skthermo.reporting
+from skthermo._io import alone_with
+from skthermo.commands.main import main
+from skthermo.monitoring import load_monitor
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
+
+HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
+
+
+@pytest.fixture(scope="module")
+def records():
+    return truss_records()
+
+
+@pytest.fixture(scope="module")
+def saved(records, tmp_path_factory):
+    """A file of a monitor that has seen ten healthy days, and one whose alarm is open."""
+    folder = tmp_path_factory.mktemp("saved")
+    monitor = fitted_monitor(records)
+    monitor.update(records[FIRST : FIRST + 10])
+    monitor.save(folder / "healthy.joblib")
+    monitor.update(records[FIRST + 10 : DAMAGED + 10])
+    monitor.save(folder / "alarm.joblib")
+    return folder
+
+
+@pytest.fixture
+def bridge(saved, tmp_path, records):
+    """Runs commands on copies of these files, and gives exit code, output and errors."""
+
+    def run(command, *options, state="healthy", new=None, **csv):
+        file = tmp_path / f"{state}.joblib"
+        if not file.exists():
+            shutil.copy(saved / file.name, file)
+        if new is not None:
+            csv = {"index_label": "time"} | csv
+            new.to_csv(tmp_path / "new.csv", **csv) if isinstance(new, pd.DataFrame) else None
+            (tmp_path / "new.csv").write_text(new) if isinstance(new, str) else None
+            options = (tmp_path / "new.csv", *options)
+        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+            code = main([command, str(file), *map(str, options)])
+        return SimpleNamespace(code=code, out=out.getvalue(), err=err.getvalue(), file=file)
+
+    return run
+
+
+def test_healthy_records(bridge, records):
+    done = bridge("update", new=records[FIRST + 10 : FIRST + 14])
+    assert (done.code, done.err) == (HEALTHY, "")
+    lines = done.out.splitlines()
+    assert lines[0].startswith("read from ")
+    assert lines[0].endswith(f"new.csv: 4, {records.index[FIRST + 10]} to {records.index[FIRST + 13]}")
+    assert lines[1:] == [
+        "new: 4 (4 healthy, 0 alarm, 0 not judged); 0 repeated, 0 late, 0 too late",
+        f"state: healthy (newest record {records.index[FIRST + 13]})",
+        "open events: none",
+    ]
+
+
+@pytest.mark.nightly
+def test_records_are_read_to_the_last_bit(bridge, records):
+    whole = load_monitor(bridge("status").file)
+    whole.update(records[FIRST + 10 : DAMAGED + 10])
+    for start, stop in pairwise((FIRST + 10, FIRST + 11, DAMAGED + 3, DAMAGED + 10)):
+        done = bridge("update", new=records[start:stop])
+    assert_same_course(load_monitor(done.file), whole)
+
+
+def test_an_alarm(bridge, records):
+    done = bridge("update", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
+    assert done.code == ALARM
+    assert "new: 2 (0 healthy, 2 alarm, 0 not judged)" in done.out
+    event = load_monitor(done.file).events_.loc[1]
+    assert f"open event 1: damage since {event['start']}, {event['modes']}, index up to" in done.out
+
+
+def test_an_alarm_that_has_ended_within_the_new_records_is_one(bridge, records, saved):
+    loud, quiet = records[DAMAGED + 10 : DAMAGED + 20], records[FIRST + 10 : FIRST + 30].copy()
+    quiet.index = pd.date_range(loud.index[-1] + pd.Timedelta("1D"), periods=20, freq="D")
+    done = bridge("update", new=pd.concat([loud, quiet]))
+    assert load_monitor(done.file).state() == "healthy"
+    assert done.code == ALARM
+    assert "ended, not acknowledged: event 1" in done.out
+    assert bridge("status").code == HEALTHY
+
+
+def test_records_that_cannot_be_judged(bridge, records):
+    new = records[FIRST + 10 : FIRST + 20].copy()
+    new.iloc[2:] = np.nan
+    done = bridge("update", new=new)
+    assert done.code == NOT_JUDGED
+    judged = load_monitor(done.file).judged_[-10:]
+    reasons = judged.loc[judged["state"] == "not judged", "reason"].value_counts()
+    assert len(reasons)
+    for reason, number in reasons.items():
+        assert f"not judged, {reason}: {number}\n" in done.out
+
+
+@pytest.mark.parametrize("new", ["known", "none", "too late"])
+def test_without_a_new_judgement_nothing_is_healthy(bridge, records, new):
+    old = records[FIRST + 8 : FIRST + 10]
+    rows = {
+        "known": old,
+        "none": old[:0],
+        "too late": old.set_axis(pd.to_datetime(["2026-12-30", "2026-12-31"]) + pd.Timedelta("1h")),
+    }[new]
+    done = bridge("update", new=rows)
+    assert done.code == NOT_JUDGED
+    assert "state: healthy" in done.out
+    assert {"known": "2 repeated", "none": "new.csv: 0\n", "too late": "2 too late"}[new] in done.out
+
+
+def test_status_and_acknowledge(bridge):
+    assert bridge("status").code == HEALTHY
+    told = bridge("status", state="alarm")
+    assert told.code == ALARM
+    assert "damage from" in told.out
+    done = bridge("acknowledge", 1, "--harmless", "--note", "a heavy transport", state="alarm")
+    assert (done.code, done.out.splitlines()[0]) == (0, "event 1 is acknowledged as harmless")
+    event = load_monitor(done.file).events_.loc[1]
+    assert (event["acknowledged"], event["harmless"], event["note"]) == (True, True, "a heavy transport")
+    wrong = bridge("acknowledge", 7, "--damage", state="alarm")
+    assert wrong.code == FAILED
+    assert "event is 7; expected the number of one of the 1 events" in wrong.err
+
+
+ROW = "T1,T2\n2027-01-11,1.5,2.5\n"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty; expected a line of names"),
+        ("time;T1\n2027-01-11;1\n", "the first line names ['time;T1']; expected stamps and columns"),
+        ("time,T1,T1\n", "expected stamps and columns, each once"),
+        ("time,T1,T2\n2027-01-11,1.5\n", "line 2: values: 2; expected 3 as named above"),
+        ("time,T1,T2\n\n2027-01-11,1.5,warm\n", "line 3: 'warm'; expected a number with the decimal sign '.'"),
+        ("time,T1\n2027-01-11,1_5\n", "line 2: '1_5'; expected a number"),
+        ("time,T1\n11.01.2027,1\n12.01.2027,1\n", "line 2: '11.01.2027' is no time; expected one like 2026-01-31"),
+        ("time,T1\n2027-13-01,1\n", "'2027-13-01' is no time"),
+        ("time,T1\n46023.5,1\n", "'46023.5' is no time"),
+        ("time,T1\n2027-01-11T13:00Z,1\n", "stamps have an offset from UTC; expected none, as in the records"),
+        ("time,T1\n2027-01-11 13:00Z,1\n2027-01-11 14:00,1\n", "1 of 2 stamps have an offset from UTC"),
+    ],
+)  # fmt: skip
+def test_what_is_no_record_is_named_with_its_line(bridge, text, message):
+    done = bridge("update", new=text)
+    assert done.code == FAILED
+    assert message in done.err
+    assert_same_course(load_monitor(done.file), load_monitor(bridge("status").file))
+
+
+def test_other_columns_and_values_are_refused_and_nothing_is_changed(bridge, records):
+    wrong = {
+        "T9": records[FIRST + 10 : FIRST + 12].rename(columns={"T1": "T9"}),
+        "other values": records[FIRST + 9 : FIRST + 12] + 0.1,
+    }
+    for message, new in wrong.items():
+        done = bridge("update", new=new)
+        before = done.file.read_bytes()
+        assert (done.code, message in done.err) == (FAILED, True)
+        assert done.file.read_bytes() == before
+
+
+def test_other_forms_of_files(bridge, records, tmp_path):
+    new = records[FIRST + 10 : FIRST + 12]
+    form = {"sep": ";", "decimal": ",", "date_format": "%d.%m.%Y %H:%M"}
+    options = ("--separator", ";", "--decimal", ",", "--stamps", "%d.%m.%Y %H:%M")
+    done = bridge("update", *options, new=new, **form)
+    assert done.code == HEALTHY
+    np.testing.assert_array_equal(load_monitor(done.file).records_[-2:], new)
+    assert (load_monitor(done.file).records_.index[-2:] == new.index).all()
+    point = bridge("update", *options, new=records[FIRST + 12 : FIRST + 13], **form | {"decimal": "."})
+    assert (point.code, "with the decimal sign ','" in point.err) == (FAILED, True)
+
+
+def test_a_file_that_may_be_cut_off_is_told(bridge, records, tmp_path):
+    done = bridge("update", new=records[FIRST + 10 : FIRST + 12].to_csv(index_label="time").rstrip())
+    assert done.code == HEALTHY
+    assert done.err.startswith("warning: ")
+    assert "does not end with a line break: its last value may be cut off" in done.err
+
+
+@pytest.mark.nightly
+def test_stamps_with_offsets_come_in_the_time_zone_of_the_baseline(records, tmp_path):
+    zoned = records.tz_localize("Europe/Brussels")
+    monitor, file = fitted_monitor(zoned), tmp_path / "bridge.joblib"
+    monitor.save(file)
+    new = zoned[FIRST + 84 : FIRST + 90]  # the clocks change in between
+    with pytest.warns(UserWarning, match="2 of 6 new records are not judged"):
+        monitor.update(new)
+    new.to_csv(tmp_path / "new.csv")
+    assert len({line[:25][-6:] for line in (tmp_path / "new.csv").read_text().splitlines()[1:]}) == 2  # offsets
+    with contextlib.redirect_stdout(io.StringIO()):
+        main(["update", str(file), str(tmp_path / "new.csv")])
+    assert_same_course(load_monitor(file), monitor)
+    new.tz_localize(None).to_csv(tmp_path / "new.csv")
+    with contextlib.redirect_stderr(io.StringIO()) as errors:
+        assert main(["update", str(file), str(tmp_path / "new.csv")]) == FAILED
+    assert "stamps have no offset from UTC; expected one for each" in errors.getvalue()
+
+
+def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
+    def fails(*given, **named):
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(skthermo.reporting, "owner_report", fails)
+    done = bridge("update", "--report", "status.html", new=records[FIRST + 10 : FIRST + 12])
+    assert (done.code, done.err) == (FAILED, "error: the disk is full\n")
+    assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was judged is kept
+    alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
+    assert (alarm.code, alarm.err) == (ALARM, "error: the disk is full\n")
+
+
+def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(skthermo.reporting, "owner_report", lambda *given, **named: shown.append((given, named)))
+    done = bridge("update", "--report", tmp_path / "a.html", "--title", "Truss", new=records[FIRST + 10 : FIRST + 12])
+    ((monitor, file), named), *others = shown
+    assert (done.code, file, named, others) == (HEALTHY, tmp_path / "a.html", {"title": "Truss"}, [])
+    assert_same_course(monitor, load_monitor(done.file))
+
+
+def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch):
+    def fails(*args):
+        raise KeyError("a mistake of ours")
+
+    monkeypatch.setattr("skthermo.monitoring._monitor.Monitor.update", fails)
+    done = bridge("update", new=records[FIRST + 10 : FIRST + 12])
+    assert done.code == FAILED
+    assert "Traceback" in done.err
+    assert "a mistake of ours" in done.err
+
+
+@pytest.mark.parametrize("arguments", [[], ["updates"], ["update", "bridge.joblib"], ["acknowledge", "b.skops", "1"]])
+def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_judged(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == FAILED
+    assert capsys.readouterr().err.startswith("usage: python -m skthermo")
+
+
+def test_two_at_once(bridge, records, tmp_path):
+    pytest.importorskip("fcntl")
+    file = bridge("status").file
+    with alone_with(file, 0):
+        done = bridge("update", "--wait", "0.1", new=records[FIRST + 10 : FIRST + 12])
+        assert bridge("status").code == HEALTHY  # reads the last whole file
+    assert done.code == FAILED
+    assert f"is in use by process {os.getpid()} on " in done.err
+    assert bridge("update", "--wait", "0.1", new=records[FIRST + 10 : FIRST + 12]).code == HEALTHY
+
+
+@pytest.mark.nightly
+def test_it_is_started_from_a_shell(saved, records, tmp_path):
+    records[FIRST + 10 : FIRST + 12].to_csv(tmp_path / "new.csv")
+    shutil.copy(saved / "healthy.joblib", tmp_path)
+    command = [sys.executable, "-m", "skthermo", "update", "healthy.joblib", "new.csv"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (HEALTHY, "")
+    assert "state: healthy" in done.stdout
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs processes that fork")
+def test_a_kill_leaves_a_whole_state_that_goes_on_to_the_same_decisions(saved, records, tmp_path):
+    file, new = tmp_path / "healthy.joblib", tmp_path / "new.csv"
+    shutil.copy(saved / file.name, file)
+    undisturbed, random, kills = load_monitor(file), np.random.default_rng(0), 0
+    for day in range(FIRST + 10, FIRST + 14):
+        records[day : day + 1].to_csv(new)
+        undisturbed.update(records[day : day + 1])
+        for again in range(2):
+            process = multiprocessing.get_context("fork").Process(target=main, args=(["update", str(file), str(new)],))
+            process.start()
+            if not again:
+                time.sleep(random.uniform(0, 0.1))
+                os.kill(process.pid, signal.SIGKILL)
+            process.join()
+            kills += process.exitcode == -signal.SIGKILL
+            assert load_monitor(file).last_ in (records.index[day - 1], records.index[day])
+    assert kills >= 3
+    left = load_monitor(file)
+    left.counts_ |= {"n_repeated": 0}  # where the kill came after the state was saved
+    assert_same_course(left, undisturbed)
+    assert not list(tmp_path.glob(".*.unfinished"))

@@ -1,0 +1,275 @@
+"""Several detectors beside each other: what is drawn is what the study found, and nothing is left unsaid."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import spearmanr
+from sklearn.decomposition import PCA
+from sklearn.ensemble import IsolationForest
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+
+from skthermo.detection import MahalanobisDetector
+from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PODCurveDisplay
+from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, pod_curve
+from skthermo.studies.detectability._findings import StudyFindings
+
+FOUND = "piers 18 %"
+
+
+def results_of(simulated, measured, scenario="healthy", measure="PFA", half=0.02):
+    """Rows of a study with one scenario; a rate that is None is not there."""
+    rows = []
+    for source, rates in (("data-informed", simulated), ("reference", measured)):
+        for detector, rate in rates.items():
+            row = {"detector": detector, "scenario": scenario, "source": source, "measure": measure, "rate": rate}
+            row |= {"n_records": 200, "n_not_judged": 0, "error": ""}
+            if source == "data-informed":
+                row |= {"band_lowest": max(rate - half, 0), "band_highest": min(rate + half, 1)}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+SIMULATED = {"raw, a": 0.01, "raw, b": 0.2, "whitened": 0.02, "linear": 0.3}
+MEASURED = {"raw, a": 0.02, "raw, b": 0.26, "whitened": 0.0, "linear": 0.31}
+HEALTHY = results_of(SIMULATED, MEASURED)
+DAMAGED = results_of({k: 1 - 2 * v for k, v in SIMULATED.items()}, dict.fromkeys(SIMULATED, 0.9), FOUND, "POD")
+BOTH = pd.concat([DAMAGED, HEALTHY], ignore_index=True)
+FAILED = pd.DataFrame([{"detector": "cointegration", "error": "LinAlgError: singular"}])
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts if text.get_text()]
+
+
+def limit_of(display):
+    return display.axes_[0].lines[-1].get_xdata()[0]
+
+
+def rows_named(ax):
+    return [text.get_text() for text in ax.get_yticklabels()]
+
+
+def test_measured_rates_stand_beside_bands_and_are_counted():
+    display = DetectorsDisplay.from_predictions(BOTH)
+    healthy, damaged = display.axes_
+    assert healthy.get_title().startswith("false alarms\n3 of 4 in the band")
+    assert damaged.get_title().startswith(f"damage found: {FOUND}\n")
+    names = rows_named(healthy)
+    assert names == ["raw, a", "whitened", "raw, b", "linear"]  # by the damage that they find
+    for detector, bar in zip(SIMULATED, display.bars_["healthy"], strict=True):
+        row = HEALTHY[(HEALTHY["detector"] == detector) & (HEALTHY["source"] == "data-informed")].iloc[0]
+        low, width = bar.get_x(), bar.get_width()
+        np.testing.assert_allclose([low, low + width], 100 * row[["band_lowest", "band_highest"]].astype(float))
+        assert bar.get_y() + bar.get_height() / 2 == pytest.approx(names.index(detector))
+    inside, outside = display.marks_["healthy"]
+    drawn = {names[int(y)]: x for points in (inside, outside) for x, y in points.get_offsets()}
+    assert drawn == pytest.approx({name: 100 * rate for name, rate in MEASURED.items()})
+    assert outside.get_offsets().tolist() == [[26.0, 2.0]]
+    assert inside.get_facecolor().tolist() != outside.get_facecolor().tolist() == [[1, 1, 1, 1]]
+    row = display.agreement.loc["healthy"]
+    expected = spearmanr(list(SIMULATED.values()), list(MEASURED.values()))[0]
+    assert row.tolist() == [4, 3, 4, pytest.approx(expected)]
+    assert np.isnan(display.agreement.loc[FOUND, "rank_correlation"])  # all measured rates are the same
+
+
+@pytest.mark.parametrize(
+    ("changed", "n_bands"),
+    [
+        ({"band_lowest": np.nan, "band_highest": np.nan}, 0),
+        ({"n_repeats": [20 if source == "reference" else 40 for source in HEALTHY["source"]]}, 0),  # a mean
+        ({"n_repeats": [1 if source == "reference" else 40 for source in HEALTHY["source"]]}, 4),
+    ],
+)
+def test_only_single_campaigns_are_compared_with_bands(changed, n_bands):
+    display = DetectorsDisplay.from_predictions(HEALTHY.assign(**changed))
+    assert display.agreement.loc["healthy", "n_bands"] == n_bands
+    assert ("in the band" in display.axes_[0].get_title()) == (n_bands > 0)
+    assert len(display.marks_["healthy"][1].get_offsets()) == (n_bands > 0)
+
+
+def test_groups_are_headings():
+    groups = {name: "raw" if name.startswith("raw") else "compensated" for name in SIMULATED}
+    display = DetectorsDisplay.from_predictions(BOTH, groups=groups)
+    labels = display.axes_[0].get_yticklabels()
+    assert [text.get_text() for text in labels] == ["raw", "raw, a", "raw, b", "compensated", "whitened", "linear"]
+    assert [text.get_fontweight() == "bold" for text in labels] == [True, False, False, True, False, False]
+    with pytest.raises(ValueError, match=r"groups names the detectors \['other'\]; expected some of"):
+        DetectorsDisplay.from_predictions(BOTH, groups={"other": "raw"})
+
+
+def test_failures_and_records_that_are_not_judged_are_told():
+    results = pd.concat([BOTH, FAILED], ignore_index=True)
+    results.loc[(results["detector"] == "linear") & (results["source"] == "reference"), "n_not_judged"] = 50
+    display = DetectorsDisplay.from_predictions(results)
+    assert rows_named(display.axes_[0])[-1] == "cointegration"
+    assert texts(display.axes_[0]) == ["20\N{NO-BREAK SPACE}% not judged", "failed: LinAlgError: singular"]
+    assert texts(display.axes_[1]) == ["20\N{NO-BREAK SPACE}% not judged"]
+
+
+def test_a_detector_that_failed_in_one_of_two_studies_is_told_there():
+    results = BOTH[(BOTH["detector"] != "linear") | (BOTH["scenario"] == "healthy")]
+    results = pd.concat([results, pd.DataFrame([{"detector": "linear", "error": "ValueError: no"}])])
+    healthy, damaged = DetectorsDisplay.from_predictions(results).axes_
+    assert (texts(healthy), texts(damaged)) == ([], ["failed: ValueError: no"])
+
+
+def test_scenarios_can_be_chosen_and_those_without_measured_records_are_not_drawn():
+    other = results_of(SIMULATED, {}, "deck 5 %", "POD")
+    results = pd.concat([BOTH, other], ignore_index=True)
+    assert list(DetectorsDisplay.from_predictions(results).agreement.index) == ["healthy", FOUND]
+    assert list(DetectorsDisplay.from_predictions(results, scenarios=[FOUND]).agreement.index) == [FOUND]
+    with pytest.raises(ValueError, match=r"expected some of \['healthy', 'piers 18 %'\]"):
+        DetectorsDisplay.from_predictions(results, scenarios=["deck 5 %"])
+    with pytest.raises(ValueError, match=r"no scenario of \['deck 5 %'\] has both simulated and measured records"):
+        DetectorsDisplay.from_predictions(other)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (BOTH.drop(columns="detector"), r"lacks the columns \['detector'\]"),
+        (None, "table is None"),
+        (pd.concat([BOTH, HEALTHY]), r"'raw, a' has 2 rows of scenario 'healthy', source 'data-informed'"),
+    ],
+)
+def test_what_is_no_result_is_named(table, message):
+    with pytest.raises(ValueError, match=message):
+        DetectorsDisplay.from_predictions(table)
+    with pytest.raises(ValueError, match="what is 'bars'"):
+        DetectorsDisplay.from_estimator(made_study(), "bars")
+    with pytest.raises(NotFittedError):
+        DetectorsDisplay.from_estimator(DetectabilityStudy(None, None, []))
+
+
+def ranking_of(**rows):
+    """A ranking of detectors by their false alarms, found damage, found damage at equal false alarms, and distance."""
+    table = pd.DataFrame(rows, index=["false_alarms", "pod", "pod_equal", "behind"], dtype=float).T
+    for name in ("false_alarms", "pod", "behind"):
+        table[f"{name}_lowest"], table[f"{name}_highest"] = table[name] - 0.01, table[name] + 0.01
+    table["keeps_limit"], table["clearly_behind"] = table["false_alarms"] < 0.03, table["behind_lowest"] > 0
+    return table.assign(not_judged=0.0, error="")
+
+
+RANKING = ranking_of(
+    whitened=[0.01, 0.9, 0.92, 0.0],
+    raw=[0.02, 0.5, 0.5, 0.42],
+    good=[0.01, 0.9, 0.915, 0.005],
+    loud=[0.3, 1, 0.7, 0.22],
+)
+
+
+def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
+    failed = pd.DataFrame({"error": "LinAlgError: singular", "keeps_limit": False, "clearly_behind": False}, ["none"])
+    ranking = pd.concat([RANKING, failed])
+    ranking.loc["raw", "not_judged"] = 0.25
+    display = DetectorsDisplay.from_predictions(ranking)
+    names = rows_named(display.axes_[0])
+    assert names == [
+        *("best, or not clearly behind", "whitened", "good", "clearly behind", "raw"),
+        *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
+    ]
+    assert texts(display.axes_[0]) == ["LinAlgError: singular"]
+    assert texts(display.axes_[1]) == ["25\N{NO-BREAK SPACE}% not judged"]
+    assert limit_of(display) == 2
+    heights = [names.index(name) for name in RANKING.index]
+    for name, points in {**display.values_, "pod_equal": display.marks_["pod"][1]}.items():
+        np.testing.assert_allclose(points.get_offsets(), np.c_[100 * RANKING[name], heights])
+    for name, bars in display.bars_.items():
+        ends = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
+        np.testing.assert_allclose(ends, 100 * RANKING[[f"{name}_lowest", f"{name}_highest"]])
+    colours = [bar.get_facecolor() for bar in display.bars_["pod"]]
+    assert colours[0] == colours[2]
+    assert len(set(colours)) == 3
+
+
+def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
+    asked = []
+    study = SimpleNamespace(scenarios=[], results_=None)
+    study.ranking = lambda *given, by: asked.append((*given, by)) or RANKING
+    display = DetectorsDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
+    assert asked == [(0.05, "reference", "pod")]
+    assert limit_of(display) == 5
+    bounds = ["behind_lowest", "behind_highest"]
+    display = DetectorsDisplay.from_predictions(RANKING.assign(clearly_behind=False, **dict.fromkeys(bounds, np.nan)))
+    assert rows_named(display.axes_[0])[0] == "order not sure: one repeat"
+    with pytest.raises(ValueError, match=r"lacks the columns \['behind'\]"):
+        DetectorsDisplay.from_predictions(RANKING.drop(columns="behind"))
+
+
+def made_study():
+    """Decisions of two detectors on a healthy and two damaged states, one of which begins with the record 5."""
+    scenarios = [
+        Scenario("healthy"),
+        Scenario("deck", {"deck": 0.1}),
+        ProgressiveDamage("later", {"deck": 0.1}, onset=5),
+    ]
+    random, rows, decisions = np.random.default_rng(0), [], {}
+    for detector in ("raw", "whitened"):
+        for number, scenario in enumerate(scenarios):
+            key = (detector, scenario.name, "data-informed")
+            decisions[key] = (random.normal(size=(3, 20)) + 1 - number).astype("f4")
+            row = {"detector": detector, "scenario": scenario.name, "source": key[2], "error": ""}
+            rows.append(row | {"measure": "POD" if number else "PFA", "rate": (decisions[key] < 0).mean()})
+    indices = {key: pd.Series(np.zeros(20)) for key in decisions}
+    return SimpleNamespace(
+        scenarios=scenarios,
+        scenarios_=scenarios,
+        results_=pd.DataFrame(rows),
+        decisions_=decisions,
+        indices_=indices,
+    )
+
+
+def test_labelled_scores_are_of_judged_records_from_the_onset_on():
+    given = made_study()
+    study = DetectabilityStudy(None, None, [])
+    study.findings_ = StudyFindings(
+        given.results_, given.scenarios_, indices=given.indices_, decisions=given.decisions_
+    )
+    for name in ("raw", "whitened"):
+        study.decisions_[name, "deck", "data-informed"][0, :4] = np.nan
+        healthy, deck, later = (study.decisions_[name, s.name, "data-informed"] for s in given.scenarios)
+        damaged = np.concatenate([deck.ravel(), later[:, 5:].ravel()])
+        is_damaged, scores = study.labelled_scores(name)
+        assert (is_damaged.sum(), (~is_damaged).sum()) == (105 - 4, 60)
+        np.testing.assert_array_equal(scores, -np.r_[healthy.ravel(), damaged[~np.isnan(damaged)]])
+        assert (scores > 0).sum() == (np.r_[healthy.ravel(), damaged] < 0).sum()
+    assert len(study.labelled_scores("raw", scenarios=["later"])[0]) == 60 + 45
+    with pytest.raises(ValueError, match="detector is 'other'"):
+        study.labelled_scores("other")
+    with pytest.raises(ValueError, match="60 healthy and 0 damaged"):
+        study.labelled_scores("raw", scenarios=["roof"])
+
+
+def test_damage_indices_of_a_study_have_a_panel_for_each_detector():
+    study, random = made_study(), np.random.default_rng(1)
+    study.indices_ = {key: pd.Series(random.uniform(1, 3, 20)) for key in study.indices_}
+    study.thresholds_ = {"raw": 2.0, "whitened": 2.5}
+    study.detectors_ = {"raw": MahalanobisDetector(), "whitened": make_pipeline(PCA(), MahalanobisDetector())}
+    display = DamageIndexDisplay.from_study(study, ["healthy", "deck"])
+    assert [ax.get_title() for ax in display.axes_] == ["raw", "whitened"]
+    assert [line.get_ydata()[0] for line in display.threshold_lines_] == [2.0, 2.5]
+    for name, points in display.points_.items():
+        for line, state in zip(points, ["healthy", "deck"], strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), study.indices_[name, state, "data-informed"])
+    assert "unsquared" in display.axes_[0].get_ylabel()
+    study.detectors_["raw"] = IsolationForest()
+    assert "unsquared" not in DamageIndexDisplay.from_study(study).axes_[0].get_ylabel()
+    with pytest.raises(ValueError, match=r"scenarios are \['other'\]; expected some of \['healthy', 'deck', 'later'\]"):
+        DamageIndexDisplay.from_study(study, ["other"])
+    study.thresholds_["raw"] = None
+    with pytest.raises(ValueError, match="threshold of 'raw' is None"):
+        DamageIndexDisplay.from_study(study)
+
+
+def test_a_curve_of_a_study_is_that_of_the_detector_that_is_named():
+    study = made_study()
+    curves = {"raw": pod_curve([0.1, 0.2], [3, 17], [20, 20]), "whitened": pod_curve([0.1, 0.2], [5, 19], [20, 20])}
+    study.pod_curve = lambda family, source, detector: curves[detector]
+    first = PODCurveDisplay.from_estimator(study, "deck", detector="raw")
+    second = PODCurveDisplay.from_estimator(study, "deck", detector="whitened", ax=first.ax_)
+    assert (first.curve, second.curve) == (curves["raw"], curves["whitened"])
+    assert (first.line_.get_label(), second.line_.get_label()) == ("raw", "whitened")
