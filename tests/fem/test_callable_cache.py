@@ -131,6 +131,17 @@ def test_a_damaged_file_is_refused_by_name(file, length):
         CallableModel(Counted(), NAMES, 3, cache=file).frequencies(THETA)
 
 
+def test_a_flipped_bit_costs_one_solve(file):
+    CallableModel(three_modes, NAMES, 3, cache=file).frequencies(THETA)
+    content = bytearray(file.read_bytes())
+    content[content.index(PLAIN[7].astype("<f8").tobytes())] ^= 1
+    file.write_bytes(content)
+    again = Counted()
+    for _ in range(2):
+        np.testing.assert_array_equal(CallableModel(again, NAMES, 3, cache=file).frequencies(THETA), PLAIN)
+    np.testing.assert_array_equal(again.rows, THETA[[7]])
+
+
 def test_an_empty_file_is_filled(file):
     file.parent.mkdir()
     file.touch()

@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from os import PathLike
@@ -38,7 +39,7 @@ class SampleCache:
         self.read([])
 
     def read(self, keys: Sequence[bytes]) -> dict[bytes, Array]:
-        """Frequencies of the keys that are known."""
+        """Frequencies of the keys that are known; a record that was damaged on the disk is not."""
         if self.path.is_dir():
             raise ValueError(f"{self.path}: the cache is a folder; expected a file, such as {self.path / 'solved'}")
         if not self.path.exists():
@@ -46,8 +47,9 @@ class SampleCache:
         with self._opened() as database:
             if not self._is_begun(database):
                 return {}
-            asked = ((key, database.execute("SELECT frequencies FROM solved WHERE theta = ?", [key])) for key in keys)
-            return {key: np.frombuffer(row[0], "<f8") for key, found in asked if (row := found.fetchone())}
+            query = "SELECT frequencies, checksum FROM solved WHERE theta = ?"
+            found = ((key, row) for key in keys if (row := database.execute(query, [key]).fetchone()))
+            return {key: np.frombuffer(f, "<f8") for key, (f, checksum) in found if checksum == zlib.crc32(key + f)}
 
     def add(self, solved: Mapping[bytes, Array]) -> None:
         """Write frequencies by their key; other processes wait meanwhile."""
@@ -56,10 +58,12 @@ class SampleCache:
             database.execute("BEGIN IMMEDIATE")
             if not self._is_begun(database):
                 database.execute("CREATE TABLE about (columns TEXT)")
-                database.execute("CREATE TABLE solved (theta BLOB PRIMARY KEY, frequencies BLOB) WITHOUT ROWID")
+                columns = "theta BLOB PRIMARY KEY, frequencies BLOB, checksum INTEGER"
+                database.execute(f"CREATE TABLE solved ({columns}) WITHOUT ROWID")
                 database.execute("INSERT INTO about VALUES (?)", [json.dumps(self._describes)])
-            rows = ((key, frequencies.astype("<f8").tobytes()) for key, frequencies in solved.items())
-            database.executemany("INSERT OR REPLACE INTO solved VALUES (?, ?)", rows)
+            records = ((key, frequencies.astype("<f8").tobytes()) for key, frequencies in solved.items())
+            rows = ((key, f, zlib.crc32(key + f)) for key, f in records)
+            database.executemany("INSERT OR REPLACE INTO solved VALUES (?, ?, ?)", rows)
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:

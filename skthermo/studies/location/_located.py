@@ -125,8 +125,8 @@ class LocatedDamage:
     >>> print(located.summary())
     top is damaged with a probability of over 99.9 %, probably in element 3 of 5 (x = 10.4 to 15.6 m) (over 99.9 %).
     The rest of top is unlikely.
-    >>> located.table.loc["13", "severity"].round(1)
-    np.float64(0.4)
+    >>> round(float(located.table.loc["13", "severity"]), 1)
+    0.4
     """
 
     table: pd.DataFrame
