@@ -215,3 +215,9 @@ def test_what_is_no_share_is_refused(flawless, options, message):
 def test_no_gaps_are_drawn_for_none(flawless):
     with pytest.raises(ValueError, match="gaps is None; expected 'fitted'"):
         flawless.draw_gaps(T, None)
+
+
+@pytest.mark.parametrize("known", [0.1, "fitted", F[:10]])
+def test_records_are_known_by_the_frequencies_of_fit_alone(flawless, known):
+    with pytest.raises(ValueError, match="expected"):
+        flawless.service_records(known)

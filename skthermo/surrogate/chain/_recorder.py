@@ -45,14 +45,12 @@ class RecordSimulator(SavesFrames):
         """Gaps and outliers of the training records."""
         return self.gaps_and_outliers or ServiceRecords.of(self.records, self.residuals)
 
-    def service_of(self, outliers: Any) -> ServiceRecords:
-        """Gaps and outliers where the latter are asked for: as known, or by raw frequencies of the records."""
-        if isinstance(outliers, ServiceRecords):
-            return outliers
-        if np.ndim(outliers) == 0:
+    def service_of(self, F: ArrayLike | None = None) -> ServiceRecords:
+        """Gaps and outliers of the training records, the latter by their raw frequencies if these are given."""
+        if F is None:
             return self.service
         expected = self.records.modelled * np.exp(self.model.discrepancy.at(self.records.inputs))
-        return ServiceRecords.of_raw(self.records, self.residuals, outliers, expected)
+        return ServiceRecords.of_raw(self.records, self.residuals, F, expected)
 
     def noise(
         self,
@@ -112,7 +110,10 @@ class RecordSimulator(SavesFrames):
         self, weather: Weather, outliers: Any, stream: np.random.RandomState
     ) -> tuple[ServiceRecords, NDArray[np.intp]]:
         """Gaps and outliers of the training records, and those of which records the rows have."""
-        service = self.service_of(outliers)
+        if isinstance(outliers, ServiceRecords):
+            service = outliers
+        else:
+            service = self.service_of(outliers if np.ndim(outliers) else None)
         order = np.argsort(row_times(weather.given), kind="stable")
         taken = service.draw(places_of(self.residuals, weather.inputs[order]), stream)
         return service, taken[np.argsort(order)]
