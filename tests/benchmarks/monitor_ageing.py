@@ -25,7 +25,6 @@ from sklearn.pipeline import make_pipeline
 from skthermo.detection import TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
 
@@ -46,17 +45,15 @@ def followed(follower, T, F, n_first):
     """Records after the first as the detector sees them, and what is known of the drift at the end of each day."""
     later = F[n_first:]
     days = pd.date_range(later.index[0].normalize(), later.index[-1], freq="D")
-    daily = follower.filter.records.means(T, later, days)
+    daily = follower.records.means(T, later, days)
     state, corrected, states = follower.start(), [], {}
     of_day = later.groupby(later.index.normalize())
     for row, day in enumerate(days):
         if day in of_day.groups:
             records = of_day.get_group(day)
             corrected.append(follower.corrected(state, records))
-        one = slice(row, row + 1)
         if day > state.day:
-            new = DailyMeans(days[one], daily.values[one], daily.counts[one], daily.basis[one])
-            state = follower._with_day(state, new)
+            state = follower._with_day(state, daily[row : row + 1])
         states[day] = state
     return pd.concat(corrected), states
 

@@ -7,7 +7,8 @@
 Groups take turns over the seeds. A chain learns from the first year; then all four years are followed. The simpler
 ways, and the filter of a monitor, which knows at each day only what came before and is judged after the first year:
 
-- filtered: `ParameterFilter`, day by day; a drift is found where the end value of a group is beyond chance at 1 %.
+- filtered: `DriftFollower` without its delay, day by day; a drift is found where the end value of a group is beyond
+  chance at 1 %.
 - M1 - M2: parameters that M1 finds in the measured frequencies less those of M2, daily means smoothed over 60 days,
   with the standard error of those means as a band; a drift is found where a straight line has a slope at 1 % divided by
   the number of groups.
@@ -34,9 +35,9 @@ from scipy import stats
 
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import track_parameters
-from skthermo.monitoring.drift import ParameterFilter
-from skthermo.monitoring.drift._daily import DailyMeans, calendar
-from skthermo.monitoring.drift._filter import GroupEffects
+from skthermo.monitoring.drift import DriftFollower
+from skthermo.monitoring.drift._daily import calendar
+from skthermo.monitoring.drift._observations import GroupEffects, observation
 from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
 
@@ -66,13 +67,11 @@ def tracked(fem, T, F):
 def filtered(fem, T, F):
     """As `tracked`, for days after the first year and a filter that learned from it."""
     n_first = int((F.index < F.index[0] + pd.Timedelta(days=365)).sum())
-    follower = ParameterFilter.of(fem, T[:n_first], F[:n_first])
-    state, known = follower.start(), {}
-    daily = follower.records.means(T, F[n_first:], calendar(F.index[n_first:], "1D"), state.weather)
-    for row, day in enumerate(daily.days):
-        part = slice(row, row + 1)
-        today = DailyMeans(daily.days[part], daily.values[part], daily.counts[part], daily.basis[part])
-        state = follower.advanced(state, today)
+    follower = DriftFollower.of(fem, T[:n_first], F[:n_first])
+    days, start, known = calendar(F.index[n_first:], "1D"), follower.start(), {}
+    daily, state = follower.records.means(T, F[n_first:], days, start.weather), start.known
+    for row, day in enumerate(days):
+        state = follower.next_day(state, observation(daily, row, follower.noise, follower.slopes))
         known[day] = follower.estimate(state)
     estimates, errors = (pd.DataFrame({d: e[c] for d, e in known.items()}).T for c in ("change", "standard_error"))
     scores = (estimates / errors).abs().iloc[-1]

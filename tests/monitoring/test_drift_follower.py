@@ -9,8 +9,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._follower import DELAY
+from skthermo.monitoring.drift._kalman import State
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
@@ -37,31 +37,30 @@ def follower(chain, steady):
 def second_year(follower, steady):
     """Daily means of the year after the baseline."""
     T, F = steady.temperatures, steady.frequencies[FIRST:]
-    return follower.filter.records.means(T, F, F.index)
+    return follower.records.means(T, F, F.index)
 
 
 def followed(follower, daily, changes):
     """States of the follower day by day, where ln stiffness of the diagonals changes by so much."""
-    state, slopes = follower.start(), follower.filter.slopes[:, 2]
+    state, slopes = follower.start(), follower.slopes[:, 2]
     for row, change in enumerate(changes):
-        day = slice(row, row + 1)
-        shifted = daily.values[day] + change * slopes
-        state = follower._with_day(state, DailyMeans(daily.days[day], shifted, daily.counts[day], daily.basis[day]))
+        day = daily[row : row + 1]
+        state = follower._with_day(state, replace(day, values=day.values + change * slopes))
         yield state
 
 
 def with_drift(follower, lost, error):
     """A state in which one group has lost a share of its stiffness, known to an error, and the others nothing."""
     start = follower.start()
-    mean, covariance = np.zeros_like(start.known.mean), np.zeros_like(start.known.covariance)
+    mean, covariance = map(np.zeros_like, start.known)
     mean[0], covariance[0, 0] = np.log1p(-lost), error**2
-    return replace(start, known=replace(start.known, mean=mean, covariance=covariance))
+    return replace(start, known=State(mean, covariance))
 
 
 def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
     F = steady.frequencies[-5:]
     clear, doubtful = (with_drift(follower, 0.03, error) for error in (1e-5, 0.03))
-    shift = follower.filter.slopes[:, 0] * np.log(0.97)
+    shift = follower.slopes[:, 0] * np.log(0.97)
     pd.testing.assert_frame_equal(follower.corrected(clear, F), F * np.exp(-shift), rtol=1e-9)
     pd.testing.assert_frame_equal(follower.corrected(doubtful, F), F)
     swapped = F.iloc[:, ::-1]

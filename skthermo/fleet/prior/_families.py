@@ -107,10 +107,7 @@ def expect(members: Sequence[Member], families: Mapping[Hashable, CoefficientFam
 
 
 def maximise(
-    members: Sequence[Member],
-    names: Sequence[Hashable],
-    follows: Mapping[tuple[int, Hashable], float],
-    found: Moments,
+    members: Sequence[Member], names: Sequence[Hashable], follows: Mapping[tuple[int, Hashable], float], found: Moments
 ) -> dict[Hashable, CoefficientFamily]:
     """The most likely families given posterior moments of the bridges' coefficients."""
     families = {}

@@ -59,10 +59,9 @@ class DailyMeans:
     """Daily means of the logarithm of measured over predicted frequencies.
 
     ``values`` and ``counts``, (n_days, n_modes), are means and numbers of records; ``basis``, (n_days, n_modes, size),
-    is the mean of the `WeatherFunctions` over the records of each mode. ``days`` begin every ``freq``.
+    is the mean of the `WeatherFunctions` over the records of each mode.
     """
 
-    days: pd.DatetimeIndex
     values: Array
     counts: Array
     basis: Array
@@ -77,9 +76,9 @@ class DailyMeans:
         days: pd.DatetimeIndex,
         before: float = np.nan,
     ) -> DailyMeans:
-        """Means of records: ln(measured / predicted), (n_records, n_modes), and the temperatures.
+        """Means of ln(measured / predicted), (n_records, n_modes), over days that begin at ``days``.
 
-        ``before`` is the first coordinate of the weather on the day before the first, if it is known.
+        ``before`` is the `weather` of the day before the first, if it is known.
         """
         of_day = days.searchsorted(times, side="right") - 1
         n_days, n_modes = len(days), ratios.shape[1]
@@ -97,12 +96,26 @@ class DailyMeans:
             for column in range(basis.size - 1):
                 means[:, mode, column] = _means(functions[rows, column], of_day[rows], n_days)
             means[:, mode, -1] = earlier
-        return cls(days, values, counts, np.nan_to_num(means))
+        return cls(values, counts, np.nan_to_num(means))
 
     @property
     def known(self) -> NDArray[np.bool_]:
         """Which modes were measured on which days."""
         return ~np.isnan(self.values)
+
+    @property
+    def weather(self) -> float:
+        """First coordinate of the last day's mean weather, NaN if it is not known."""
+        there = self.basis[-1, self.known[-1], 1]
+        return float(there[0]) if len(there) else np.nan
+
+    def __getitem__(self, days: slice) -> DailyMeans:
+        return DailyMeans(self.values[days], self.counts[days], self.basis[days])
+
+    def followed_by(self, later: DailyMeans) -> DailyMeans:
+        """These days, and later ones behind them."""
+        parts = ((getattr(one, name) for one in (self, later)) for name in ("values", "counts", "basis"))
+        return DailyMeans(*(np.concatenate(list(part)) for part in parts))
 
 
 def _means(values: Array, of_day: NDArray[np.intp], n_days: int) -> Array:

@@ -167,11 +167,7 @@ def _form(trends: ModeTrends, groups: Sequence[int], walk: float) -> tuple[Array
 
 
 def _chance(
-    trends: ModeTrends,
-    singles: Sequence[Sequence[int]],
-    observed: float,
-    freedom: float,
-    random: np.random.RandomState,
+    trends: ModeTrends, singles: Sequence[Sequence[int]], observed: float, freedom: float, random: np.random.RandomState
 ) -> float:
     """Probability that errors alone give as much evidence, from draws."""
     root = np.linalg.cholesky(trends.covariance)

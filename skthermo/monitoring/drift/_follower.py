@@ -11,12 +11,23 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from skthermo._estimators.warnings import without_warnings
+from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring.drift._daily import DailyMeans
-from skthermo.monitoring.drift._filter import WALK, ParameterFilter, ParameterState, length_of
+from skthermo.monitoring.drift._daily import DailyMeans, calendar
+from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State, absorb
+from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._observations import (
+    MISLEARNED,
+    DailyRecords,
+    GroupEffects,
+    check_records,
+    observation,
+    with_time,
+)
 
 DELAY = 30
 """Days that a day waits before drift is learned from it: a sudden change is seen by then."""
@@ -25,30 +36,26 @@ SUDDEN = 1e-3  # probability that the mean of waiting days is as far from what w
 CLEAR = 0.05  # probability that frequencies without drift would seem to drift as much, from which it is taken out
 SIGNIFICANT = 2.58  # standard errors of a group's change: by chance in 1 % of groups that do not drift
 LIMIT = 0.05
+RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
+WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
+TURN = 0.01  # standard deviation of what a year adds to the yearly rate
+A_DAY = DAY / YEAR
 ONE_DAY = pd.DateOffset(days=1)
 
 
 @dataclass(frozen=True)
-class Waiting:
-    """Daily means of days that wait, as in `DailyMeans`."""
-
-    values: Array
-    counts: Array
-    basis: Array
-
-
-@dataclass(frozen=True)
-class FollowerState:
+class FollowerState(SavesFrames):
     """What a `DriftFollower` knows at the end of a day.
 
-    ``known`` is the drift by the days that have waited long enough, ``waiting`` holds those since. Drift is not learned
-    from those that are ``sudden``: in a time that departs from what was foretold; ``n_left_out`` of such in a row.
-    ``weather`` is the first coordinate of the last day's mean weather, NaN if it is not known, ``times`` (nanoseconds)
-    and ``temperatures`` are the latest records, as many as lags of the chain look back.
+    ``known`` are levels and rates of the groups, constants and disturbances by all days up to the one that was
+    ``learned`` last, ``waiting`` the days since. Drift is not learned from those that are ``sudden``: in a time that
+    departs from what was foretold; ``n_left_out`` of such in a row. ``weather`` is that of the last day; ``times``
+    (nanoseconds) and ``temperatures`` are the latest records, as many as lags of the chain look back.
     """
 
-    known: ParameterState
-    waiting: Waiting
+    learned: pd.Timestamp
+    known: State
+    waiting: DailyMeans
     sudden: NDArray[np.bool_]
     weather: float
     times: NDArray[np.int64]
@@ -58,39 +65,42 @@ class FollowerState:
     @property
     def day(self) -> pd.Timestamp:
         """Beginning of the last day."""
-        return self.known.day + len(self.sudden) * ONE_DAY
+        return self.learned + len(self.sudden) * ONE_DAY
 
 
 @dataclass(frozen=True)
 class DriftFollower:
     """Takes slow drift out of measured frequencies, and leaves sudden changes in.
 
-    Drift is followed by a `ParameterFilter`, a month behind: a day is learned from when it has waited `DELAY` days, and
-    only if no time of this length that holds it departs from what was foretold. So a sudden change is never learned
-    as drift, however long it lasts; a drift that is much faster than some percent a year is not either. A sudden change
-    that the mean of a month does not show is learned in time, and reported as the drift that it looks like.
+    A Kalman filter follows the stiffness of groups day by day, apart from weather and noise, relative to the mean of a
+    baseline, a month behind: a day is learned from when it has waited `DELAY` days, and only if no time of this length
+    that holds it departs from what was foretold. So a sudden change is never learned as drift, however long it lasts; a
+    drift that is much faster than some percent a year is not either. A sudden change that the mean of a month does not
+    show is learned in time, and reported as the drift that it looks like.
 
     What is taken out is the drift found, times a share that is 0 as long as it may be chance and goes to 1 as it
     becomes clear.
 
-    ``limit`` is the change of a group's stiffness that is worth attention however slowly it came, ``start_`` what is
-    known at the end of the baseline.
+    ``members`` are the model's groups behind each group, ``slopes``, (n_modes, n_groups), relative changes of
+    frequencies per relative change of stiffness; ``start_`` is what is known at the end of the baseline. A change of a
+    group's stiffness by `LIMIT` is worth attention however slowly it came.
     """
 
-    filter: ParameterFilter
-    limit: float
+    records: DailyRecords
+    members: Mapping[str, Sequence[str]]
+    slopes: Array
+    noise: DailyNoise
     memory: Memory
     start_: FollowerState = field(repr=False)
 
     @classmethod
+    @warnings_once()
     def of(
         cls,
         fem: Any,
         T: pd.DataFrame,
         F: pd.DataFrame,
         groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
-        *,
-        limit: float = LIMIT,
     ) -> DriftFollower:
         """Learn from the temperatures and frequencies of a baseline, for a fitted chain; by default for all groups."""
         check_is_fitted(fem)
@@ -101,13 +111,24 @@ class DriftFollower:
                 f"the chain fem was fitted on temperatures and modes of which the baseline lacks {missing}; expected "
                 f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
             )
-        T, F = T[list(fem.feature_names_in_)], F[list(fem.mode_names_)]
-        followed, memory = ParameterFilter.of(fem, T, F, groups), Memory.of(fem.mapper_)
-        n_modes, size = F.shape[1], followed.records.basis.size
-        nothing = np.empty((0, n_modes))
-        waiting, known = Waiting(nothing, nothing, np.empty((0, n_modes, size))), followed.start()
-        start = FollowerState(known, waiting, np.empty(0, dtype=bool), known.weather, *_latest(memory, T))
-        return cls(followed, limit, memory, start)
+        T, F = T[temperatures], F[list(fem.mode_names_)]
+        check_records(fem, T, F)
+        records, memory, days = DailyRecords.of(fem, T), Memory.of(fem.mapper_), calendar(F.index, "1D")
+        daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups)
+        noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
+        n_groups, n_modes, span = len(effects.names), F.shape[1], len(days) * A_DAY
+        sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
+        covariance = np.diag(np.repeat([0.0, RATE**2, MISLEARNED**2, 0.0], sizes))
+        levels, slopes = np.arange(n_groups), n_groups + np.arange(n_groups)
+        covariance[levels, levels] = (RATE * span / 2) ** 2
+        covariance[levels, slopes] = covariance[slopes, levels] = -(RATE**2) * span / 2
+        covariance[-n_modes:, -n_modes:] = noise.stationary
+        known, sudden = State(np.zeros(len(covariance)), covariance), np.empty(0, dtype=bool)
+        start = FollowerState(days[-1], known, daily[:0], sudden, daily.weather, *_latest(memory, T))
+        found = cls(records, effects.members, effects.slopes, noise, memory, start)
+        for number in range(len(days)):
+            known = found.next_day(known, observation(daily, number, noise, effects.slopes))
+        return replace(found, start_=replace(start, known=known))
 
     def start(self) -> FollowerState:
         """What is known at the end of the baseline."""
@@ -128,18 +149,18 @@ class DriftFollower:
             state = self._with_day(state, self._no_records())
         beside = pd.concat([_history(state, T.index.tz, self.temperatures), T[self.temperatures]])
         with without_warnings():  # earlier temperatures have no lags; gaps of the day are the detector's to tell
-            daily = self.filter.records.means(beside, F[self.modes], days[-1:], state.weather)
+            daily = self.records.means(beside, F[self.modes], days[-1:], state.weather)
         times, temperatures = _latest(self.memory, beside)
         return replace(self._with_day(state, daily), times=times, temperatures=temperatures)
 
     def corrected(self, state: FollowerState, F: pd.DataFrame) -> pd.DataFrame:
         """Measured frequencies without the drift that is taken out, by the state at the end of the day before."""
-        shift = dict(zip(self.modes, self.share(state) * self.filter.frequency_drift(state.known), strict=True))
+        shift = dict(zip(self.modes, self.share(state) * self.frequency_drift(state.known)[0], strict=True))
         return F * np.exp([-shift.get(mode, 0.0) for mode in F])
 
     def share(self, state: FollowerState) -> float:
         """Share of the drift found that is taken out: 0 as long as it may be chance, and nearly 1 when it is clear."""
-        shift, covariance = self.filter.frequency_drift(state.known), self.filter.frequency_covariance(state.known)
+        shift, covariance = self.frequency_drift(state.known)
         values, vectors = np.linalg.eigh(covariance)
         clear = values > 1e-8 * values[-1]
         distance = float(((shift @ vectors[:, clear]) ** 2 / values[clear]).sum())
@@ -153,7 +174,7 @@ class DriftFollower:
         ``per_year_error``), whether the change is ``significant``, ``taken_out`` (the change that is taken out of the
         frequencies), and whether a significant change is ``beyond_limit``.
         """
-        found = self.filter.estimate(state.known)
+        found = self.estimate(state.known)
         scale = np.exp(found["change"])
         share = self.share(state)
         clear = (np.abs(found["change"]) > SIGNIFICANT * found["standard_error"]) & (share > 0)
@@ -166,67 +187,84 @@ class DriftFollower:
                 "per_year_error": found["per_year_error"],
                 "significant": clear,
                 "taken_out": np.expm1(share * found["change"]),
-                "beyond_limit": clear & (np.abs(change) > self.limit),
+                "beyond_limit": clear & (np.abs(change) > LIMIT),
             }
         )
+
+    def next_day(self, known: State, shown: DayShown | None) -> State:
+        """What is known one day later, of which nothing is learned without what that day showed."""
+        n = len(self.members)
+        walk, turn = (deviation**2 * A_DAY * np.eye(n) for deviation in (WALK, TURN))
+        predicted = DailySteps(A_DAY, walk, turn, self.noise.memory, self.noise.renewal).predict(known)
+        return predicted if shown is None else absorb(predicted, shown)[0]
+
+    def estimate(self, known: State) -> pd.DataFrame:
+        """Change of each group's ln stiffness since the baseline, and yearly, with standard errors."""
+        n = len(self.members)
+        errors = np.sqrt(np.diag(known.covariance)[: 2 * n])
+        columns = {
+            "change": known.mean[:n],
+            "standard_error": errors[:n],
+            "per_year": known.mean[n : 2 * n],
+            "per_year_error": errors[n:],
+        }
+        return pd.DataFrame(columns, index=pd.Index(list(self.members), name="group"))
+
+    def frequency_drift(self, known: State) -> tuple[Array, Array]:
+        """Shift of ln frequency of each mode that the drift causes, (n_modes,), and its covariance."""
+        n = len(self.members)
+        return self.slopes @ known.mean[:n], self.slopes @ known.covariance[:n, :n] @ self.slopes.T
 
     @property
     def modes(self) -> list[str]:
         """Names of the frequencies that are followed."""
-        return list(self.filter.records.fem.mode_names_)
+        return list(self.records.fem.mode_names_)
 
     @property
     def temperatures(self) -> list[str]:
         """Names of the temperatures that tell the weather."""
-        return list(self.filter.records.fem.feature_names_in_)
+        return list(self.records.fem.feature_names_in_)
 
     def _no_records(self) -> DailyMeans:
         """A day without any."""
-        n_modes, size = len(self.modes), self.filter.records.basis.size
+        n_modes, size = len(self.modes), self.records.basis.size
         none = np.zeros((1, n_modes))
-        return DailyMeans(pd.DatetimeIndex([pd.NaT]), none + np.nan, none, np.zeros((1, n_modes, size)))
+        return DailyMeans(none + np.nan, none, np.zeros((1, n_modes, size)))
 
     def _with_day(self, state: FollowerState, daily: DailyMeans) -> FollowerState:
         """The state after one more day; the day that has waited longest is learned from or left out."""
-        there = daily.basis[0, daily.known[0], 1]
-        waiting = Waiting(
-            np.vstack([state.waiting.values, daily.values]),
-            np.vstack([state.waiting.counts, daily.counts]),
-            np.concatenate([state.waiting.basis, daily.basis]),
-        )
+        waiting = state.waiting.followed_by(daily)
         sudden = np.append(state.sudden, False) | self._departs(state.known, waiting)
-        weather = float(there[0]) if len(there) else float("nan")
-        state = replace(state, waiting=waiting, sudden=sudden, weather=weather)
+        state = replace(state, waiting=waiting, sudden=sudden, weather=daily.weather)
         if len(sudden) <= DELAY:
             return state
-        day = pd.DatetimeIndex([state.known.day + ONE_DAY])
-        oldest = DailyMeans(day, waiting.values[:1], waiting.counts[:1], waiting.basis[:1])
         return replace(
             state,
-            known=self.filter.advanced(state.known, oldest, absorb=not sudden[0]),
-            waiting=Waiting(waiting.values[1:], waiting.counts[1:], waiting.basis[1:]),
+            learned=state.learned + ONE_DAY,
+            known=self.next_day(state.known, None if sudden[0] else observation(waiting, 0, self.noise, self.slopes)),
+            waiting=waiting[1:],
             sudden=sudden[1:],
             n_left_out=state.n_left_out + 1 if sudden[0] else 0,
         )
 
-    def _departs(self, known: ParameterState, waiting: Waiting) -> bool:
+    def _departs(self, known: State, waiting: DailyMeans) -> bool:
         """Whether the mean of the days that wait is too far from what was foretold."""
-        number = (~np.isnan(waiting.values)).sum(axis=0)
+        number = waiting.known.sum(axis=0)
         modes = np.flatnonzero(number)
         if not len(modes):
             return False
         shift, spread = self._foretold(known, waiting)
         difference = (np.nansum(waiting.values, axis=0)[modes] / number[modes]) - shift
         distance = float(difference @ np.linalg.solve(spread, difference))
-        return distance > len(modes) * stats.f.isf(SUDDEN, len(modes), max(self.filter.noise.freedom, 4.0))
+        return distance > len(modes) * stats.f.isf(SUDDEN, len(modes), max(self.noise.freedom, 4.0))
 
-    def _foretold(self, known: ParameterState, waiting: Waiting) -> tuple[Array, Array]:
+    def _foretold(self, known: State, waiting: DailyMeans) -> tuple[Array, Array]:
         """Mean of ln ratios of each measured mode over the days that wait, and its covariance."""
-        noise, slopes = self.filter.noise, self.filter.slopes
-        known_days = ~np.isnan(waiting.values)
+        noise, slopes = self.noise, self.slopes
+        known_days = waiting.known
         weights = known_days / np.maximum(known_days.sum(axis=0), 1)
         ahead = np.arange(1, len(weights) + 1)
-        later = ahead @ weights * length_of(self.filter.records.freq)
+        later = ahead @ weights * A_DAY
         n_modes, n_groups = slopes.shape
         size = waiting.basis.shape[2]
         design = np.zeros((n_modes, len(known.mean)))

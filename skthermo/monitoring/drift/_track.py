@@ -14,7 +14,10 @@ from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, Explanations, ModeTrends
-from skthermo.monitoring.drift._filter import (
+from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
+from skthermo.monitoring.drift._kalman import DailySteps, State
+from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._observations import (
     MISLEARNED,
     DailyRecords,
     GroupEffects,
@@ -24,9 +27,6 @@ from skthermo.monitoring.drift._filter import (
     shapes_of_time,
     with_time,
 )
-from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
-from skthermo.monitoring.drift._kalman import DailySteps, State
-from skthermo.monitoring.drift._noise import DailyNoise
 
 ANY_TREND = 0.3  # prior standard deviation of a trend of ln frequency over the records
 ANY_RATE = 0.1  # prior standard deviation of the yearly change of ln stiffness of a group that is followed
@@ -121,8 +121,8 @@ def track_parameters(
     random, length = as_random_state(random_state), length_of(freq)
     order = np.argsort(F.index, kind="stable")
     T, F = T.iloc[order], F.iloc[order]
-    records = DailyRecords.of(fem, T, freq)
-    daily = with_enough_days(records.means(T, F, calendar(F.index, freq)), fem.mode_names_)
+    days = calendar(F.index, freq)
+    daily = with_enough_days(DailyRecords.of(fem, T).means(T, F, days), fem.mode_names_)
     effects = GroupEffects.of(fem, T, F, groups)
     noise = DailyNoise.of(daily.values, with_time(daily, N_SHAPES), daily.counts)
     trends = mode_trends(daily, noise, effects.slopes, freq)
@@ -131,7 +131,7 @@ def track_parameters(
     changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
     slopes = effects.of_changes(changes if found.p_value <= significance else {})
     followed = replace(followed, trends=replace(followed.trends, slopes=slopes))
-    return history_of(fem, effects, followed, significance, random)
+    return history_of(fem, days, effects, followed, significance, random)
 
 
 def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
@@ -154,11 +154,11 @@ def mode_trends(daily: DailyMeans, noise: DailyNoise, slopes: Array, freq: str) 
     deviations = np.append(np.full(size, MISLEARNED), np.full(N_SHAPES, ANY_TREND))
     covariance = np.diag(np.append(np.tile(deviations**2, n_modes), np.zeros(n_modes)))
     covariance[-n_modes:, -n_modes:] = noise.stationary
-    days = [observation(wide, number, noise, none) for number in range(len(daily.days))]
+    days = [observation(wide, number, noise, none) for number in range(len(daily.values))]
     steps = DailySteps(length_of(freq), np.zeros((0, 0)), np.zeros((0, 0)), noise.memory, noise.renewal)
     state = steps.filtered(State(np.zeros(len(covariance)), covariance), days)
     places = (np.arange(n_modes)[:, np.newaxis] * (size + N_SHAPES) + size + np.arange(N_SHAPES)).ravel()
-    years = (len(daily.days) - 1) * length_of(freq)
+    years = (len(daily.values) - 1) * length_of(freq)
     return ModeTrends(state.mean[places], state.covariance[np.ix_(places, places)], slopes, years)
 
 
@@ -182,7 +182,7 @@ class Followed:
         n_modes, size = len(slopes), self.daily.basis.shape[2]
         covariance = np.diag(np.repeat([0.0, ANY_RATE**2, MISLEARNED**2, 0.0], [n, n, n_modes * size, n_modes]))
         covariance[-n_modes:, -n_modes:] = self.noise.stationary
-        days = [observation(self.daily, number, self.noise, slopes) for number in range(len(self.daily.days))]
+        days = [observation(self.daily, number, self.noise, slopes) for number in range(len(self.daily.values))]
         steady, walks = np.zeros((n, n)), walk**2 * self.length * np.eye(n)
         steps = DailySteps(self.length, walks, steady, self.noise.memory, self.noise.renewal)
         means, covariances, end = steps.smoothed(State(np.zeros(len(covariance)), covariance), days)
@@ -206,7 +206,7 @@ class Followed:
         )
         means, covariance = both.coefficients(range(1 + len(others)), walk, ANY_RATE)
         mean, covariance = means[:n], covariance[:n, :n]
-        shapes = shapes_of_time(len(self.daily.days), n)
+        shapes = shapes_of_time(len(self.daily.values), n)
         at_end = np.array([shapes[-1], np.append(1 / trends.years, np.zeros(n - 1))])
         deviations = np.sqrt(np.einsum("ti,ij,tj->t", shapes, covariance, shapes))
         return GroupCourse(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
@@ -225,7 +225,7 @@ def confused_sets(found: Explanations, rivals: Mapping[int, Sequence[int]]) -> l
 def mode_table(names: Sequence[Any], followed: Followed, explained: Array) -> pd.DataFrame:
     """Measured and explained change of ln frequency over the records; NaN for a mode that was hardly measured."""
     trends = followed.trends
-    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.days), trends.n_shapes)[-1:])
+    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.values), trends.n_shapes)[-1:])
     columns = {
         "measured": at_end @ trends.mean,
         "explained": explained,
@@ -237,7 +237,12 @@ def mode_table(names: Sequence[Any], followed: Followed, explained: Array) -> pd
 
 
 def history_of(
-    fem: Any, effects: GroupEffects, followed: Followed, significance: float, random: np.random.RandomState
+    fem: Any,
+    days: pd.DatetimeIndex,
+    effects: GroupEffects,
+    followed: Followed,
+    significance: float,
+    random: np.random.RandomState,
 ) -> ParameterHistory:
     """What was found, by the names of groups and modes."""
     found, names = followed.found, effects.names
@@ -263,7 +268,7 @@ def history_of(
     trends = followed.trends
     misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
     return ParameterHistory(
-        days=followed.daily.days,
+        days=days,
         courses=named,
         years=trends.years,
         p_value=found.p_value,
@@ -283,6 +288,6 @@ def history_of(
         modes=mode_table(fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes))),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
         widening=found.widening,
-        shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, followed.daily.days, fem.mode_names_),
+        shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, days, fem.mode_names_),
         seed=int(random.randint(2**31 - 1)),
     )

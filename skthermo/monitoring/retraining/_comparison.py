@@ -11,7 +11,7 @@ import pandas as pd
 
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring.retraining._blocks import block_mean, blocks_of
+from skthermo.monitoring.retraining._shift import block_mean, blocks_of
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them

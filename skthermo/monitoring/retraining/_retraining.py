@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
+from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array
 from skthermo._tables.text import counted
-from skthermo._tables.times import YEAR
+from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring.retraining._blocks import blocks_of
+from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
-from skthermo.monitoring.retraining._harvest import Harvest, margin_of
-from skthermo.monitoring.retraining._new_level import NewLevel
-from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree
+from skthermo.monitoring.retraining._shift import WEEK, ShiftsTried, WeatherFree, blocks_of
 
+MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun unseen
 FEWEST_WEEKS = 3  # of new records, from which standard errors of a comparison can be told
 
 Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
@@ -274,3 +275,132 @@ def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
         if not event.harmless and len(inside):
             found[number] = inside
     return found
+
+
+@dataclass(frozen=True)
+class Harvest:
+    """Records that may train, and a table of what was left out and why.
+
+    ``excluded`` has a row for each reason: ``start``, ``end`` (NaT: until the last record), ``columns`` (all, or the
+    one whose values alone are left out), ``n_records`` and ``reason``.
+    """
+
+    records: pd.DataFrame
+    excluded: pd.DataFrame
+
+    @classmethod
+    def of(
+        cls,
+        records: pd.DataFrame,
+        events: pd.DataFrame,
+        faults: pd.DataFrame | None,
+        margin: pd.Timedelta = MARGIN,
+        are_put_back: bool = False,
+    ) -> Harvest:
+        """Leave out events that were not acknowledged as harmless, and values of faulty sensors.
+
+        Modes that were swapped for a time stand in their place already with ``are_put_back``.
+        """
+        kept, rows = np.ones(len(records), dtype=bool), []
+        for start, end, reason in _spans(events, margin):
+            inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
+            kept &= ~inside
+            rows.append((start, end, "all", int(inside.sum()), reason))
+        masked = records.copy()
+        told = faults if faults is not None else pd.DataFrame()
+        for fault in told.itertuples():
+            if fault.kind == "disagree" or (are_put_back and fault.kind == "swapped"):  # nothing is left out
+                continue
+            inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
+            masked.loc[inside, fault.column] = np.nan
+            rows.append((fault.since, fault.until, fault.column, int((inside & kept).sum()), f"sensor: {fault.kind}"))
+        empty = kept & masked.isna().all(axis=1).to_numpy()
+        if empty.any():
+            rows.append((masked.index[empty][0], masked.index[empty][-1], "all", int(empty.sum()), "without a value"))
+        excluded = pd.DataFrame(rows, columns=["start", "end", "columns", "n_records", "reason"])
+        return cls(masked[kept & ~empty], excluded[excluded["n_records"] > 0].reset_index(drop=True))
+
+
+def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
+    """Start, end and reason of each time that may not train."""
+    for number, event in zip(events.index, events.itertuples(), strict=True):
+        if event.harmless:
+            continue
+        is_open = pd.isna(event.end)
+        state = "acknowledged, but not as harmless" if event.acknowledged else "not acknowledged"
+        still = ", and still open: nothing after its start may train" if is_open else ""
+        yield event.start - margin, event.end, f"event {number} ({event.kind}), {state}{still}"
+
+
+def margin_of(memory: Memory, records: pd.DataFrame) -> pd.Timedelta:
+    """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
+    return max(MARGIN, memory.duration(pd.Series(records.index).diff().median()))
+
+
+@dataclass(frozen=True)
+class NewLevel:
+    """Relative change of each mode's level, and what days as many as the new ones tell of a level.
+
+    ``table`` has a row for each mode: ``change`` (relative), ``standard_error``, ``n_records``. ``span`` is the time
+    that the new records cover.
+    """
+
+    table: pd.DataFrame
+    span: pd.Timedelta
+    old: WeatherFree
+
+    @classmethod
+    def of(cls, old: WeatherFree, new: pd.DataFrame) -> NewLevel:
+        """From new records, by what the old regression leaves of them."""
+        left = old.of_new(new)
+        step = pd.Series(new.index).diff().median()
+        span = new.index[-1] - new.index[0] + (step if pd.notna(step) else pd.Timedelta(0))
+        counts = left.notna().sum()
+        deviations = old.residuals.std()
+        times = pd.Series([correlation_time(column) for column in old.residuals.to_numpy().T], left.columns)
+        error = deviations * np.sqrt(np.minimum(times / counts.where(counts > 0), 1.0))
+        table = pd.DataFrame({"change": left.mean(), "standard_error": error, "n_records": counts})
+        return cls(table, span, old)
+
+    def prior(self, records: pd.DataFrame, new: pd.DataFrame, random_state: int | None = None) -> pd.DataFrame:
+        """Old records at the new level, without those of a time of the year that new records cover.
+
+        The level is known only as well as a few days tell it. Each week of old records is therefore moved by what
+        another stretch of the old baseline, as long as the new one, misses its level by: what a detector learns of the
+        scatter then holds for records to come.
+        """
+        blocks = blocks_of(records.index)
+        kept = _season_not_covered(records.index, new.index)[blocks]
+        missed = self._missed(blocks.max() + 1, random_state)[blocks]
+        factors = (1 + self.table["change"].to_numpy()) / (1 + missed)
+        moved = records.copy()
+        targets = list(self.table.index)
+        moved[targets] = records[targets].to_numpy() * factors
+        return moved[kept]
+
+    def _missed(self, n_blocks: int, random_state: int | None) -> Array:
+        """Mean residuals of stretches of the old baseline by chance, (n_blocks, n_modes)."""
+        values = self.old.residuals - self.old.residuals.mean()
+        times = values.index
+        latest = times[-1] - self.span
+        if latest <= times[0]:
+            return np.zeros((n_blocks, values.shape[1]))
+        random = check_random_state(random_state)
+        starts = times[0] + (latest - times[0]) * random.uniform(size=n_blocks)
+        first, last = times.searchsorted(starts), times.searchsorted(starts + self.span)
+        known = values.notna().to_numpy()
+        sums, counts = (
+            np.vstack([np.zeros(values.shape[1]), np.cumsum(part, axis=0)])
+            for part in (np.nan_to_num(values.to_numpy()), known)
+        )
+        number = counts[last] - counts[first]
+        return np.where(number > 0, (sums[last] - sums[first]) / np.maximum(number, 1), 0.0)
+
+
+def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
+    """Which weeks of old records have a time of the year that no new record has within half a week."""
+    blocks = blocks_of(old)
+    middle = pd.Series(old).groupby(blocks).agg(lambda some: some.iloc[len(some) // 2])
+    covered = np.unique(new.dayofyear)
+    distance = np.abs(middle.dt.dayofyear.to_numpy()[:, np.newaxis] - covered)
+    return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2

@@ -16,15 +16,35 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.text import probability_text
 from skthermo._tables.times import correlation_time
 from skthermo.detection import TemperatureCompensator
-from skthermo.monitoring.retraining._blocks import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.surrogate import TemperatureMapper
 
+WEEK = pd.Timedelta("7D")
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
 MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
 HIDDEN = 0.5  # the same of a standard error, from which a change may hide behind weather that is new
 FEWEST_MORE = 3  # independent blocks than modes, from which there is a test
 N_STEPS = 8  # days of the new period at which a change may have begun
+
+
+def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
+    """Number of the block of each record, counted without gaps."""
+    numbers = (times - times[0]) // length
+    return np.unique(numbers, return_inverse=True)[1]
+
+
+def block_mean(values: Array, blocks: NDArray[np.intp]) -> tuple[float, float]:
+    """Mean of the values that are there, and its standard error from the blocks' sums; NaN for fewer than three."""
+    known = ~np.isnan(values)
+    if not known.any():
+        return np.nan, np.nan
+    mean = float(values[known].mean())
+    used, of_value = np.unique(blocks[known], return_inverse=True)
+    n_blocks = len(used)
+    if n_blocks < 3:
+        return mean, np.nan
+    sums = np.bincount(of_value, values[known] - mean)
+    return mean, float(np.sqrt((sums**2).sum() * n_blocks / (n_blocks - 1)) / known.sum())
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,4 @@ def records(seed, days=365, start=0, *, law=None, noise=0.002, year=0):
     names, modes = ["T1", "T2"], ["f1", "f2"]
     noisy = clean * np.exp(noise * random.standard_normal(clean.shape))
     index = pd.date_range("2025-01-01", periods=days) + pd.Timedelta(days=start)
-    return (
-        pd.DataFrame(T, index, names),
-        pd.DataFrame(noisy, index, modes),
-        pd.DataFrame(clean, index, modes),
-    )
+    return pd.DataFrame(T, index, names), pd.DataFrame(noisy, index, modes), pd.DataFrame(clean, index, modes)

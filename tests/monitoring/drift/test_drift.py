@@ -1,6 +1,5 @@
 """Drift of groups: the filter and smoother are exact, what is there is found, and what is not there is not claimed."""
 
-import pickle
 import warnings
 from dataclasses import replace
 
@@ -13,11 +12,11 @@ from sklearn.exceptions import NotFittedError
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, add_noise
 from skthermo.monitoring import track_parameters
-from skthermo.monitoring.drift import DriftFollower, ParameterFilter
+from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
-from skthermo.monitoring.drift._filter import shapes_of_time
 from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State
 from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._observations import observation, shapes_of_time
 from skthermo.plotting import ParameterHistoryDisplay
 from skthermo.surrogate import DataInformedFEM
 
@@ -213,7 +212,7 @@ def test_filled_temperatures_are_told_once(healthy):
     campaign, fem = healthy
     T, F = campaign.temperatures.copy(), campaign.frequencies
     T.iloc[30:50, 0] = np.nan
-    for follow in (lambda: track_parameters(fem, T, F, GROUPS, WEEK), lambda: ParameterFilter.of(fem, T, F, GROUPS)):
+    for follow in (lambda: track_parameters(fem, T, F, GROUPS, WEEK), lambda: DriftFollower.of(fem, T, F, GROUPS)):
         with pytest.warns(UserWarning, match="'T1' in 20 of 730 rows") as given:
             follow()
         assert len(given) == 1
@@ -254,50 +253,32 @@ def test_p_values_without_drift_are_uniform():
     assert 0.35 < np.mean(p_values) < 0.75
 
 
-def test_one_day_after_the_other_equals_all_at_once(healthy):
-    campaign, fem = healthy
-    T, F = campaign.temperatures, campaign.frequencies
-    follower = ParameterFilter.of(fem, T[:365], F[:365], GROUPS)
-    at_once = follower.advance(follower.start(), T[365:380], F[365:380])
-    state = follower.start()
-    for day in range(365, 380):
-        state = follower.advance(state, T[day : day + 1], F[day : day + 1])
-    assert_allclose(state.mean, at_once.mean, atol=1e-12)
-    assert state.day == at_once.day
-    kept = follower.advance(state, T[380:381], 1.2 * F[380:381], absorb=False)
-    assert np.array_equal(kept.mean[3:6], state.mean[3:6])
-    empty = follower.advance(state, T[:0], F[:0])
-    assert empty.day == T.index[380]
-    assert np.isnan(empty.weather)
-    assert_allclose(pickle.loads(pickle.dumps(state)).covariance, state.covariance)
-    with pytest.raises(ValueError, match="expected times after the day"):
-        follower.advance(state, T[370:371], F[370:371])
-
-
 def test_the_filter_follows_a_drift(ageing):
     campaign, fem = ageing
     T, F = campaign.temperatures, campaign.frequencies
-    follower = ParameterFilter.of(fem, T[:365], F[:365], GROUPS)
-    state = follower.advance(follower.start(), T[365:], F[365:])
-    found = follower.estimate(state).loc["bottom"]
+    follower = DriftFollower.of(fem, T[:365], F[:365], GROUPS)
+    known, daily = follower.start().known, follower.records.means(T[365:], F[365:], F.index[365:])
+    for day in range(len(F) - 365):
+        known = follower.next_day(known, observation(daily, day, follower.noise, follower.slopes))
+    found = follower.estimate(known).loc["bottom"]
     truth = np.log(1 - 0.02 * 3) - np.log(1 - 0.02 * 0.5)
     assert abs(found["change"] - truth) < 3 * found["standard_error"]
-    drift, error = follower.frequency_drift(state), np.sqrt(np.diag(follower.frequency_covariance(state)))
+    drift, covariance = follower.frequency_drift(known)
     middle = make_truss_campaign(3, random_state=0).clean_frequencies
     shift = np.log(campaign.clean_frequencies / middle).to_numpy()
-    assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * error).all()
+    assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * np.sqrt(np.diag(covariance))).all()
+    rates = slice(len(GROUPS), 2 * len(GROUPS))
+    assert np.array_equal(follower.next_day(known, None).mean[rates], known.mean[rates])
 
 
 def test_days_are_those_of_the_calendar_where_clocks_change(healthy):
     campaign, fem = healthy
     index = campaign.temperatures.index.tz_localize("Europe/Brussels")
     T, F = campaign.temperatures.set_axis(index), campaign.frequencies.set_axis(index)
-    follower = ParameterFilter.of(fem, T[:440], F[:440], GROUPS)
+    follower = DriftFollower.of(fem, T[:440], F[:440], GROUPS)
     state = follower.start()
-    assert state.day == index[439]
-    for day in range(440, 460):  # over the end of March
-        given = slice(day, day if day % 7 == 0 else day + 1)
-        state = follower.advance(state, T[given], F[given])
+    for day in range(439, 460):  # over the end of March
+        state = follower.advance(state, T[day : day + 1], F[day : day + 1])
         assert state.day == index[day]
 
 

@@ -1,4 +1,4 @@
-"""Stiffness of groups, followed day by day."""
+"""What daily means of records show of the stiffness of groups."""
 
 from __future__ import annotations
 
@@ -10,40 +10,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._effects.changes import StructuralChanges
 from skthermo._effects.frequencies import FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, spread_evenly
 from skthermo._tables.frames import check_same_rows, frame_like
-from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import YEAR, has_stamps
 from skthermo._validation import check_is_fitted
-from skthermo.monitoring.drift._daily import DailyMeans, WeatherFunctions, calendar
-from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State, absorb
+from skthermo.monitoring.drift._daily import DailyMeans, WeatherFunctions
+from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.preprocessing import ExponentialMeans
 
-RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
-WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
 MIRRORED = 1e-6  # difference of the cosine of two effects from 1, below which they are the same
 ACCURATE = 2e-5  # error of ln frequencies up to which a quadratic function of the parameters takes the model's place
-TURN = 0.01  # standard deviation of what a year adds to the yearly rate
 MISLEARNED = 0.1  # prior standard deviation of ln frequency that the chain has mislearned, for each function of weather
-
-
-@dataclass(frozen=True)
-class ParameterState(SavesFrames):
-    """What a `ParameterFilter` knows at the end of a day: mean and covariance of all states given the days so far.
-
-    ``weather`` is the first coordinate of that day's mean weather, NaN if it is not known.
-    """
-
-    day: pd.Timestamp
-    mean: Array
-    covariance: Array
-    weather: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -77,9 +61,7 @@ class QuadraticFrequencies:
         """Constant, linear and quadratic terms of each row."""
         lowest, highest = np.log(self.ends)
         width = np.where(highest > lowest, highest - lowest, 1.0)
-        places = 2 * (np.log(theta) - lowest) / width - 1
-        first, second = np.triu_indices(places.shape[1])
-        return np.hstack([np.ones((len(places), 1)), places, places[:, first] * places[:, second]])
+        return PolynomialFeatures(2).fit_transform(2 * (np.log(theta) - lowest) / width - 1)
 
     def __call__(self, theta: Array) -> Array:
         """Ln frequencies in the measured domain, (n_rows, n_modes)."""
@@ -102,12 +84,11 @@ class DailyRecords:
     fem: Any
     basis: WeatherFunctions
     surface: QuadraticFrequencies
-    freq: str
 
     @classmethod
-    def of(cls, fem: Any, T: Any, freq: str) -> DailyRecords:
+    def of(cls, fem: Any, T: Any) -> DailyRecords:
         """Learn the weather, and the frequencies in it."""
-        return cls(fem, WeatherFunctions.of(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)), freq)
+        return cls(fem, WeatherFunctions.of(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)))
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
@@ -193,110 +174,6 @@ def with_mirror_images(slopes: Array, nominal: Array) -> Array:
     return slopes @ (images / images.sum(axis=0))
 
 
-@dataclass(frozen=True)
-class ParameterFilter:
-    """Follows the stiffness of groups day by day, apart from weather and noise, relative to the mean of a baseline.
-
-    ``members`` are the model's groups behind each group, ``slopes``, (n_modes, n_groups), relative changes of
-    frequencies per relative change of stiffness; ``start_`` is what is known at the end of the baseline.
-    """
-
-    records: DailyRecords
-    members: Mapping[str, Sequence[str]]
-    slopes: Array
-    noise: DailyNoise
-    start_: ParameterState = field(repr=False)
-
-    @classmethod
-    @warnings_once()
-    def of(
-        cls,
-        fem: Any,
-        T: pd.DataFrame,
-        F: pd.DataFrame,
-        groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
-        *,
-        freq: str = "1D",
-    ) -> ParameterFilter:
-        """Learn from a baseline how daily means depend on the weather and scatter."""
-        check_records(fem, T, F)
-        records = DailyRecords.of(fem, T, freq)
-        daily = records.means(T, F, calendar(F.index, freq))
-        effects = GroupEffects.of(fem, T, F, groups)
-        noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
-        n_groups, n_modes = len(effects.names), len(noise.memory)
-        span = len(daily.days) * length_of(freq)
-        sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
-        covariance = np.diag(np.repeat([0.0, RATE**2, MISLEARNED**2, 0.0], sizes))
-        levels, slopes = np.arange(n_groups), n_groups + np.arange(n_groups)
-        covariance[levels, levels] = (RATE * span / 2) ** 2
-        covariance[levels, slopes] = covariance[slopes, levels] = -(RATE**2) * span / 2
-        covariance[-n_modes:, -n_modes:] = noise.stationary
-        before = pd.date_range(end=daily.days[0], periods=2, freq=freq)[0]
-        found = cls(
-            records,
-            effects.members,
-            effects.slopes,
-            noise,
-            ParameterState(before, np.zeros(len(covariance)), covariance),
-        )
-        return replace(found, start_=found.advanced(found.start_, daily))
-
-    def start(self) -> ParameterState:
-        """What is known at the end of the baseline."""
-        return self.start_
-
-    def advance(self, state: ParameterState, T: Any, F: Any, *, absorb: bool = True) -> ParameterState:
-        """The state at the end of the day of some records; of the next day if there are none."""
-        if not len(F):
-            day = pd.date_range(state.day, periods=2, freq=self.records.freq)[1]  # also where clocks change
-            return self._step(replace(state, day=day, weather=np.nan), None, absorb)
-        days = pd.date_range(state.day, F.index.max(), freq=self.records.freq)[1:]
-        if not len(days) or F.index.min() < days[0]:
-            raise ValueError(f"records begin at {F.index.min()}; expected times after the day of {state.day:%Y-%m-%d}")
-        return self.advanced(state, self.records.means(T, F, days, state.weather), absorb)
-
-    def advanced(self, state: ParameterState, daily: DailyMeans, absorb: bool = True) -> ParameterState:
-        """The state at the end of the last of some days."""
-        for number, day in enumerate(daily.days):
-            known = daily.basis[number, :, 1][daily.known[number]]
-            weather = float(known[0]) if len(known) else np.nan
-            observed = observation(daily, number, self.noise, self.slopes)
-            state = self._step(replace(state, day=day, weather=weather), observed, absorb)
-        return state
-
-    def estimate(self, state: ParameterState) -> pd.DataFrame:
-        """Change of each group's stiffness since the baseline, and yearly, with standard errors, as its logarithm."""
-        n = len(self.members)
-        errors = np.sqrt(np.diag(state.covariance)[: 2 * n])
-        columns = {
-            "change": state.mean[:n],
-            "standard_error": errors[:n],
-            "per_year": state.mean[n : 2 * n],
-            "per_year_error": errors[n:],
-        }
-        return pd.DataFrame(columns, index=pd.Index(list(self.members), name="group"))
-
-    def frequency_drift(self, state: ParameterState) -> Array:
-        """Shift of ln frequency of each mode that the followed drift causes, (n_modes,)."""
-        return self.slopes @ state.mean[: len(self.members)]
-
-    def frequency_covariance(self, state: ParameterState) -> Array:
-        """Covariance of `frequency_drift`, (n_modes, n_modes)."""
-        n = len(self.members)
-        return self.slopes @ state.covariance[:n, :n] @ self.slopes.T
-
-    def _step(self, state: ParameterState, day: DayShown | None, learns: bool) -> ParameterState:
-        """One day further."""
-        n = len(self.members)
-        length = length_of(self.records.freq)
-        walk, turn = (deviation**2 * length * np.eye(n) for deviation in (WALK, TURN))
-        steps = DailySteps(length, walk, turn, self.noise.memory, self.noise.renewal)
-        predicted = steps.predict(State(state.mean, state.covariance))
-        mean, covariance = absorb(predicted, day)[0] if learns and day is not None else predicted
-        return replace(state, mean=mean, covariance=covariance)
-
-
 def check_records(fem: Any, T: Any, F: Any) -> None:
     """Raise an error for what is no fitted chain, or no records of it with times."""
     if isinstance(fem, type) or not hasattr(fem, "simulator_"):
@@ -342,7 +219,9 @@ def observation(daily: DailyMeans, number: int, noise: DailyNoise, slopes: Array
 
 def with_time(daily: DailyMeans, n_shapes: int) -> Array:
     """The basis of daily means with shapes of time beside it, (n_days, n_modes, size + n_shapes)."""
-    shapes = np.broadcast_to(shapes_of_time(len(daily.days), n_shapes)[:, np.newaxis], (*daily.values.shape, n_shapes))
+    shapes = np.broadcast_to(
+        shapes_of_time(len(daily.values), n_shapes)[:, np.newaxis], (*daily.values.shape, n_shapes)
+    )
     return np.concatenate([daily.basis, shapes], axis=2)
 
 
