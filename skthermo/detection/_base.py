@@ -36,10 +36,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     ----------
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline, as ``_learn`` returns it.
-    threshold_ : float
-        A damage index above it is an alarm.
-    offset_ : float
-        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
+    threshold_, offset_ : float
+        A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
 
     Notes
     -----
@@ -214,8 +212,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Returns
         -------
         ndarray of shape (n_samples,)
-            -1 (alarm) where the damage index exceeds the threshold, +1 where it does not, and 0 where there is none:
-            such a row is neither healthy nor damaged.
+            -1 where the damage index exceeds the threshold, +1 where it does not, and 0 where there is none.
 
         Warns
         -----

@@ -61,11 +61,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     Parameters
     ----------
     estimator : regressor
-        Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single
-        target is fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
+        Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single target is
+        fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
-        Names of the frequency columns in a frame, or their positions counted from 0, in the order of
-        the output.
+        Names of the frequency columns in a frame, or their positions counted from 0, in the order of the output.
     cv : "contiguous", int, cross-validation splitter or iterable, default=None
         Folds by which the baseline is predicted:
 
@@ -91,8 +90,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     block_ : timedelta64, int or None
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
-        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and
-        their standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
+        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and their
+        standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
     spread_ : object
         Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
         of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
@@ -100,10 +99,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
         Positions of the targets.
-    n_features_in_ : int
-        Number of columns, targets included.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns, targets included, and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -117,41 +114,39 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
     the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
 
-    Rows should be in order of time, so that folds are made of periods of time: with random folds, a row would be
-    predicted by its neighbours in time, which are nearly the same record. Blocks are a compromise: as short as needed
-    for each fold to see all seasons, and long beside the memory of the residuals. Contiguous folds of a single year
-    predict each season from the others; residuals and the threshold are then too large, and hide damage. A warning
-    says so where 10 % of a fold's records lie outside the weather of the others.
+    Rows should be in order of time: with random folds, a row would be predicted by its neighbours in time, which are
+    nearly the same record. Blocks are as short as needed for each fold to see all seasons, and long beside the memory
+    of the residuals. Contiguous folds of a single year predict each season from the others; residuals and the threshold
+    are then too large, and hide damage. A warning says so where 10 % of a fold's records lie outside the weather of the
+    others.
 
-    Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
-    each stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
+    Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean: each
+    stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
     components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
     pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
-    given the others, records of the same day (at least 24 rows around each) left out; such records are left out too
-    where the baseline itself is scaled. Of more than 5000 baseline records, as many, evenly spaced in time, teach the
-    covariances. A new record takes S from the baseline record with the most similar weather; where a value is missing
-    that no sensor tells, from all records. Where its temperatures lie outside the baseline's by e ranges of their
-    columns (on average over the columns), "local" also divides by sqrt(1 + (e / 2)^2): what the
-    regression says there is less certain.
+    given the others, records of the same day (at least 24 rows around each) left out, as they are where the baseline
+    itself is scaled. At most 5000 baseline records, evenly spaced in time, teach the covariances. A new record takes S
+    from the baseline record with the most similar weather; where a value is missing that no sensor tells, from all
+    records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over the
+    columns), "local" also divides by sqrt(1 + (e / 2)^2).
 
     An estimator that states how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
     n_targets, n_targets) in Hz squared, such as `~skthermo.fleet.FleetMapper` or a ``DataInformedFEM`` with one, has
     residuals r with the covariance S + C: S, which the baseline's out-of-fold residuals teach once what C explains of
-    them is taken away, is the scatter of the measurement, and C that of each row. Scaled residuals are divided by the
-    root of S + C; residuals in Hz are shrunk towards their mean by the root of S over that of S + C, so that a detector
-    behind keeps its rate of false alarms. "local" then adds nothing for temperatures beyond the baseline's. What is not
-    known yet of a structure stays the same for a season: alarms that it causes come in runs, and damage that is smaller
-    than C cannot be seen there. Where each target has a clone of its own, C is diagonal. Weather that a fleet has seen
-    (``reach_`` and ``from_fleet`` of the estimator) counts as known.
+    them is taken away, is the scatter of the measurement, and C that of each row, diagonal where each target has a
+    clone of its own. Scaled residuals are divided by the root of S + C; residuals in Hz are shrunk towards their mean
+    by the root of S over that of S + C, so that a detector behind keeps its rate of false alarms. "local" then adds
+    nothing for temperatures beyond the baseline's. What is not known yet of a structure stays the same for a season:
+    alarms that it causes come in runs, and damage that is smaller than C cannot be seen there. Weather that a fleet has
+    seen (``reach_`` and ``from_fleet`` of the estimator) counts as known.
 
     Missing values:
 
     - A missing temperature is filled by a linear regression on the other sensors of its row, learned in `fit`, whatever
-      the estimator would do with NaN; one warning counts what was filled. The deviation by which a residual is divided
-      is widened by what the filling costs: the change of the prediction when what was filled moves by one standard
-      deviation, added in quadrature over the sensors. Residuals in Hz are shrunk by as much, towards their mean, so
-      that a detector behind keeps its rate of false alarms. Records whose prediction hangs on a filled value do not
-      teach the spread, unless they are the half of all. Only a row without any temperature has NaN.
+      the estimator would do with NaN; one warning counts what was filled. What that costs, the change of the prediction
+      when what was filled moves by one standard deviation, in quadrature over the sensors, is added to C. Records whose
+      prediction hangs on a filled value do not teach the spread, unless they are the half of all. Only a row without
+      any temperature has NaN.
     - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) are fitted to all rows,
       so that lags are the true ones whatever the folds. What follows is fitted to the rows that they give to the rest.
     - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
@@ -224,10 +219,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Raises
         ------
         ValueError
-            If a target is not among the columns or is named twice; if the targets are all of the columns
-            or none; if a target is NaN in every row, or in every row that the estimator can learn from; if the
-            residuals that are to be scaled have a singular covariance; if there are fewer rows than folds, or ``cv``
-            does not test every row exactly once.
+            If a target is not among the columns or is named twice; if the targets are all of the columns or none; if a
+            target is NaN in every row, or in every row that the estimator can learn from; if the residuals that are to
+            be scaled have a singular covariance; if there are fewer rows than folds, or ``cv`` does not test every row
+            exactly once.
 
         Warns
         -----
@@ -246,7 +241,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
     @_fit_context(prefer_skip_nested_validation=False)
     def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
-        """Fit on all rows of a baseline, and give its out-of-fold residuals.
+        """Fit on all rows of a baseline, and give its out-of-fold residuals; errors and warnings are those of `fit`.
 
         Parameters
         ----------
@@ -259,16 +254,6 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
             In Hz, or dimensionless if scaled; each row predicted by a clone that was not fitted on its fold.
-
-        Raises
-        ------
-        ValueError
-            As in `fit`.
-
-        Warns
-        -----
-        UserWarning
-            As in `fit`.
         """
         temperatures, frequencies, findings = self._read_baseline(X)
         return frame_like(frequencies, self._learn(temperatures, frequencies, findings))
@@ -288,8 +273,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            Measured minus predicted, in Hz, or dimensionless if scaled. For the rows of `fit` they are too small: use
-            `fit_transform` there.
+            Measured minus predicted, in Hz, or dimensionless if scaled. Too small for the rows of `fit`: use
+            `fit_transform`.
 
         Raises
         ------
@@ -328,8 +313,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -------
         float
             Natural logarithm of a density per Hz, averaged over the targets that are there: higher is better, and a
-            residual twice as small gains 0.69. Settings of all parameters, ``scale`` included, can be compared. NaN
-            if no row has a residual; a warning counts the rows scored if they are fewer than half.
+            residual twice as small gains 0.69. Settings of all parameters, ``scale`` included, can be compared. NaN if
+            no row has a residual; a warning counts the rows scored if they are fewer than half.
         """
         _, weather, residuals, errors, _ = self._residuals(X)
         residuals = self._with_spread(residuals)

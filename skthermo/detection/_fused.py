@@ -19,15 +19,14 @@ from skthermo.detection._thresholds import conformal_threshold
 class FusedDetector(DamageDetector, _BaseComposition):
     """Alarm where several detectors together find records far from a healthy baseline.
 
-    The damage index is the mean of theirs, each divided by its own threshold. Compensators differ in
-    how well they remove the effect of temperature; the mean index is nearly as good as the best of them, or better,
-    without a choice.
+    The damage index is the mean of theirs, each divided by its own threshold. Compensators differ in how well they
+    remove the effect of temperature; the mean index is nearly as good as the best of them, or better, without a choice.
 
     Parameters
     ----------
     detectors : list of (str, detector)
-        Names and detectors, or pipelines that end with one, such as
-        ``make_pipeline(TemperatureCompensator(...), MahalanobisDetector())``. All get the same columns.
+        Names and detectors, or pipelines that end with one, such as ``make_pipeline(TemperatureCompensator(...),
+        MahalanobisDetector())``. All get the same columns.
     contamination : float, default=0.02
         Share of healthy records above the threshold.
 
@@ -37,14 +36,10 @@ class FusedDetector(DamageDetector, _BaseComposition):
         Fitted clones.
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline, from the indices by which the detectors set their own thresholds.
-    threshold_ : float
-        The ceil((n + 1)(1 - contamination))-th smallest of them.
-    offset_ : float
-        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
-    n_features_in_ : int
-        Number of columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    threshold_, offset_ : float
+        The ceil((n + 1)(1 - contamination))-th smallest of them; ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -52,8 +47,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
 
     Notes
     -----
-    A record that some of the detectors cannot judge gets the mean of the others; one that none can judge is not judged:
-    its damage index is NaN, and ``predict`` gives 0.
+    A record that some of the detectors cannot judge gets the mean of the others; one that none can judge has the index
+    NaN, and ``predict`` gives 0.
 
     Examples
     --------
@@ -80,33 +75,9 @@ class FusedDetector(DamageDetector, _BaseComposition):
         self.contamination = contamination
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Parameters of this detector and of those that it is made of.
-
-        Parameters
-        ----------
-        deep : bool, default=True
-            Whether to give the parameters of the detectors too.
-
-        Returns
-        -------
-        dict
-            Values by name.
-        """
         return self._get_params("detectors", deep=deep)
 
-    def set_params(self, **params: Any) -> FusedDetector:
-        """Set parameters, also of the detectors, as in ``set_params(lines__mahalanobisdetector__contamination=0.01)``.
-
-        Parameters
-        ----------
-        **params : dict
-            Names and values.
-
-        Returns
-        -------
-        FusedDetector
-            This detector.
-        """
+    def set_params(self, **params: Any) -> FusedDetector:  # also of the detectors, by their names
         return self._set_params("detectors", **params)
 
     def _records(self, X: ArrayLike, F: Array) -> ArrayLike:

@@ -26,24 +26,24 @@ N_FOLDS = 10  # of the baseline, whose distances come from the others where ther
 class MahalanobisDetector(DamageDetector):
     """Alarm where frequencies, or their residuals, are far from a healthy baseline.
 
-    The damage index is the *unsquared* Mahalanobis distance, eq. (20),
-    DI = sqrt((f - mu) Sigma^-1 (f - mu)^T), in the modes that a record has.
+    The damage index is the *unsquared* Mahalanobis distance, eq. (20) of [KCM26]_, DI = sqrt((f - mu) Sigma^-1 (f -
+    mu)^T), in the modes that a record has.
 
     Parameters
     ----------
     contamination : float, default=0.02
         Share of healthy records above the threshold.
     covariance : covariance estimator, optional
-        Any of scikit-learn's, such as ``LedoitWolf()`` for few records or ``MinCovDet()``
-        for a baseline with outliers; it is fitted on complete rows. By default the most likely covariance of all rows,
-        by accelerated expectation maximisation where modes are missing.
+        Any of scikit-learn's, such as ``LedoitWolf()`` for few records or ``MinCovDet()`` for a baseline with outliers;
+        it is fitted on complete rows. By default the most likely covariance of all rows, by accelerated expectation
+        maximisation [VR08]_ where modes are missing.
     threshold : {"conformal", "quantile", "chi2"}, default="conformal"
         How the threshold is set:
 
-        - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances that each of the n
-          baseline records has from the others, those left out that are within two correlation times of it. New
-          records that are as the baseline's (neither season nor trend) exceed it at about the rate asked for or less,
-          however they are distributed, and also where records depend on those just before them.
+        - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances that each of the n baseline
+          records has from the others, those left out that are within two correlation times of it. New records that are
+          as the baseline's (neither season nor trend) exceed it at about the rate asked for or less, however they are
+          distributed, and also where records depend on those just before them.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5.6 % false alarms
           where 2 % are asked for.
@@ -60,14 +60,10 @@ class MahalanobisDetector(DamageDetector):
         Damage index of the baseline; with the conformal threshold, each record's distance from the others.
     n_independent_ : float
         How many independent records the baseline counts as: its number of records over their correlation time.
-    threshold_ : float
-        A damage index above it is an alarm.
-    offset_ : float
-        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
-    n_features_in_ : int
-        Number of modes.
-    feature_names_in_ : ndarray of str
-        Names of the modes, where `fit` saw a frame with such names.
+    threshold_, offset_ : float
+        A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of modes and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -82,33 +78,22 @@ class MahalanobisDetector(DamageDetector):
     The correlation time of the baseline is 1 + 2 times the sum of the autocorrelations up to the first that is not
     clearly above zero, on the mean over the modes, of what the season does not explain: waves of a year and half a year
     are left out first where the stamps reach over 300 days, or where there are 300 rows without stamps, which count as
-    one year. Records are neighbours in the order of the rows or, on the
-    ``DatetimeIndex`` of a frame, in time. From the mean and the covariance of all records, the sums over a record's
-    neighbours are taken away, in closed form; half of the records stay at least. Where modes are missing, or with a
-    ``covariance`` of your own, it is learned ten times more, each time without a tenth of the blocks of time and
-    without their neighbours; blocks last five correlation times at least. Where the baseline counts as fewer than 50
-    independent records, a warning says so.
+    one year. Records are neighbours in the order of the rows or, on the ``DatetimeIndex`` of a frame, in time. From the
+    mean and the covariance of all records, the sums over a record's neighbours are taken away, in closed form; half of
+    the records stay at least. Where modes are missing, or with a ``covariance`` of your own, it is learned ten times
+    more, each time without a tenth of the blocks of time and without their neighbours; blocks last five correlation
+    times at least. Where the baseline counts as fewer than 50 independent records, a warning says so.
 
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
-    normally distributed record exceeds as often, by the approximation of Wilson and Hilferty. Where the baseline
-    shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than others,
-    a factor corrects it, shrunk to 1 as far as chance may explain the difference. An alarm then means the same
-    whichever modes are missing. Complete rows have the plain distance. Rows without any mode cannot be judged: their
-    index is NaN, and ``predict`` gives 0.
+    normally distributed record exceeds as often, by the approximation of Wilson and Hilferty [WH31]_. Where the
+    baseline shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than
+    others, a factor corrects it, shrunk to 1 as far as chance may explain the difference. Rows without any mode cannot
+    be judged: their index is NaN, and ``predict`` gives 0. Rows with gaps under a ``covariance`` of your own keep the
+    distances of the fit.
 
     The promise of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
-    this one is fixed, and keeps the rate nearly: 2 % asked and 6 modes give 1.9 % false alarms after 100
-    and after 365 independent records, and 2.0 and 2.2 % where neighbours in time have a correlation of 0.9.
-    Rows with gaps under a ``covariance`` of your own keep the distances of the fit.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
-
-    Wilson & Hilferty, The distribution of chi-square [WH31]_.
-
-    Varadhan & Roland, Simple and globally convergent methods for accelerating the convergence of any EM algorithm
-    [VR08]_.
+    this one is fixed, and keeps the rate nearly: 2 % asked and 6 modes give 1.9 % false alarms after 100 and after 365
+    independent records, and 2.0 and 2.2 % where neighbours in time have a correlation of 0.9.
 
     Examples
     --------

@@ -26,8 +26,8 @@ MOST_PERIODS = 50  # into which the baseline is divided; the windows of each are
 class WindowedAlarm(DamageDetector):
     """Alarm where the last records together are far from a healthy baseline.
 
-    Records have to be in order of time, and are best whitened: residuals of
-    ``TemperatureCompensator(..., scale="local")``.
+    Records have to be in order of time, and are best whitened: residuals of ``TemperatureCompensator(...,
+    scale="local")``.
 
     Parameters
     ----------
@@ -39,9 +39,8 @@ class WindowedAlarm(DamageDetector):
 
         - ``"mean"``: length of the mean of the whitened records, in standard deviations of such a mean. Finds small
           lasting changes.
-        - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that
-          there is an alarm where m of them exceed the threshold. Not misled by a few absurd records.
-
+        - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that there
+          is an alarm where m of them exceed the threshold. Not misled by a few absurd records.
     m : int, optional
         Number of records of a full window that have to exceed the threshold; by default half of them. For
         ``rule="m-of-n"``.
@@ -52,23 +51,18 @@ class WindowedAlarm(DamageDetector):
     ----------
     law_ : object
         Distribution of the records, learned from the baseline, by which windows are judged.
-    width_ : int
-        Largest number of records in a window.
+    width_, fewest_ : int
+        Largest number of records in a window, and fewest with a value that a window is judged by: half as many as a
+        window of the baseline has (median).
     lookback_ : int or numpy.timedelta64
         How far back a window looks: a number of rows before its last one, or a time.
-    fewest_ : int
-        Fewest records with a value that a window is judged by: half as many as a window of the baseline has (median).
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline's windows, each by a distribution learned from the other periods; NaN where a
         window has too few records.
-    threshold_ : float
-        A damage index above it is an alarm.
-    offset_ : float
-        ``-threshold_``, so that ``decision_function`` is ``score_samples - offset_``.
-    n_features_in_ : int
-        Number of modes.
-    feature_names_in_ : ndarray of str
-        Names of the modes, where `fit` saw a frame with such names.
+    threshold_, offset_ : float
+        A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of modes and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -77,16 +71,16 @@ class WindowedAlarm(DamageDetector):
 
     Notes
     -----
-    Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a
-    single one. The standard deviation of a mean therefore includes the mean correlation of two records in one window,
-    mode by mode. The threshold comes from the baseline's own windows, each judged by the other periods; the
-    number of independent ones, by the correlation time of the highest (at least half a window), decides which index it
-    is. If there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
+    Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a single
+    one. The standard deviation of a mean therefore includes the mean correlation of two records in one window, mode by
+    mode. The threshold comes from the baseline's own windows, each judged by the other periods; the number of
+    independent ones, by the correlation time of the highest (at least half a window), decides which index it is. If
+    there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
     compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
 
-    Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be
-    as unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value
-    than ``fewest_`` are not judged: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
+    Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be as
+    unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value than
+    ``fewest_`` are not judged: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
     series: a call does not remember the records of the last one.
 
     Examples

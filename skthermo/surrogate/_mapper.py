@@ -14,16 +14,16 @@ from skthermo.surrogate._regression import MultiplierRegressor, default_lines
 
 
 class TemperatureMapper(MultiplierRegressor):
-    """Parameters of an FE model from temperatures, equation (6).
+    """Parameters of an FE model from temperatures, equation (6) [KCM26]_.
 
     Parameters
     ----------
     regressor : regressor, optional
         Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
         logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
-        parameters are not positive, no logarithm is taken. By default broken lines,
-        ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data.
-        See `paper_network` for the paper's network.
+        parameters are not positive, no logarithm is taken. By default broken lines, ``make_pipeline(HingeFeatures(),
+        RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data. See `paper_network` for the paper's
+        network.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -33,16 +33,12 @@ class TemperatureMapper(MultiplierRegressor):
         Fitted to standardised temperatures (inputs) and standardised log parameters (outputs).
     inputs_, targets_ : Standardiser
         Means and scales of the temperatures and of the (log) parameters.
-    n_parameters_ : int
-        Number of parameters.
-    parameter_names_ : list of str or None
-        Their names, where `fit` saw them in a frame.
+    n_parameters_, parameter_names_ : int, list of str or None
+        Number of parameters and, where `fit` saw them in a frame, their names.
     y_is_vector_ : bool
         Whether `fit` saw one parameter as a vector.
-    n_features_in_ : int
-        Number of temperature columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of temperature columns and, where `fit` saw a frame with such, their names.
 
     Notes
     -----
@@ -52,10 +48,6 @@ class TemperatureMapper(MultiplierRegressor):
     broken lines, about 0.7 % with small networks (different for each seed), 0.67 % with random forests, 0.73 % with
     boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials (``examples/plot_regressors.py``).
     Trees stay at their last value beyond the data. Where few records show a sharp knee, networks follow it better.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -50,13 +50,13 @@ def default_lines(penalties: Any = PENALTIES, **options: Any) -> Pipeline:
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:
-    """The deep networks of Kamali et al. (2026), as closely as ``MLPRegressor`` allows.
+    """The deep networks of Kamali et al. (2026) [KCM26]_, as closely as ``MLPRegressor`` allows.
 
     Parameters
     ----------
     network : {"truss", "kw51-inverse", "kw51-mapper"} or {1, 4, 6}
-        Purpose of the network, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers),
-        the inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
+        Purpose of the network, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers), the
+        inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
     **parameters
         Parameters of ``MLPRegressor`` that replace those of the paper.
 
@@ -74,13 +74,8 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     -----
     ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. The dropout of Table 1 (0.05 after the
     input) and Table 6 (0.2 after the first two layers) is replaced by the L2 penalty ``alpha``, 0.1 and 1 here, and,
-    for the inverse surrogate, by ``noise`` on the simulated frequencies. Training ends before 1000 epochs when the
-    loss has stopped falling; no rows are held out to decide this, because a small sample has too few of them.
-    The estimators themselves standardise inputs and outputs.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
+    for the inverse surrogate, by ``noise`` on the simulated frequencies. Training ends before 1000 epochs when the loss
+    has stopped falling; no rows are held out to decide this. The estimators themselves standardise inputs and outputs.
 
     Examples
     --------

@@ -88,18 +88,18 @@ class Simulated(TypedDict, total=False):
 class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     """FE model whose parameters depend on temperature as learned from monitoring data.
 
-    The method of Kamali et al. (2026), Section 2. M1 turns measured frequencies into parameters (eq. (5)), M2 maps
-    temperatures to those parameters (eq. (6)), and the FE model, healthy or damaged, turns the parameters back into
-    frequencies (eqs. (7)-(8)).
+    The method of Kamali et al. (2026), Section 2 [KCM26]_. M1 turns measured frequencies into parameters (eq. (5)), M2
+    maps temperatures to those parameters (eq. (6)), and the FE model, healthy or damaged, turns the parameters back
+    into frequencies (eqs. (7)-(8)).
 
     Parameters
     ----------
     model : FE model
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
-        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets
-        this one. ``set_params(inverse__n_samples=500)`` puts the default inverse in the place of None, with ``reduce``
-        and ``n_jobs`` of the chain, and sets its parameter; so do the names of a grid search, and those of the mapper.
+        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets this one.
+        ``set_params(inverse__n_samples=500)`` puts the default inverse in the place of None, with ``reduce`` and
+        ``n_jobs`` of the chain, and sets its parameter; so do the names of a grid search, and those of the mapper.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``, behind the `~skthermo.preprocessing.ExponentialMeans` of earlier
         temperatures that the frequencies remember, if `~skthermo.preprocessing.find_memory` finds such. With lags of
@@ -109,23 +109,22 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         measured mode, over that of the nominal model, is a factor. ``BiasAligner()`` is the paper's shift. A
         `~skthermo.preprocessing.BiasAligner` without a reference gets this model.
     imputer : transformer or "passthrough", default="passthrough"
-        Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only.
-        Without an imputer, an inverse that refines estimates the parameters of such rows from the modes that are
-        there; without refining, they do not train M2.
+        Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only. Without one,
+        an inverse that refines estimates the parameters of such rows from the modes that are there; without refining,
+        they do not train M2.
     discrepancy : "auto", regressor or None, default="auto"
         What the FE model cannot follow: predictions, healthy or damaged, are multiplied with the ratio of measured over
         modelled frequencies, which a regressor learns mode by mode from the inputs of M2. "auto" is a
         `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
-        Whether M1, predictions and simulations use a reduced model, ``model.reduced``, which makes large models much
-        faster. "auto" reduces where that is expected to save time, by the size of the model and the number of records,
-        and where a basis is accurate; ``report_`` says which. True allows a relative error of 1e-5 in the frequencies,
-        as "auto" does; a number sets the error allowed. Every `InverseSurrogate` of the inverse whose own ``reduce`` is
-        "auto" gets this value: it simulates and refines with a reduced model for its bounds, or for a wider box where
-        the records have parameters outside them. Predictions use that reduced model if its box covers the parameters
-        that M2 gives for the training weather, plus a quarter of their range on either side, else one of their own for
-        this box. Rows outside the box are solved by the model itself, with a warning that counts them; so are all where
-        no basis is as accurate as that, with a warning unless "auto" decides.
+        Whether M1, predictions and simulations use a reduced model, ``model.reduced``, much faster for large models.
+        "auto" reduces where that is expected to save time and where a basis is accurate; ``report_`` says which. True
+        allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Every
+        `InverseSurrogate` of the inverse whose own ``reduce`` is "auto" gets this value. Predictions use its reduced
+        model if the box of that covers the parameters that M2 gives for the training weather, plus a quarter of their
+        range on either side, else one of their own for this box. Rows outside the box are solved by the model itself,
+        with a warning that counts them; so are all where no basis is as accurate as that, with a warning unless "auto"
+        decides.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
         and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
@@ -139,10 +138,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     Attributes
     ----------
-    inverse_, mapper_, aligner_ : estimators
-        Fitted clones.
-    imputer_ : estimator or None
-        Fitted clone.
+    inverse_, mapper_, aligner_, imputer_ : estimators
+        Fitted clones; None without an imputer.
     parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
         Multipliers that M1 found in the training data, eq. (5).
     noise_ : ndarray of shape (n_modes,)
@@ -153,10 +150,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         temperatures T; 0 with ``discrepancy=None``.
     records_ : TrainingRecords
         The training records, and what M2 learned from them.
-    thermal_ : ThermalModel
-        What predicts: mapper, simulator, aligner and discrepancy, together and unchangeable.
-    recorder_ : RecordSimulator
-        Draws noise, gaps and outliers as the training records have them.
+    thermal_, recorder_ : ThermalModel, RecordSimulator
+        What predicts (mapper, simulator, aligner and discrepancy), and what draws noise, gaps and outliers as the
+        training records have them.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -171,35 +167,27 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Columns of the parameters and of the frequencies.
     y_is_vector_ : bool
         Whether `fit` saw one mode as a vector.
-    n_features_in_ : int
-        Number of temperature columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of temperature columns and, where `fit` saw a frame with such, their names.
 
     Notes
     -----
     ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T))) * exp(discrepancy_(T))``,
-    and simulations of damage have the same discrepancy. Kennedy and O'Hagan [KOH01]_ separate the parameters of a
-    calibrated model from its discrepancy in the same way. Outliers, as
-    `~skthermo.preprocessing.check_records` finds them, train neither aligner nor M1; they stay in the records, so that
-    ``service_records`` knows them. If temperatures are a frame, results are frames.
+    and simulations of damage have the same discrepancy, as Kennedy and O'Hagan [KOH01]_ separate the parameters of a
+    calibrated model from it. Outliers, as `~skthermo.preprocessing.check_records` finds them, train neither aligner nor
+    M1; they stay in the records, so that ``service_records`` knows them. If temperatures are a frame, results are
+    frames. A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in
+    the training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as
+    one without any temperature, is NaN; no row is dropped.
+
     Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
     among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
     5000. Time and memory then grow in proportion to the rows.
+
     A mapper that states its own uncertainty by a method ``predict_covariance(X)``, (n_samples, n_parameters,
     n_parameters), such as one that has learned from a fleet, makes standard deviations and intervals as wide as it is
     uncertain. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, it says where it stands on
     records of others.
-    A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in the
-    training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as one
-    without any temperature, is NaN; no row is dropped.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
-
-    Kennedy & O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63 (2001)
-    425-464 [KOH01]_.
 
     Examples
     --------
@@ -274,7 +262,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         sample_weight : array-like of shape (n_samples,), optional
             Weight of each record in what M2 and the discrepancy learn; those of a series are matched to the rows of a
             frame by index. Records of weight 0 do not train them and have no residuals; imputer, aligner and M1 see all
-            records alike.
+            alike.
 
         Returns
         -------
@@ -284,11 +272,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Raises
         ------
         ValueError
-            If lengths or indices differ, the number of modes is not the model's, a temperature
-            is constant, missing throughout, in kelvin or holds a number that stands for a missing value, or a mode
-            was never measured; if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``;
-            if weights are negative, NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose
-            ``fit`` takes none.
+            If lengths or indices differ, the number of modes is not the model's, a temperature is constant, missing
+            throughout, in kelvin or holds a number that stands for a missing value, or a mode was never measured; if
+            shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``; if weights are negative,
+            NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose ``fit`` takes none.
 
         Warns
         -----
@@ -393,19 +380,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Notes
         -----
         An inverse that refines finds the same parameters whatever its regressor, which gives the start alone: here a
-        linear regression on 200 simulations at most, which trains in no time. It refines on frequencies alone, also
-        where `fit` had shapes. Records whose weight was 0 in `fit` are left out, and other weights are 1.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> other = fem.refitted(later.temperatures, later.frequencies)
-        >>> change = other.predict(later.temperatures) / fem.predict(later.temperatures) - 1
-        >>> bool(0 < change.abs().max().max() < 0.02)
-        True
+        linear regression on 200 simulations at most. It refines on frequencies alone, also where `fit` had shapes.
+        Records whose weight was 0 in `fit` are left out, and other weights are 1.
         """
         T, F = self.training_records_
         counted = self.records_.counted
@@ -436,19 +412,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
         weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
         correlated. No record comes twice, so that lags, folds and neighbours are what they are in measured records.
-        The FE model is solved for the frequencies alone and nothing is inverted: only the temperature mapper and the
-        discrepancy are fitted.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year = make_truss_campaign(random_state=0)
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> others = [fem.resampled(seed) for seed in range(3)]
-        >>> changes = [other.predict(year.temperatures) / fem.predict(year.temperatures) - 1 for other in others]
-        >>> all(0 < change.abs().max().max() < 0.02 for change in changes)
-        True
+        Only the temperature mapper and the discrepancy are fitted: nothing is inverted.
         """
         check_is_fitted(self)
         records = self.records_.resampled(self.residuals_, self.discrepancy_, as_random_state(random_state))
@@ -534,8 +498,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records, or a sensor departs from what the others foretell, as one that drifts or is stuck does; `predict`,
-            `predict_interval` and `simulate` warn of the same.
+            records, or a sensor departs from what the others foretell; `predict`, `predict_interval` and `simulate`
+            warn of the same.
         """
         weather = self._weather(X)
         return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
@@ -563,12 +527,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         frequencies : ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz, in the measured domain. An array of shape (n_samples,) if `fit` saw one mode as a vector, as in
-            scikit-learn, and so are the standard deviations.
+            In Hz, in the measured domain. A vector if `fit` saw one mode as a vector, and so are the standard
+            deviations.
         std : ndarray or DataFrame of shape (n_samples, n_modes)
             Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
-            weather, out of fold, in Hz. They contain the scatter of the measurement, what a missing temperature
-            costs, and what `predict_covariance` says where the mapper knows it.
+            weather, out of fold, in Hz. They contain the scatter of the measurement, what a missing temperature costs,
+            and what `predict_covariance` says where the mapper knows it.
         """
         check_flag(return_std, "return_std")
         weather = self._weather(X)
@@ -589,34 +553,20 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         ndarray of shape (n_samples, n_modes, n_modes)
-            In Hz squared, in the measured domain: G C G' with the covariance C of the parameters that the mapper states
-            and the exact derivatives G = d f / d theta of the model (of its reduced model within its box), times the
-            discrepancy. Without the scatter of the measurement. NaN where nothing is predicted.
+            In Hz squared, in the measured domain, to first order: G C G' with the covariance C of the parameters that
+            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and the exact derivatives G = d f / d theta of
+            the model (of its reduced model within its box), times the discrepancy. Without the scatter of the
+            measurement. NaN where nothing is predicted.
 
         Raises
         ------
         ValueError
             If the mapper does not state how uncertain it is.
 
-        See Also
-        --------
-        skthermo.fleet.FleetMapper : A mapper that does.
-
         Notes
         -----
-        To first order. The uncertainty is that of the coefficients of the mapper: the same draw of them moves all
-        records of a season together, so that the errors of records in similar weather do not average out.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year = make_truss_campaign(random_state=0)
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> fem.predict_covariance(year.temperatures)  # doctest: +ELLIPSIS
-        Traceback (most recent call last):
-        ...
-        ValueError: TemperatureMapper does not state how uncertain it is; expected a mapper with predict_covariance...
+        The same draw of the mapper's uncertain coefficients moves all records of a season together, so that the errors
+        of records in similar weather do not average out.
         """
         check_is_fitted(self)
         if not offers(self.mapper_, "predict_covariance"):
@@ -645,8 +595,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         lowest : ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz, in the measured domain, and a vector where `predict` gives one; 0 if there are too few training
-            records for the confidence.
+            In Hz, in the measured domain, and a vector where `predict` gives one; 0 if there are too few records.
         highest : ndarray or DataFrame of shape (n_samples, n_modes)
             Likewise; infinite if there are too few.
 
@@ -657,26 +606,20 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals: the training records are divided into blocks of a week or more, which are dealt in
-        turn to five folds, and each fold is predicted by a mapper fitted to the others. The width is a multiple of the
-        spread of these residuals in similar weather; the multiple is the order statistic that the folds themselves
-        needed. If new records are exchangeable with the
-        training records, the interval holds a mode with about the probability asked. Records of one structure are
-        serially correlated, so that the share of a short period that is held varies more. Beyond the training range
-        there are no residuals to learn from, and the interval is widened by the distance (see `applicability`). Where a
-        temperature was filled, it is widened by the change of the prediction when that temperature is wrong by its
-        standard deviation, sensor by sensor in quadrature.
+        Split-conformal intervals [LGR18]_: the training records are divided into blocks of a week or more, which are
+        dealt in turn to five folds, and each fold is predicted by a mapper fitted to the others. The width is a
+        multiple of the spread of these residuals in similar weather; the multiple is the order statistic that the folds
+        themselves needed. If new records are exchangeable with the training records, the interval holds a mode with
+        about the probability asked; the share of a short period varies more, because records of one structure are
+        serially correlated. Beyond the training range, the interval is widened by the distance (see `applicability`).
+        Where a temperature was filled, it is widened by the change of the prediction when that temperature is wrong by
+        its standard deviation, sensor by sensor in quadrature.
 
         A mapper that knows how uncertain it is (`predict_covariance`) says so in place of that distance: its standard
         deviation is added in quadrature, and the residuals count without what it explains of them. Only beyond the
         weather that such a mapper stands on, its ``reach_``, is the interval widened by the distance as well. What a
-        mapper does not know stays the same for a season: its errors there are one draw, not noise, and the share that
-        is held differs more from one structure to the next than from one year to the next.
-
-        References
-        ----------
-        Lei, G'Sell, Rinaldo, Tibshirani & Wasserman, Distribution-free predictive inference for regression, Journal of
-        the American Statistical Association 113 (2018) 1094-1111 [LGR18]_.
+        mapper does not know stays the same for a season: the share that is held differs more from one structure to the
+        next than from one year to the next.
 
         Examples
         --------
@@ -732,15 +675,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             Mass added to the model's in kg; a vector holds lumped masses.
         noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
             Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals of a whole training record, out of fold. So modes scatter together, scatter more in frost, and are
-            missing as in the training records. Runs of consecutive records are drawn if residuals are serially
-            correlated, scaled to the weather of the rows, which should be in order of time. A second draw with a small
-            weight smooths the residuals, so that the largest of the training records can be exceeded.
+            residuals of a whole training record, out of fold, so that modes scatter together, scatter more in frost,
+            and are missing as in the training records. Runs of consecutive records are drawn if residuals are serially
+            correlated [PR94]_, scaled to the weather of the rows, which should be in order of time. A second draw with
+            a small weight smooths the residuals, so that the largest of the training records can be exceeded.
         gaps : float or "fitted", optional
             Values that are missing. With "fitted", modes and whole records are missing as in the training records: as
-            often, together, and for as long (`draw_gaps` tells which temperatures are missing beside them). A
-            number is the share of the values that are missing, each by itself; 0 gives complete records. By
-            default, modes are missing with ``noise="fitted"`` only, as in the record that the noise of a row is of.
+            often, together, and for as long (`draw_gaps` tells which temperatures are missing beside them). A number is
+            the share of the values that are missing, each by itself; 0 gives complete records. By default, modes are
+            missing with ``noise="fitted"`` only, as in the record that the noise of a row is of.
         outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
             Values that are far off. With "fitted", those training residuals that are far from their neighbours
             (`~skthermo.preprocessing.HampelFilter`) come back as often, in the same modes together, and for as many
@@ -759,18 +702,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Raises
         ------
         ValueError
-            If a damage group or a parameter is unknown, a severity is 1 or more, a factor is not positive, or the
-            model cannot be changed in this way; if gaps or outliers are no shares.
+            If a damage group or a parameter is unknown, a severity is 1 or more, a factor is not positive, or the model
+            cannot be changed in this way; if gaps or outliers are no shares.
 
         Warns
         -----
         UserWarning
             If a factor is above 10, which may be meant in percent.
-
-        References
-        ----------
-        Politis & Romano, The stationary bootstrap, Journal of the American Statistical Association 89 (1994) 1303-1313
-        [PR94]_, for runs of consecutive residuals.
         """
         weather = self._weather(X)
         change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
@@ -794,11 +732,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
         noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
-            As in `simulate`, and so are the next two.
-        gaps : float or "fitted", optional
-            Which values are missing.
-        outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
-            Which values are far off.
+            As in `simulate`, and so are all others.
+        gaps, outliers : float, "fitted" or array-like, optional
+            Which values are missing, and which are far off.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -894,12 +830,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             Temperatures in degrees Celsius.
         modes : sequence of int
             Ranks of modes of the healthy nominal model, the lowest being 0.
-        damage : mapping of str to float or array-like of shape (n_samples,), optional
-            As in `simulate`, and so are the next three.
-        parameters : mapping of str to float, optional
-            Factors of parameters.
-        stiffness, mass : matrix of shape (n_dof, n_dof), optional
-            What is added.
+        damage, parameters, stiffness, mass : optional
+            Changes of the structure, as in `simulate`.
 
         Returns
         -------
@@ -991,10 +923,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         DataFrame
-            With X's index. One column for each input of M2, lags included: its distance outside the range of the
-            training rows, divided by that range (0 inside). The column ``outside_bounds`` says whether a
-            parameter is outside the bounds of the inverse. Where the mapper has learned from a fleet, a last column,
-            ``from_fleet``, is True in weather that the fleet has seen, and the training rows have not.
+            With X's index. A column for each input of M2, lags included: its distance outside the range of the training
+            rows, divided by that range (0 inside). ``outside_bounds`` says whether a parameter is outside the bounds of
+            the inverse. Where the mapper has learned from a fleet, ``from_fleet`` is True in weather that only the
+            fleet has seen.
         """
         weather = self._weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
@@ -1047,31 +979,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return default_part(self, name)
 
     def set_params(self, **params: Any) -> Self:
-        """Set parameters, also of parts, as in ``set_params(inverse__noise=0.01)``.
-
-        Where a part is None or "auto" and stands for a default, that default takes its place and gets the parameters.
-
-        Parameters
-        ----------
-        **params : dict
-            Names and values.
-
-        Returns
-        -------
-        DataInformedFEM
-            This estimator.
-
-        Raises
-        ------
-        ValueError
-            If there is no such parameter, or it has no parameters of its own.
-
-        Warns
-        -----
-        UserWarning
-            If a search of scikit-learn sets the regressor, or the simulations, of an inverse that refines its
-            estimates: all settings then score alike.
-        """
         super().set_params(**params)
         warn_of_inert(self, params)
         return self

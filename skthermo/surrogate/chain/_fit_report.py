@@ -68,8 +68,8 @@ class FitReport(SavesFrames):
     left_out : Series
         Rows that did not train the mapper, by reason; a row may have several reasons.
     filled : DataFrame
-        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, the
-        ``standard deviation`` of what was filled, in degrees, and ``when`` they are missing.
+        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, the ``standard
+        deviation`` of what was filled, in degrees, and ``when`` they are missing.
     offsets : Series
         Mean measured frequency against the model's nominal one, by mode, in percent.
     hidden_offsets : Series

@@ -44,7 +44,7 @@ MANY_BY_FULL_MODEL = 0.01  # share of rows that the full model solves beside a r
 class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     """Parameters of an FE model from frequencies and mode shapes, learned from simulations; equations (3)-(4).
 
-    Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1.
+    Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1 [KCM26]_ [KMH24]_.
 
     Parameters
     ----------
@@ -65,11 +65,11 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         refined becomes more accurate there.
     noise : "auto", float or array-like of shape (n_modes,), default="auto"
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
-        measurement, M1 does not amplify that noise: the regressor learns the posterior mean of the parameters, and
-        refining finds the posterior mode. With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode
-        is missing). "auto" is estimated: by a `DataInformedFEM` from temperatures and frequencies; without
-        temperatures, from what the model leaves unexplained of the records that `fit` sees, if estimates are refined
-        and there are more modes than parameters; otherwise it is 0.
+        measurement, the regressor learns the posterior mean of the parameters, and refining finds the posterior mode.
+        With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode is missing). "auto" is estimated: by
+        a `DataInformedFEM` from temperatures and frequencies; without temperatures, from what the model leaves
+        unexplained of the records that `fit` sees, if estimates are refined and there are more modes than parameters;
+        otherwise it is 0.
     dofs : array-like of int of shape (n_sensors,), optional
         Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
         frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
@@ -89,18 +89,17 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Whether to simulate and refine with the reduced model ``model.reduced(bounds)``, much faster for large models.
         "auto" reduces where ``model.reduction_pays``, given the simulations and the records of `fit`, and a basis is
         accurate. True allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error
-        allowed. If the records that
-        `fit` sees have parameters outside the bounds, it makes a reduced model for a wider box that holds them, within
-        the limits of estimates (three times the half-width of the bounds, in ln theta). Rows that end outside that box
-        are solved by the full model, with a warning that counts them. `inverse_transform` and `round_trip` always use
-        the full model for the way back.
+        allowed. If the records that `fit` sees have parameters outside the bounds, it is made for a wider box that
+        holds them, within the limits of estimates (three times the half-width of the bounds, in ln theta). Rows that
+        end outside that box are solved by the full model, with a warning that counts them. `inverse_transform` and
+        `round_trip` use the full model for the way back.
     memory : str or joblib.Memory, optional
         Folder for what is computed in `fit` and for the inversion of the records that `fit` saw, so that searches and
         cross-validation make each only once: simulations and their reduced model, by model, bounds, number and seed;
         the regressor, by its parameters and what it learns from; the inversion, by the model, the settings of the
-        refinement and the records. Anything that changes gives a new one. If several processes need the same, one makes
-        it and the others wait; warnings come again with what is read. With ``random_state=None``, what is stored is
-        always the same. Clear the memory when the program behind a model or a regressor of your own changes. See Notes.
+        refinement and the records. Processes that need the same wait for the one that makes it; warnings come again
+        with what is read. With ``random_state=None``, what is stored is always the same. Clear the memory when the
+        program behind a model or a regressor of your own changes. See Notes.
     n_jobs : int, optional
         Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
@@ -118,16 +117,14 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         ``theta``, ``frequencies`` and, with ``dofs``, ``shapes`` of the training samples, before noise.
     columns_ : InverseColumns
         How columns are read, named and computed.
-    shape_inputs_ : ShapeInputs or None
-        With ``dofs``: how columns of shapes are read; ``reference`` holds the nominal shapes at the sensors.
-    scores_ : ShapeScores
-        With ``dofs``: linear estimates that the regressor sees in place of the components of shapes.
+    shape_inputs_, scores_ : ShapeInputs, ShapeScores
+        With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors), and
+        linear estimates that the regressor sees in place of the components of shapes.
     simulator_ : Simulator
         If there is a model: it and, where it is reduced, the reduced model of the steps.
-    refinement_ : Refinement
-        If estimates are refined: the model, the box and the prior of the steps.
-    inversions_ : Inversions
-        If estimates are refined: those of the records of `fit`, which the memory keeps.
+    refinement_, inversions_ : Refinement, Inversions
+        If estimates are refined: the model, the box and the prior of the steps, and the inversions of the records of
+        `fit`.
     box_ : Box or None
         The bounds of the samples, if they were simulated; else None.
     noise_ : ndarray of shape (n_modes,)
@@ -136,18 +133,14 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
         Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
-        ``noise_`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where
-        that cannot be estimated.
-    n_parameters_ : int
-        Number of parameters.
-    parameter_names_ : list of str or None
-        Their names: the model's, or those of the frame that `fit` saw.
+        ``noise_`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where that cannot
+        be estimated.
+    n_parameters_, parameter_names_ : int, list of str or None
+        Number of parameters, and their names: the model's, or those of the frame that `fit` saw.
     y_is_vector_ : bool
         Whether `fit` saw one parameter as a vector.
-    n_features_in_ : int
-        Number of columns of X.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns of X and, where `fit` saw a frame with such, their names.
 
     Notes
     -----
@@ -160,27 +153,18 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     The noise is what is stated or, where the residuals of the row show more, what they show. Frequencies that count as
     exact end below a step of 1e-6.
 
-    Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 % from any of seven. Not
-    refined, the default network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %,
-    a Gaussian process by 0.01 and 0.14 % (``examples/plot_regressors.py``).
+    Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 %. Not refined, the default
+    network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %, a Gaussian process by
+    0.01 and 0.14 % (``examples/plot_regressors.py``).
 
-    With ``dofs``, the regressor sees linear estimates of the parameters (ridge regression on noisy simulations) in
-    place of the many components of shapes. Refined on frequencies and shapes, errors of the truss's verticals are 39 %
-    lower with four sensors than from frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of
-    30 %, noise of 0.1 % on frequencies and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
+    Refined on frequencies and shapes, errors of the truss's verticals are 39 % lower with four sensors than from
+    frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of 30 %, noise of 0.1 % on frequencies
+    and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
 
     For each simulation, a ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes, more with ``dofs``, and for each
-    training record in each set of training records ``8 * (2 n_parameters + n_modes + 3) + n_parameters + 1`` bytes: 51
-    kB for a year of days of the truss. With ``reduce`` it also holds the reduced model with the full one, once for the
-    bounds and again for each set of training records that leaves them. ``reduce_size`` of ``joblib.Memory(folder)``
-    removes what has not been used for longest.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
-
-    Kamali, Mariani, Hadianfard & Marzani, Inverse surrogate model for deterministic structural model updating based on
-    random forest regression, Mechanical Systems and Signal Processing 215 (2024) 111416 [KMH24]_.
+    training record in each set of training records ``8 * (2 n_parameters + n_modes + 3) + n_parameters + 1`` bytes;
+    with ``reduce`` also the reduced model with the full one, once for the bounds and again for each set of training
+    records that leaves them. ``reduce_size`` of ``joblib.Memory(folder)`` removes what has not been used for longest.
 
     Examples
     --------
@@ -268,15 +252,14 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Raises
         ------
         ValueError
-            If there is neither y nor a model, the numbers of modes or parameters are not the
-            model's, the bounds are infeasible, multipliers of a model are not positive, or a model
-            that is to be reduced has no method for it.
+            If there is neither y nor a model, the numbers of modes or parameters are not the model's, the bounds are
+            infeasible, multipliers of a model are not positive, or a model that is to be reduced has no method for it.
 
         Warns
         -----
         UserWarning
-            If there are more parameters than modes, or modes change their order in more than a tenth of the
-            simulations and the model does not track them.
+            If there are more parameters than modes, or modes change their order in more than a tenth of the simulations
+            and the model does not track them.
         """
         random_state = 0 if self.random_state is None and self.memory is not None else self.random_state
         random = check_random_state(random_state)
@@ -383,9 +366,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
               they have reached; rows that have stalled keep the regressor's estimate;
             - ``outside`` (n_samples, n_parameters): whether a parameter contradicts the prior: farther from the middle
               of the bounds than their whole width, and by more than its uncertainty explains;
-            - ``solves`` (n_samples,): how often a model was solved with its derivatives for the row;
-            - ``full_solves`` (n_samples,): with ``reduce``, how many of these were of the full model, because the steps
-              of the row ended outside the box of the reduced one.
+            - ``solves``, ``full_solves`` (n_samples,): how often a model was solved with its derivatives for the row,
+              and how many of these were of the full model because steps ended outside the box of the reduced one.
 
         Raises
         ------
@@ -445,8 +427,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         """Coefficient of determination R2, averaged over parameters: without y, of the regressor on new simulations.
 
         Without y, so that searches can compare regressors, the score is that of the logarithms of the parameters that
-        the regressor itself gives, not refined, for 500 simulations that it was not trained on. They are drawn from the
-        same bounds and carry the same noise. With y, the score is that of `predict`, over complete rows.
+        the regressor itself gives, not refined, for 500 simulations that it was not trained on, from the same bounds
+        and with the same noise. With y, the score is that of `predict`, over complete rows.
 
         Parameters
         ----------
@@ -470,8 +452,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Notes
         -----
         The 500 simulations are always the same, so that scores of different regressors and numbers of samples can be
-        compared. Those of different ``bounds`` or ``noise`` cannot: the task differs. Measured records do not matter,
-        and one fold is enough: ``cv=ShuffleSplit(1)``. With ``refine=0``, `fit` leaves out what no score needs.
+        compared; those of different ``bounds`` or ``noise`` cannot. Measured records do not matter, and one fold is
+        enough. With ``refine=0``, `fit` leaves out what no score needs.
 
         Examples
         --------
@@ -553,15 +535,6 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         ------
         ValueError
             If the estimator has no model.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skthermo.datasets import make_truss
-        >>> from skthermo.surrogate import InverseSurrogate
-        >>> inverse = InverseSurrogate(make_truss(), refine=0, random_state=0).fit()
-        >>> bool(1e-4 < np.abs(inverse.round_trip()).max() < 1e-2)
-        True
         """
         check_is_fitted(self)
         self._check_has_model()
