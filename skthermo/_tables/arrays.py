@@ -155,6 +155,12 @@ def median(values: Array) -> Array:
     return np.array([np.median(column) if len(column) else np.nan for column in known])
 
 
+def means_of_known(values: Array, axis: int = 0) -> Array:
+    """Means without NaN along one axis of a table; NaN, without a warning, where nothing is known."""
+    counts = (~np.isnan(values)).sum(axis=axis)
+    return np.divide(np.nansum(values, axis=axis), counts, out=np.full(len(counts), np.nan), where=counts > 0)
+
+
 def robust_deviation(values: Array) -> Array:
     """Standard deviations of columns that outliers hardly move, NaN ignored; from the median of the distances."""
     return NORMAL * median(np.abs(values - median(values)))

@@ -7,23 +7,21 @@ from typing import Any, Literal, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._estimators.arguments import by_mode, is_model
 from skthermo._tables.arrays import as_floats, real_array
 from skthermo._tables.frames import check_columns, frame_like, warn_of_markers
 from skthermo._validation import (
-    Estimator,
     HasMethods,
     StrOptions,
-    TransformerMixin,
     _fit_context,
     check_array,
     check_is_fitted,
 )
+from skthermo.preprocessing._records import RecordTransformer
 
 
-class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
+class BiasAligner(RecordTransformer):
     """Move measured frequencies so that their means are the model's frequencies, equation (22).
 
     Parameters
@@ -108,28 +106,10 @@ class BiasAligner(OneToOneFeatureMixin, TransformerMixin, Estimator):
                     raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
         return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Shift or scale measured frequencies to the reference.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            In Hz; NaN stays NaN.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            Aligned frequencies in Hz.
-        """
-        check_is_fitted(self)
-        F = self._validated(X, reset=False)
+    def _transformed(self, X: Any, values: NDArray) -> Any:
         if self.method == "scale":
-            return frame_like(X, F / self.mean_ * self.reference_)
-        return frame_like(X, F - self.mean_ + self.reference_)
+            return frame_like(X, values / self.mean_ * self.reference_)
+        return frame_like(X, values - self.mean_ + self.reference_)
 
     @overload
     def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...

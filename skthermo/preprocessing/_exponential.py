@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.text import duration_text
 from skthermo._validation import _fit_context, check_is_fitted
-from skthermo.preprocessing._past import PastFeatures
+from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
 REACH = 4  # time constants beyond which records have no weight; they would have 2 % of it
@@ -146,9 +146,7 @@ class ExponentialMeans(PastFeatures):
             times, records = self._joined(self._found(own, REACH * self._longest), own, values)
         order = np.argsort(times, kind="stable")
         sorted_times, sorted_records = times[order], records[np.ix_(order, self.sensors_)]
-        back = np.empty(len(order), dtype=np.intp)
-        back[order] = np.arange(len(order))
-        rows = back[len(order) - len(own) :]
+        rows = np.argsort(order)[len(order) - len(own) :]
         means = [trailing_means(sorted_times, sorted_records, int(constant))[rows] for constant in self.time_constants_]
         told = self._warn_of_no_past(X, values, own, sorted_times)
         return np.hstack([values, *means]).astype(values.dtype, copy=False), told

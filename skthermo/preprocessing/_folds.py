@@ -94,14 +94,12 @@ class BlockedKFold(BaseCrossValidator):
         if n_rows < self.n_splits:
             raise ValueError(f"{n_rows} rows are fewer than {self.n_splits} folds; expected a row for each")
         positions, length = times - times.min(), self.length(X)
+        ranks = np.argsort(np.argsort(times, kind="stable"))
         if (is_rows := isinstance(length, int)) or not has_stamps(X):
-            positions = np.empty(n_rows)
-            positions[np.argsort(times, kind="stable")] = np.arange(n_rows)
+            positions = ranks
         blocks = np.unique(positions // (length if is_rows else length.as_unit("ns").value), return_inverse=True)[1]
         if blocks.max() + 1 < self.n_splits:
-            blocks = np.empty(n_rows, dtype=np.intp)
-            order = np.argsort(times, kind="stable")
-            blocks[order] = np.arange(n_rows) * self.n_splits // n_rows
+            blocks = ranks * self.n_splits // n_rows
         return blocks % self.n_splits
 
     def remembering(self, X: Any, n_records: float) -> BlockedKFold:

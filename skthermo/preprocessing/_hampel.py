@@ -5,31 +5,24 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import OneToOneFeatureMixin
 
 from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
 from skthermo._tables.frames import check_positions_are_names, frame_like, positions_of
 from skthermo._tables.times import has_stamps, row_times
-from skthermo._validation import (
-    Estimator,
-    Interval,
-    TransformerMixin,
-    _fit_context,
-    check_is_fitted,
-    validate_data,
-)
+from skthermo._validation import Interval, _fit_context, validate_data
+from skthermo.preprocessing._records import RecordTransformer
 from skthermo.preprocessing._stamps import as_duration
 from skthermo.preprocessing._weather_regression import WeatherRegression
 
 LEAST_WINDOW = 3  # rows
 
 
-class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
+class HampelFilter(RecordTransformer):
     """NaN in place of values that are far from the median of their neighbours in time.
 
     With ``targets``, the other columns are the weather, and what it explains of the targets is subtracted before values
@@ -144,30 +137,7 @@ class HampelFilter(OneToOneFeatureMixin, TransformerMixin, Estimator):
         self.n_removed_[self.targets_] = self._far(distances, local).sum(axis=0)
         return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Put NaN in place of outliers.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            Records, in the columns of `fit`.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_features)
-            A frame gives a frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If columns differ from `fit`; if the window is a duration and X has no ``DatetimeIndex``.
-        """
-        check_is_fitted(self)
-        values = self._validated(X, reset=False)
+    def _transformed(self, X: Any, values: NDArray) -> Any:
         cleaned = values.copy()
         far = np.zeros(values.shape, dtype=bool)
         far[:, self.targets_] = self._far(*self._distances(X, values))
@@ -211,6 +181,5 @@ def distances_from_neighbours(values: Array, times: Array, window: int | pd.Time
     around = {"window": window, "center": True, "min_periods": 1}
     distances = table - table.rolling(**around).median()
     local = NORMAL * distances.abs().rolling(**around).median()
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
+    back = np.argsort(order)
     return distances.to_numpy()[back], local.to_numpy()[back]

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from numbers import Integral
-from typing import overload
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import broken_lines
+from skthermo._tables.arrays import as_floats, broken_lines
 from skthermo._tables.frames import frame_like, row_weights
-from skthermo._validation import (
-    Estimator,
-    Interval,
-    TransformerMixin,
-    _check_feature_names_in,
-    _fit_context,
-    check_is_fitted,
-    validate_data,
-)
+from skthermo._validation import Interval, _check_feature_names_in, _fit_context
+from skthermo.preprocessing._records import RecordTransformer
 
 
-class HingeFeatures(TransformerMixin, Estimator):
+class HingeFeatures(RecordTransformer):
     """Append max(x - knot, 0) for some knots of every column, so that linear regression fits broken lines.
 
     Frequencies over temperature are broken lines: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
@@ -95,7 +88,7 @@ class HingeFeatures(TransformerMixin, Estimator):
             If a column is NaN in every row, or in every row that has a weight; if weights are negative, NaN or
             infinite, all 0, or not one for each row.
         """
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
+        values = as_floats(self._validated(X, reset=True))
         weights = row_weights(sample_weight, X)
         if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
@@ -110,44 +103,11 @@ class HingeFeatures(TransformerMixin, Estimator):
             self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
         return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Append the hinges.
+    def _transformed(self, X: Any, values: NDArray) -> Any:
+        return frame_like(X, broken_lines(as_floats(values), self.knots_), self.get_feature_names_out())
 
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            In the columns of `fit`; NaN stays NaN.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_features * (1 + n_knots))
-            The columns of X, then max(x - knot, 0) of all columns for each knot.
-        """
-        check_is_fitted(self)
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-        return frame_like(X, broken_lines(values, self.knots_), self.get_feature_names_out())
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Names of the columns of X; by default those seen in `fit`.
-
-        Returns
-        -------
-        ndarray of str
-            ``T`` itself, ``T_above1`` for its first knot, and so on.
-        """
-        check_is_fitted(self)
-        names = _check_feature_names_in(self, input_features)
-        above = [f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in names]
-        return np.array([*names, *above], dtype=object)
+    def _names(self, columns: Sequence[Any]) -> list[Any]:
+        return [*columns, *(f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in columns)]
 
 
 def weighted_quantiles(values: NDArray[np.float64], shares: NDArray, weights: NDArray) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from skthermo._validation import (
     StrOptions,
     _fit_context,
 )
-from skthermo.preprocessing._past import PastFeatures
+from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
 DEFAULT_TOLERANCE = 6  # times freq

@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, broken_lines, means_of_known, median, robust_deviation, spread_evenly
 from skthermo._tables.frames import check_same_rows, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import DAY_NS, has_stamps
+from skthermo._validation import check_array
 from skthermo.preprocessing._exponential import PAST, ExponentialMeans, trailing_means
 from skthermo.preprocessing._weather_regression import (
     KNOTS,
@@ -90,9 +91,6 @@ class MemoryFindings(SavesFrames):
     def _sensors(self) -> str:
         return " and ".join(repr(one) for one in self.features.sensors)
 
-    def __str__(self) -> str:
-        return self.summary()
-
     def __repr__(self) -> str:
         return self.summary()
 
@@ -115,7 +113,8 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     Raises
     ------
     ValueError
-        If the tables differ in length or index, or hold something that is no number.
+        If the tables differ in length or index, repeat the name of a column, or hold something that is no real number
+        or is infinite.
 
     See Also
     --------
@@ -152,14 +151,17 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     ExponentialMeans(sensors=['air'], time_constants=['40D'])
     """
     check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
+    T, F = (
+        check_array(table, dtype=np.float64, ensure_all_finite="allow-nan", input_name=name)
+        for table, name in ((temperatures, "temperatures"), (frequencies, "frequencies"))
+    )
     nothing = MemoryFindings(pd.DataFrame(columns=COLUMNS), None, 0.0)
     if not has_stamps(temperatures):
         return nothing
     stamps = temperatures.index.as_unit("ns").asi8
     order = np.argsort(stamps, kind="stable")
     first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
-    T, F = as_floats(temperatures)[np.ix_(order, list(first.values()))], as_floats(frequencies)[order]
-    candidates = _Candidates.of(stamps[order], T, F)
+    candidates = _Candidates.of(stamps[order], T[np.ix_(order, list(first.values()))], F[order])
     return nothing if candidates is None else candidates.findings(list(first), column_names(frequencies, "f"))
 
 
@@ -242,7 +244,7 @@ class _Candidates:
         for fold in range(N_FOLDS):
             rows = (self.folds == fold) & (self.ages >= after)
             left = np.abs(self.values[rows] - self.inputs[np.ix_(rows, columns)] @ grams.coefficients(fold).T)
-            errors[fold] = _means_of_known(left)
+            errors[fold] = means_of_known(left)
         return errors
 
     def fall(self, known: list[NDArray[np.intp]], block: NDArray[np.intp], mean: _Mean) -> tuple[float, float]:
@@ -275,11 +277,11 @@ class _Candidates:
     def findings(self, sensors: list[Hashable], modes: list[Hashable]) -> MemoryFindings:
         """What is chosen, as a table and a transformer."""
         chosen = self.chosen()
-        before = _means_of_known(self.errors(self.weather))
+        before = means_of_known(self.errors(self.weather))
         table = []
         for i, constant in enumerate(TIME_CONSTANTS):
             errors = {
-                mean: _means_of_known(self.errors(self.weather, block))
+                mean: means_of_known(self.errors(self.weather, block))
                 for mean, block in self.means.items()
                 if mean.constant == i
             }
@@ -315,12 +317,6 @@ def _time_shapes(left: Array) -> Array:
     standard = np.nan_to_num((left - median(left)) / np.where(deviation > 0, deviation, np.inf))
     explained = ((shapes.T @ standard) ** 2).sum(axis=1) / (shapes**2).sum(axis=0)
     return np.column_stack([place - 0.5, shapes[:, explained.argmax()]])
-
-
-def _means_of_known(values: Array) -> Array:
-    """Mean of the values of each column that are known; NaN where none is."""
-    counts = (~np.isnan(values)).sum(axis=0)
-    return np.divide(np.nansum(values, axis=0), counts, out=np.full(len(counts), np.nan), where=counts > 0)
 
 
 def _fall(before: Array, after: Array) -> tuple[float, float]:

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from typing import overload
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._tables.arrays import as_floats, means_of_known
 from skthermo._tables.frames import frame_like
-from skthermo._validation import (
-    Estimator,
-    TransformerMixin,
-    _check_feature_names_in,
-    _fit_context,
-    check_is_fitted,
-    validate_data,
-)
+from skthermo._validation import _fit_context
+from skthermo.preprocessing._records import RecordTransformer
 
 EVERYWHERE = "ambient"
 SINGULAR = 1e-9  # eigenvalue beside the largest that counts as zero
 
 
-class SensorMeans(TransformerMixin, Estimator):
+class SensorMeans(RecordTransformer):
     """Mean of the sensors of each role.
 
     Structures differ in number, names and places of their thermometers. Their mean by role ("air", "deck") is an input
@@ -98,7 +92,7 @@ class SensorMeans(TransformerMixin, Estimator):
         ValueError
             If ``roles`` does not name each column of X, and no other, or gives no column a role.
         """
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
+        values = as_floats(self._validated(X, reset=True))
         role_of = self._read_roles()
         roles = sorted({role for role in role_of if role is not None})
         self.columns_ = {role: [i for i, own in enumerate(role_of) if own == role] for role in roles}
@@ -107,45 +101,13 @@ class SensorMeans(TransformerMixin, Estimator):
             self.offsets_[columns] = offsets_between(values[:, columns])
         return self
 
-    @overload
-    def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Mean of each role.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            In the columns of `fit`; NaN is ignored.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_roles)
-            Means; NaN where all sensors of a role are missing.
-        """
-        check_is_fitted(self)
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-        level = values - self.offsets_
-        means = [mean_of_known(level[:, columns]) for columns in self.columns_.values()]
+    def _transformed(self, X: Any, values: NDArray) -> Any:
+        level = as_floats(values) - self.offsets_
+        means = [means_of_known(level[:, columns], axis=1) for columns in self.columns_.values()]
         return frame_like(X, np.column_stack(means), self.columns_)
 
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the roles.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Names of the columns of X; by default those seen in `fit`.
-
-        Returns
-        -------
-        ndarray of str
-            Roles, sorted.
-        """
-        check_is_fitted(self)
-        _check_feature_names_in(self, input_features)
-        return np.array(list(self.columns_), dtype=object)
+    def _names(self, columns: Sequence[Any]) -> list[Any]:
+        return list(self.columns_)
 
     def _read_roles(self) -> list[str | None]:
         """Role of each column."""
@@ -166,15 +128,8 @@ class SensorMeans(TransformerMixin, Estimator):
 def offsets_between(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """By how much columns differ from their mean, by least squares over the values that are there."""
     known = ~np.isnan(values)
-    means = mean_of_known(values)[:, np.newaxis]
+    means = means_of_known(values, axis=1)[:, np.newaxis]
     shares = known / np.maximum(known.sum(axis=1, keepdims=True), 1)
     normal = np.diag(known.sum(axis=0)) - known.T @ shares
     # singular, because only differences are known: its zero eigenvalues are rounding errors of any size
     return np.linalg.lstsq(normal, np.where(known, values - means, 0.0).sum(axis=0), rcond=SINGULAR)[0]
-
-
-def mean_of_known(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean of the values that are there; NaN where none is."""
-    known = ~np.isnan(values)
-    count = known.sum(axis=1)
-    return np.where(count > 0, np.where(known, values, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)

@@ -100,9 +100,6 @@ class RecordFindings(SavesFrames):
         count = f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."
         return "\n".join([count, *(f"{what}: {detail}" for what, detail in self.table[["what", "detail"]].to_numpy())])
 
-    def __str__(self) -> str:
-        return self.summary()
-
     def __repr__(self) -> str:
         return self.summary()
 

@@ -1,7 +1,8 @@
-"""Records of `fit` as the past of those of `transform`."""
+"""What transformers of records share, and records of `fit` as the past of those of `transform`."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, overload
 
@@ -22,70 +23,75 @@ from skthermo.preprocessing._stamps import as_stamps
 EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
 
 
-class PastFeatures(TransformerMixin, Estimator):
-    """A transformer whose columns depend on earlier records, which it finds by their stamps among those of `fit`."""
-
-    history_: NDArray | None
-    stamps_: NDArray | None
-    time_zone_: str | None
+class RecordTransformer(TransformerMixin, Estimator):
+    """A transformer that gives a row for every record, and a frame on the same index for a frame."""
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
     @overload
     def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Features of every row, from its own values and those of earlier records.
+        """What the class says, for each record.
 
         Parameters
         ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius; NaN is allowed.
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            In the columns and the units of `fit`; NaN is allowed.
 
         Returns
         -------
-        ndarray or DataFrame of shape (n_samples, n_features)
+        ndarray or DataFrame of shape (n_samples, n_features_out)
             In the columns of `get_feature_names_out`. A frame gives a frame on its own index.
 
         Raises
         ------
         ValueError
-            If the number or names of sensors, or the kind of index, differ from `fit`.
-
-        Warns
-        -----
-        UserWarning
-            If many rows lack records before them, as the notes of the class say.
+            If the number or names of columns, or the kind of index, differ from `fit`.
         """
         check_is_fitted(self)
-        values = self._validated(X, reset=False)
-        features, told = self._features(X, values, self._stamps_as_in_fit(X))
-        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), told)
+        return self._transformed(X, self._validated(X, reset=False))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: of each sensor and lag, or of the sensors and then of their means.
+        """Names of the columns that `transform` gives.
 
         Parameters
         ----------
         input_features : array-like of str, optional
-            Names of the sensors; by default those seen in `fit`.
+            Names of the columns of X; by default those seen in `fit`.
 
         Returns
         -------
         ndarray of str
-            Such as ``T1_lag0`` or ``T1_mean30D``.
+            Names such as ``T1``, ``T1_lag0``, ``T1_mean30D``, or ``T1_above1`` for the hinge at its first knot.
         """
         check_is_fitted(self)
         return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
 
+    @abstractmethod
+    def _transformed(self, X: Any, values: NDArray) -> Any:
+        """The result of `transform`, from X and its checked values."""
+
+    def _names(self, columns: Sequence[Any]) -> list[Any]:
+        """Names of the results for columns of these names: by default the same."""
+        return list(columns)
+
+
+class PastFeatures(RecordTransformer):
+    """A transformer whose columns depend on earlier records, which it finds by their stamps among those of `fit`."""
+
+    history_: NDArray | None
+    stamps_: NDArray | None
+    time_zone_: str | None
+
+    def _transformed(self, X: Any, values: NDArray) -> Any:
+        features, told = self._features(X, values, self._stamps_as_in_fit(X))
+        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), told)
+
+    @abstractmethod
     def _features(
         self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None
     ) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
         """The features, and the rows of which a warning has said why they lack some."""
-        raise NotImplementedError
-
-    def _names(self, sensors: Sequence[Any]) -> list[Any]:
-        """Names of the features of some sensors."""
-        raise NotImplementedError
 
     def _remember(self, X: Any, values: NDArray) -> pd.DatetimeIndex | None:
         """Store the records of `fit` where they have stamps, and return these."""
