@@ -165,9 +165,9 @@ class Fitted:
         F, after = self.records.frequencies, self.records.after
         tables = {
             ("healthy", "measured"): self.test(F),
-            ("healthy", "data-informed"): self.test(self.simulated("healthy", noise, seed)),
+            ("healthy", "simulated"): self.test(self.simulated("healthy", noise, seed)),
             ("retrofit", "measured"): F[after],
-            ("retrofit", "data-informed"): self.simulated(change, noise, seed)[after],
+            ("retrofit", "simulated"): self.simulated(change, noise, seed)[after],
         }
         baseline = F[:TRAINED][modes]
         detector = MahalanobisDetector(threshold="quantile").fit(baseline.dropna() if complete else baseline)

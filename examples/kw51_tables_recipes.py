@@ -33,9 +33,9 @@ PAPER_7 = [0.2510, 0.2888, 0.2654, 0.2270, 0.2213]
 PAPER_8 = [0.1512, 0.1346, 0.3346, 0.1281, 0.4224, 0.1827]
 PAPER_9 = {
     ("healthy", "measured"): [1.88, 0.945, 0.772],
-    ("healthy", "data-informed"): [5.88, 1.211, 1.129],
+    ("healthy", "simulated"): [5.88, 1.211, 1.129],
     ("retrofit", "measured"): [100.0, 10.743, 0.895],
-    ("retrofit", "data-informed"): [100.0, 10.181, 0.817],
+    ("retrofit", "simulated"): [100.0, 10.181, 0.817],
 }
 SETTINGS = {  # Tables 4 and 6
     ("M1", "the paper's"): "256-128-64-32-16 ReLU, Adam 0.001, 1000 epochs of batches of 128, noise-free",
@@ -156,11 +156,11 @@ def choice(records, fitted):
         "round trip, %": fitted.fem.report_.round_trip.abs().max(),
         f"MAPE, {'measured' if records.clean is None else 'true'}, %": fitted.errors(measured).mean(),
         "false alarms measured, %": alarms[0.0]["healthy", "measured"],
-        "simulated": alarms[0.0]["healthy", "data-informed"],
-        "with noise": alarms["fitted"]["healthy", "data-informed"],
+        "simulated": alarms[0.0]["healthy", "simulated"],
+        "with noise": alarms["fitted"]["healthy", "simulated"],
         "index after retrofit, measured": index[0.0]["retrofit", "measured"],
-        "simulated with noise": index["fitted"]["retrofit", "data-informed"],
-        "found, %": alarms["fitted"]["retrofit", "data-informed"],
+        "simulated with noise": index["fitted"]["retrofit", "simulated"],
+        "found, %": alarms["fitted"]["retrofit", "simulated"],
         "fit, s": fitted.seconds,
     }
 
@@ -175,7 +175,7 @@ def table_of_gaps_in_detection(fitted):
             "records with an index": whole.loc[("healthy", "measured"), "records with an index, %"],
             "false alarms": whole.loc[("healthy", "measured"), "alarms, %"],
             "retrofit found": whole.loc[("retrofit", "measured"), "alarms, %"],
-            "simulated": whole.loc[("retrofit", "data-informed"), "alarms, %"],
-            f"{PART:.0%} of it, simulated": part.loc[("retrofit", "data-informed"), "alarms, %"],
+            "simulated": whole.loc[("retrofit", "simulated"), "alarms, %"],
+            f"{PART:.0%} of it, simulated": part.loc[("retrofit", "simulated"), "alarms, %"],
         }
     return pd.DataFrame(rows).T.round(2)

@@ -61,7 +61,7 @@ print(results.sort_values("found (%)", ascending=False).to_string(index=False))
 
 later, truth = true_year(seed=2, damages=[one.damage for one in scenarios])
 table = task.confirm({"tuned": search, "before": before}, later, random_state=0)
-shown = ["tuned", "fresh", "fresh_lowest", "fresh_highest", "optimism", "false_alarms"]
+shown = ["tuned", "fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "false_alarms"]
 print((100 * table[shown]).round(1).to_string())
 
 # %%

@@ -60,7 +60,7 @@ def truth(scenario, seed):
 study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=5, random_state=0, uncertainty="noise")
 study.run(later.temperatures, baseline, reference=truth)
 ranking = study.ranking(max_false_alarms=0.03)
-print((100 * ranking[["false_alarms", "pod", "pod_equal", "behind"]]).round(1).to_string())
+print((100 * ranking[["false_alarms", "pod", "pod_at_equal_pfa", "pod_deficit"]]).round(1).to_string())
 
 # %%
 # The order by simulated records. Detectors whose difference from the best may be chance are not clearly behind it.

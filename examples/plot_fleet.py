@@ -87,8 +87,8 @@ for name in new:
         label: mape(later.clean_frequencies, chain.predict(later.temperatures)).mean()
         for label, chain in chains[name].items()
     }
-    follows = chains[name]["30 days and the fleet"].mapper_[-1].follows_
-    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_alien, "follows": max(follows.values())}
+    follows = chains[name]["30 days and the fleet"].mapper_[-1].pooling_probability_
+    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_atypical, "follows": max(follows.values())}
 print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 
 # %%

@@ -60,7 +60,7 @@ fem.fit(baseline[campaign.temperatures.columns], baseline[modes])
 compensator = TemperatureCompensator(make_pipeline(HingeFeatures(), Ridge()), targets=modes)
 monitor = Monitor(make_pipeline(compensator, WindowedAlarm("1D")), fem=fem, false_alarms_per_year=1)
 monitor.fit(baseline)
-print(monitor.promise_)
+print(monitor.false_alarm_estimate_)
 
 # %%
 # Day by day

@@ -198,7 +198,7 @@ PredictionDisplay.from_predictions(records.frequencies[after][PAIR], best.simula
 # The damage index by modes 2 and 4 rises after the retrofit, in simulations as in the records.
 
 indices, threshold = best.detection()
-sources = ("measured", "data-informed")
+sources = ("measured", "simulated")
 by_label = {name: pd.concat([indices[state, name] for state in ("healthy", "retrofit")]) for name in sources}
 DamageIndexDisplay.from_predictions(by_label, threshold)
 

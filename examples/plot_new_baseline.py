@@ -37,7 +37,7 @@ works_begin, works_end = (campaign.state.index[campaign.state == state][0] for s
 
 compensator = TemperatureCompensator(make_pipeline(HingeFeatures(), Ridge()), targets=modes)
 monitor = Monitor(make_pipeline(compensator, WindowedAlarm("2D"))).fit(records[records.index < works_begin])
-print(monitor.promise_)
+print(monitor.false_alarm_estimate_)
 
 # %%
 # During the works
@@ -50,12 +50,12 @@ print(monitor.events_[["kind", "start", "end", "peak", "modes"]].to_string())
 # %%
 # Three days later
 # ----------------
-# :meth:`~skthermo.monitoring.Monitor.begin_again` says which days the new baseline begins with, and closes the event.
+# :meth:`~skthermo.monitoring.Monitor.rebaseline` says which days the new baseline begins with, and closes the event.
 
 after = records[records.index >= works_end]
 soon = works_end + pd.Timedelta(days=3)
 monitor.update(after[after.index < soon])
-print(monitor.begin_again(works_end).summary())
+print(monitor.rebaseline(works_end).summary())
 
 # %%
 # A month later, a refit would add the new records. It says whether that is a gain; here it is none, because the hard

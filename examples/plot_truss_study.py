@@ -88,7 +88,7 @@ true, simulated = (pd.concat(years, ignore_index=True) for years in (true, simul
 print(error_table(true, simulated, scenarios=np.repeat([one.name for one in HALVED], 365)).round(2))
 
 marks = {one.name: 365 * number for number, one in enumerate(HALVED)}
-labels = ("thermo-mechanical", "data-informed")
+labels = ("thermo-mechanical", "simulated")
 PredictionDisplay.from_predictions(true, simulated, labels=labels, kind="lines", marks=marks, n_columns=2)
 
 # %%
@@ -117,7 +117,7 @@ def study_of(severities):
 
 
 study = study_of(SEVERITIES)
-sources = {"thermo-mechanical": "reference", "data-informed": "data-informed"}
+sources = {"thermo-mechanical": "reference", "simulated": "simulated"}
 detector = study.detector_name()
 shown = ["healthy", *(f"{group} 20 %" for group in GROUPS)]
 indices = {name: {label: study.indices_[detector, name, source] for label, source in sources.items()} for name in shown}
@@ -155,7 +155,7 @@ bench = DetectabilityStudy(
     fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0, uncertainty="noise"
 )
 bench.run(later.temperatures, reference=true_records)
-print(bench.ranking()[["false_alarms", "pod", "behind", "clearly_behind"]].round(2).to_string())
+print(bench.ranking()[["false_alarms", "pod", "pod_deficit", "significantly_worse"]].round(2).to_string())
 print(bench.summary())
 display = DetectorsDisplay.from_estimator(bench, "agreement")
 

@@ -162,11 +162,11 @@ PredictionDisplay.from_predictions(
 # %%
 # Is it right on records that it has not seen?
 # --------------------------------------------
-# :meth:`~skthermo.surrogate.DataInformedFEM.applicability` says how far the weather of the test is outside that of the
-# training. Errors stand beside those of a ridge regression from temperatures straight to frequencies, which knows
-# nothing of a structure: the chain loses little against it, and can be damaged.
+# :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` says how far the weather of the test is outside
+# that of the training. Errors stand beside those of a ridge regression from temperatures straight to frequencies,
+# which knows nothing of a structure: the chain loses little against it, and can be damaged.
 
-beyond = fem.applicability(T[n_train:]).drop(columns="outside_bounds").max(axis=1)
+beyond = fem.extrapolation_distance(T[n_train:]).drop(columns="outside_bounds").max(axis=1)
 print(f"{(beyond > 0.25).mean():.0%} of the last fifth lie a quarter of the training range or more outside it\n")
 
 inputs = LagFeatures(LAGS, freq="30min").fit(T[:n_train]).transform(T).dropna()  # scikit-learn's ridge wants no gaps

@@ -132,9 +132,9 @@ for ax in display.axes_:
 #
 # Most of the test is warmer than all that was learned
 # ----------------------------------------------------
-# :meth:`~skthermo.surrogate.DataInformedFEM.applicability` says so, and every prediction would warn of it.
+# :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` says so, and every prediction would warn of it.
 
-beyond = fem.applicability(T_test).drop(columns="outside_bounds").max(axis=1)
+beyond = fem.extrapolation_distance(T_test).drop(columns="outside_bounds").max(axis=1)
 print(f"{(beyond > 0.25).mean():.0%} of the last {len(T_test)} records have a temperature more than a quarter of the")
 print(f"training range outside it, the warmest {beyond.max():.0%}")
 

@@ -122,7 +122,7 @@ fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", nco
 fem, found = identify(bridge)
 print(found.summary())
 print("\nEvery group, on average over all explanations")
-print(found.table[["probability", "severity", "lowest", "highest", "if_damaged"]].round(3).to_string())
+print(found.table[["probability", "severity", "ci_low", "ci_high", "if_damaged"]].round(3).to_string())
 print("\nMean shift of every mode in percent, measured and explained")
 print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2).to_string())
 
@@ -283,7 +283,7 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 # first, third and fourth frequency 0.8 to 1.2 % lower than that of all healthy records does, and detectors take its
 # error for damage. With the chain of all healthy records, the same assumed damage gives a rank correlation of 0.98, and
 # all false alarms lie in their bands; of found damage still only 5 of 22 rates do, since the bands hold noise alone.
-# :meth:`~skthermo.surrogate.DataInformedFEM.applicability` warns of such weather.
+# :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` warns of such weather.
 #
 # Which detector would simulation have chosen?
 # --------------------------------------------
@@ -294,13 +294,13 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 
 study = choose(bridge, candidates)
 ranking = study.ranking(max_false_alarms=0.02)
-print(ranking[["false_alarms", "keeps_limit", "pod", "behind", "pod_equal"]].round(3).to_string())
+print(ranking[["false_alarms", "within_limit", "pod", "pod_deficit", "pod_at_equal_pfa"]].round(3).to_string())
 memory.cleanup()
 
 # %%
 # .. code-block:: none
 #
-#                                    false_alarms  keeps_limit    pod  behind  pod_equal
+#                                    false_alarms  within_limit    pod  behind  pod_at_equal_pfa
 #    detector
 #    boosted trees, whitened                0.020         True  0.757   0.000      0.757
 #    broken lines, whitened                 0.006         True  0.744   0.013      0.828

@@ -337,7 +337,7 @@ fifth, rows = len(healthy) // 5, {}
 for share in (0.4, 0.5, 0.6, 0.8):
     n = round(share * len(healthy))
     compensator = compensate(Records(healthy[:n], healthy[n : n + fifth], records.damaged), TemperatureMapper())[1]
-    beyond = compensator.applicability(healthy[n : n + fifth])
+    beyond = compensator.extrapolation_distance(healthy[n : n + fifth])
     rows[f"first {share:.0%}"] = {
         "beyond known weather": 100 * (beyond > 0).any(axis=1).mean(),
         "far beyond": 100 * (beyond.max(axis=1) > 0.25).mean(),

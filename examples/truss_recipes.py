@@ -27,7 +27,7 @@ PAPER_MAPE = [
 ]
 PAPER_RATES = {
     "reference": [4.11, 26.03, 94.79, 100, 100, 100, 12.60, 59.73, 98.08, 100, 100, 66.30, 100, 100, 100, 100],
-    "data-informed": [4.38, 21.64, 92.33, 100, 100, 100, 7.40, 53.97, 97.26, 100, 100, 66.30, 100, 100, 100, 100],
+    "simulated": [4.38, 21.64, 92.33, 100, 100, 100, 7.40, 53.97, 97.26, 100, 100, 66.30, 100, 100, 100, 100],
 }
 PAPER_SMALLEST = {"bottom": 30, "top": 30, "diagonal": 20}
 
@@ -76,20 +76,20 @@ def table_2(realisations):
 def table_3(studies):
     """Alarms in percent: the paper's, mean of the realisations, and bounds that hold 95 % of the years of each."""
     results = pd.concat([study.results_ for study in studies]).set_index(["scenario", "source"])
-    columns = {"here": ("rate", "mean"), "lowest": ("band_lowest", "min"), "highest": ("band_highest", "max")}
+    columns = {"here": ("rate", "mean"), "lowest": ("pi_low", "min"), "highest": ("pi_high", "max")}
     table = 100 * results.groupby(level=[0, 1], sort=False).agg(**columns)
     table.insert(0, "paper", pd.DataFrame(PAPER_RATES, results.index.unique(0)).T.unstack())
     table = table.unstack("source").swaplevel(axis=1)[list(PAPER_RATES)].loc[results.index.unique(0)]
     gaps = [study.results_.pivot(index="scenario", columns="source", values="rate") for study in studies]
-    table["difference", "paper"] = (table["data-informed", "paper"] - table["reference", "paper"]).abs()
-    table["difference", "here"] = sum(100 * (gap["data-informed"] - gap["reference"]).abs() for gap in gaps) / len(gaps)
+    table["difference", "paper"] = (table["simulated", "paper"] - table["reference", "paper"]).abs()
+    table["difference", "here"] = sum(100 * (gap["simulated"] - gap["reference"]).abs() for gap in gaps) / len(gaps)
     table.loc["Average"] = table[["difference"]].mean()
     return table.round(2)
 
 
 def smallest(studies):
     """Minimum detectable damage in percent: the paper's, median of the realisations, and bounds that hold each."""
-    columns = {"here": ("mdd", "median"), "lowest": ("lowest", "min"), "highest": ("highest", "max")}
+    columns = {"here": ("mdd", "median"), "lowest": ("ci_low", "min"), "highest": ("ci_high", "max")}
     found = {level: pd.concat([study.minimum_detectable_damage(level) for study in studies]) for level in (0.9, 0.95)}
     by_level = {f"POD {level:.0%}": 100 * each.groupby(level=[0, 1]).agg(**columns) for level, each in found.items()}
     table = pd.concat(by_level, axis=1).loc[GROUPS]

@@ -87,8 +87,8 @@ def side_by_side(results):
     columns = {}
     for measure, state in STATES.items():
         columns[state, "measured"] = rates["rate", measure, "reference"]
-        simulated = {"simulated": "rate", "lowest": "band_lowest", "highest": "band_highest"}
-        columns |= {(state, key): rates[value, measure, "data-informed"] for key, value in simulated.items()}
+        simulated = {"simulated": "rate", "lowest": "pi_low", "highest": "pi_high"}
+        columns |= {(state, key): rates[value, measure, "simulated"] for key, value in simulated.items()}
     return 100 * pd.DataFrame(columns).loc[order].astype(float)
 
 

@@ -1165,7 +1165,7 @@ use(
         },
     ),
 )
-for name in ("predict", "predict_parameters", "applicability", "predict_interval", "expected_residuals"):
+for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "expected_residuals"):
     more = {
         "predict": {"return_std": (False, flag())},
         "predict_interval": {"confidence": (0.9, number(0, 1, 90, -0.1))},
@@ -1443,7 +1443,7 @@ fitted(
 )
 method("detection.TemperatureCompensator.transform", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
 WHITENER = detection.TemperatureCompensator(Ridge(), targets=MODES, scale="local").fit(BOTH)
-method("detection.TemperatureCompensator.applicability", WHITENER, X=(BOTH, table(BOTH, rows=False)))
+method("detection.TemperatureCompensator.extrapolation_distance", WHITENER, X=(BOTH, table(BOTH, rows=False)))
 
 # metrics
 PREDICTED = F * 1.01
@@ -1650,14 +1650,14 @@ method(
     "studies.DetectabilityStudy.pod_curve",
     STUDY,
     family=("top", texts() | {"unknown": "no"}),
-    source=("data-informed", texts() | {"unknown": "no"}),
+    source=("simulated", texts() | {"unknown": "no"}),
     log=(False, flag()),
 )
 method(
     "studies.DetectabilityStudy.is_undetected",
     STUDY,
     family=("top", texts() | {"unknown": "no"}),
-    source=("data-informed", texts() | {"unknown": "no"}),
+    source=("simulated", texts() | {"unknown": "no"}),
 )
 method(
     "studies.DetectabilityStudy.minimum_detectable_damage",
@@ -1669,16 +1669,16 @@ method(
     "studies.DetectabilityStudy.ranking",
     STUDY,
     max_false_alarms=(0.02, number(-0.1, 2)),
-    source=("data-informed", texts() | {"unknown": "no"}),
+    source=("simulated", texts() | {"unknown": "no"}),
     confidence=(0.9, number(0, 1, 90)),
     by=("pod", choice()),
 )
 method(
-    "studies.DetectabilityStudy.time_to_find",
+    "studies.DetectabilityStudy.time_to_detection",
     STUDY,
     within=(["7D"], {"a number": [7], "texts": ["soon"], "negative": ["-1D"], "a time": STAMP, "true": [True]}),
     level=(0.9, number(0, 1, 90)),
-    source=("data-informed", texts() | {"unknown": "no"}),
+    source=("simulated", texts() | {"unknown": "no"}),
     confidence=(0.9, number(0, 1, 90, but=("None",))),
     smallest=(False, flag()),
 )
@@ -1748,8 +1748,8 @@ use(
 )
 use("studies.IdentifiedDamage.scenario", lambda **a: FOUND.scenario(**a).name, name=("found", texts()))
 use(
-    "studies.what_to_add",
-    lambda **a: studies.what_to_add(**a)["gain"],
+    "studies.compare_extensions",
+    lambda **a: studies.compare_extensions(**a)["gain"],
     study=(STUDY, instead(studies.DetectabilityStudy(CHAIN, DETECTOR, SCENARIOS))),
     T=(LATER.temperatures, weather(LATER.temperatures, rows=False)),
     modes=([6], integers(23) | {"measured": [0]}),
@@ -1889,17 +1889,17 @@ NOT_CALLED = {
 """Public names whose constructors are not tried, with reasons."""
 
 UNTRIED = {
-    "datasets.make_fleet": {"aliens", "kinds"},
+    "datasets.make_fleet": {"atypical", "kinds"},
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
     "fem.AffineModel": {"contents"},
     "preprocessing.ExponentialMeans": {"sensors", "time_constants"},
     "preprocessing.check_records": {"unit"},
-    "reporting.owner_report": {"detector", "drift_limit", "false_share", "max_false_alarms", "now"},
-    "studies.DetectabilityStudy": {"models", "n_worlds"},
+    "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
+    "studies.DetectabilityStudy": {"models", "n_replicates"},
     "studies.detection_task": {"columns", "gaps", "outliers"},
     "studies.identify_damage": {"n_jobs"},
-    "studies.what_to_add": {"detector"},
+    "studies.compare_extensions": {"detector"},
     "surrogate.DataInformedFEM": {"discrepancy", "memory"},
     "updating.ModelUpdater": {"reduce"},
 }
@@ -1921,13 +1921,13 @@ LEGAL: dict[str, dict[tuple[str, str], str]] = {
     "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
     "severities": {("empty", "studies.sweep"): "the healthy structure alone"},
     "information": {("NaN inside", "updating.cramer_rao"): "NaN stays NaN"},
-    "modes": {("empty", "studies.what_to_add"): "no further modes are asked for"},
-    "baseline_factors": {("empty", "studies.what_to_add"): "no longer baselines are asked for"},
+    "modes": {("empty", "studies.compare_extensions"): "no further modes are asked for"},
+    "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
     "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
     "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
     "X": {
-        ("kelvin", "surrogate.DataInformedFEM.applicability"): "the answer says how far outside",
-        ("-999", "surrogate.DataInformedFEM.applicability"): "the answer says how far outside",
+        ("kelvin", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
+        ("-999", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
     },
     "F": {("NaN throughout", "updating.ModelUpdater.fit"): "shapes alone may be measured"},
     "damage_index": {

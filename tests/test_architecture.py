@@ -62,10 +62,10 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),
     "studies.scenarios": set(),
-    "studies.worlds": set(),
-    "studies.detectability": {"studies.scenarios", "studies.worlds"},
-    "studies.extension": {"studies.detectability", "studies.scenarios", "studies.worlds"},
-    "studies.identification": {"studies.scenarios", "studies.worlds"},
+    "studies.replicates": set(),
+    "studies.detectability": {"studies.scenarios", "studies.replicates"},
+    "studies.extension": {"studies.detectability", "studies.scenarios", "studies.replicates"},
+    "studies.identification": {"studies.scenarios", "studies.replicates"},
     "studies.location": {"studies.identification", "studies.scenarios"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}

@@ -55,7 +55,7 @@ pytestmark = [  # scikit-learn checks detectors on 20 to 50 rows
         "depend on each other in time and count as",
         "explain nothing of the frequencies",
         "change at once by what the weather does not explain",
-        r"rows are not judged \(predict gives 0\), the first row 0.*. their windows",
+        r"rows are not evaluated \(predict gives 0\), the first row 0.*. their windows",
     )
 ]
 

@@ -442,11 +442,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/identification/_shapes.py", "studies/test_identify_shapes.py"): [
         ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
     ],
-    ("studies/detectability/_world_rates.py", "studies/test_worlds.py"): [
+    ("studies/detectability/_replicate_rates.py", "studies/test_replicates.py"): [
         ("noise in the variance between worlds", " - within / values.shape[1]", ""),
         ("a band of the mean of all worlds", "variance * (1 + 1 / number)", "variance / number"),
     ],
-    ("studies/worlds/_weather.py", "studies/test_worlds.py"): [
+    ("studies/worlds/_weather.py", "studies/test_replicates.py"): [
         ("weather of any season", "SEASON = 15", "SEASON = 90"),
     ],
     ("studies/detectability/_judged.py", "studies/test_several_detectors.py"): [
@@ -468,7 +468,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
         ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
         (
-            "records that are not judged",
+            "records that are not evaluated",
             "np.mean(self.values[rows] < raised)",
             "np.mean(~(self.values[rows] >= raised))",
         ),
@@ -477,7 +477,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
     ],
-    ("studies/detectability/_waits.py", "studies/test_time_to_find.py"): [
+    ("studies/detectability/_waits.py", "studies/test_time_to_detection.py"): [
         ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
         ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
     ],

@@ -92,7 +92,7 @@ def study():
     detectors = {"raw": MahalanobisDetector()}
     detectors |= {name: make_pipeline(compensator, part) for name, part in parts.items()}
     scenarios = sweep(chain, (0.1, 0.3), groups=["bottom", "diagonal"])
-    found = DetectabilityStudy(chain, detectors, scenarios, n_repeats=4, n_worlds=4, random_state=0)
+    found = DetectabilityStudy(chain, detectors, scenarios, n_repeats=4, n_replicates=4, random_state=0)
     rates = found.run(later.temperatures, baseline=year.frequencies)
     return {"rates": numbers(rates), "ranking": numbers(found.ranking())}
 

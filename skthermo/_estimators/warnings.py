@@ -52,11 +52,11 @@ KINDS: dict[type[SkthermoWarning], str] = {
         "the training range"
     ),
     UnevaluatedRowsWarning: (
-        "modes not found, poles without shape, records not judged, records that were not compared, rows not "
-        "judged, rows scored, rows that cannot be predicted, rows with a likelihood"
+        "modes not found, poles without shape, records not evaluated, records that were not compared, rows not "
+        "evaluated, rows scored, rows that cannot be predicted, rows with a likelihood"
     ),
     ModelWarning: (
-        "doubtful matrices, doubtful optimum, draws, failed worlds, failing program, hidden offsets, impossible "
+        "doubtful matrices, doubtful optimum, draws, failed replicates, failing program, hidden offsets, impossible "
         "parameters, large discrepancy, large factor, no reduced model, no solution, not converged, order of "
         "modes, outside the, refined by the full model, round trip, shapes unlike the model's, unfinished draws, "
         "worse than the mean"

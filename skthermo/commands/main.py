@@ -4,7 +4,7 @@
     python -m skthermo status bridge.skops
     python -m skthermo acknowledge bridge.skops 3 --harmless --note "a special transport"
 
-Exit codes of update and status: 0 healthy, 1 alarm, 2 not judged (also if there was no new record), 3 an error, and
+Exit codes of update and status: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an error, and
 the monitor's file is as it was. An alarm is 1 also if its report cannot be written. acknowledge: 0 done, 3 an error.
 """
 
@@ -26,11 +26,11 @@ from skthermo.commands._record_files import ISO, read_file
 from skthermo.monitoring import Monitor, load_monitor
 
 HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "alarm": ALARM, "not judged": NOT_JUDGED}
+CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_JUDGED}
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose exit code for wrong arguments is not that of a monitor that was not judged."""
+    """A parser whose exit code for wrong arguments is not that of a monitor that was not evaluated."""
 
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and end the program."""
@@ -95,7 +95,7 @@ def _update(options: argparse.Namespace) -> int:
         records = read_file(options.records, **form, zone=monitor.last_.tz)
         records.index.name = monitor.baseline_.index.name
         before = dict(monitor.counts_)
-        with told_around({"records not judged"}):  # said below, with all reasons
+        with told_around({"records not evaluated"}):  # said below, with all reasons
             judged = monitor.update(records) if len(records) else None
         code = _code(monitor, judged)
         print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, judged)]))
@@ -172,8 +172,8 @@ def _taken_in(before: dict[str, int], after: dict[str, int], judged: pd.DataFram
     states = ", ".join(f"{(new['state'] == state).sum()} {state}" for state in CODES)
     lines = [f"new: {len(new)} ({states}); {others}"]
     lines += [f"judged anew, as records came late: {revised}"] if revised else []
-    reasons = new.loc[new["state"] == "not judged", "reason"].value_counts()
-    return lines + [f"not judged, {reason}: {number}" for reason, number in reasons.items()]
+    reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts()
+    return lines + [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
 
 
 def _standing(monitor: Monitor) -> list[str]:

@@ -164,7 +164,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         told = explained_rows(X) | explained_rows(index)
         untold = np.isnan(index) & ~told
         if np.isnan(index).all() and untold.any():
-            self._warn_of_not_judged(X, untold)
+            self._warn_of_not_evaluated(X, untold)
         if isinstance(X, pd.DataFrame):
             return explain_rows(pd.Series(index, index=X.index, name="damage_index"), told)
         return explain_rows(index, told)
@@ -202,7 +202,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         return explain_rows(scores - self.offset_, explained_rows(scores))
 
     def predict(self, X: ArrayLike) -> NDArray[np.int64]:
-        """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not judged.
+        """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not evaluated.
 
         Parameters
         ----------
@@ -224,7 +224,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         unknown = np.isnan(decision)
         untold = unknown & ~explained_rows(decision)
         if untold.any() and not unknown.all():  # where all are, `damage_index` has said so
-            self._warn_of_not_judged(X, untold)
+            self._warn_of_not_evaluated(X, untold)
         return np.where(unknown, 0, np.where(decision < 0, -1, 1))
 
     @available_if(lambda detector: detector._has_likelihood())
@@ -254,11 +254,11 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         densities = self._log_densities(F) + log_volumes(X)
         return mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
 
-    def _warn_of_not_judged(self, X: Any, rows: NDArray[np.bool_]) -> None:
+    def _warn_of_not_evaluated(self, X: Any, rows: NDArray[np.bool_]) -> None:
         first = int(rows.argmax())
         stamp = f" ({X.index[first]})" if isinstance(X, pd.DataFrame) else ""
         warn_user(
-            f"{rows.sum()} of {len(rows)} rows are not judged (predict gives 0), the first row {first}{stamp}: "
+            f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
             f"{self._cause(X, rows)}",
-            "rows not judged",
+            "rows not evaluated",
         )

@@ -323,10 +323,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         return mean_log_density(densities - 0.5 * np.log(2 * np.pi) * present.sum(axis=1), present)
 
     @overload
-    def applicability(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    def extrapolation_distance(self, X: pd.DataFrame) -> pd.DataFrame: ...
     @overload
-    def applicability(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def applicability(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+    def extrapolation_distance(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def extrapolation_distance(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
         """How far the temperatures of records lie outside those of the baseline.
 
         Parameters
@@ -470,7 +470,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
 
 
 def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
-    """Rows of which nothing is predicted, so that they are not judged; a warning counts those not yet explained."""
+    """Rows of which nothing is predicted, so that they are not evaluated; a warning counts those not yet explained."""
     unknown = np.isnan(predicted).all(axis=1)
     others = "of which the estimator predicts nothing, as where lags reach to no record"
     message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)

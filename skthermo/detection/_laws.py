@@ -77,7 +77,7 @@ class CountLaw:
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window; NaN where no record has a mode."""
-        with without_warnings():  # the alarm counts windows that are not judged
+        with without_warnings():  # the alarm counts windows that are not evaluated
             single = self.detector.damage_index(windows.rows)
         padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
         last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)

@@ -80,7 +80,7 @@ class WindowedAlarm(DamageDetector):
 
     Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be as
     unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value than
-    ``fewest_`` are not judged: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
+    ``fewest_`` are not evaluated: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
     series: a call does not remember the records of the last one.
 
     Examples

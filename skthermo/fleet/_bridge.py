@@ -36,7 +36,7 @@ LIBRARIES = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "
 NOT_WATCHED = {
     "state": "",
     "last": pd.NaT,
-    "n_judged": 0,
+    "n_evaluated": 0,
     "not_judged": np.nan,
     "alarm_rate": np.nan,
     "n_events": 0,
@@ -154,9 +154,10 @@ class BridgeFit:
             return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
 
     def lost(self, failure: Failure, facts: dict[str, float] | None = None, warnings: tuple[Told, ...] = ()) -> Result:
-        """What is known if the records or the estimator cannot be had: what was fitted before, not judged any more."""
+        """What is known if the records or the estimator cannot be had: what was fitted before, not evaluated any
+        more."""
         if self.known is not None and self.known.is_fitted:
-            return Result(_not_judged(self.known, failure, warnings))
+            return Result(_not_evaluated(self.known, failure, warnings))
         return Result(BridgeOutcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
 
 
@@ -196,14 +197,14 @@ class BridgeUpdate:
     def lost(self, failure: Failure, warnings: tuple[Told, ...] = ()) -> Result:
         """The bridge as it was, with one row that says why no new record is judged."""
         failure = replace(failure, stage="new records" if failure.stage == "new records" else "update")
-        return Result(_not_judged(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
+        return Result(_not_evaluated(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
 
 
-def _not_judged(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Told, ...]) -> BridgeOutcome:
+def _not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Told, ...]) -> BridgeOutcome:
     """The bridge as it was; it is not healthy, because nothing is known of it."""
     standing = dict(outcome.standing)
     if outcome.is_watched:
-        standing["state"] = "alarm" if standing["n_open"] else "not judged"
+        standing["state"] = "alarm" if standing["n_open"] else "not evaluated"
     return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
 
 
@@ -271,13 +272,13 @@ def standing_of(monitor: Monitor) -> dict[str, Any]:
     """What a monitor says of its bridge."""
     days, events, drift = monitor.days_, monitor.events_, monitor.drift_
     damage = events[events["kind"] == "damage"]
-    n_judged, n_records = int(days["n_judged"].sum()), monitor.counts_["n_records"]
+    n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
     standing = NOT_WATCHED | {
         "state": monitor.state(),
         "last": monitor.last_ if len(monitor.records_) else pd.NaT,
-        "n_judged": n_judged,
-        "not_judged": 1 - n_judged / n_records if n_records else np.nan,
-        "alarm_rate": days["n_alarms"].sum() / n_judged if n_judged else np.nan,
+        "n_evaluated": n_evaluated,
+        "not_judged": 1 - n_evaluated / n_records if n_records else np.nan,
+        "alarm_rate": days["n_alarms"].sum() / n_evaluated if n_evaluated else np.nan,
         "n_events": len(damage),
         "n_open": int(damage["end"].isna().sum()),
     }
@@ -297,7 +298,14 @@ def _answers(name: Hashable, judged: pd.DataFrame) -> pd.DataFrame:
 
 def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
     """One row for a bridge of which no new record was judged."""
-    row = {"bridge": name, "time": pd.NaT, "state": "not judged", "index": np.nan, "reason": str(failure), "event": 0}
+    row = {
+        "bridge": name,
+        "time": pd.NaT,
+        "state": "not evaluated",
+        "index": np.nan,
+        "reason": str(failure),
+        "event": 0,
+    }
     return pd.DataFrame([row | {"revised": False}])
 
 

@@ -26,8 +26,8 @@ class Discoveries:
         Share of false ones among the bridges that are called, on average.
     table : DataFrame
         Damage events that are open or recent, and were not acknowledged as harmless: ``bridge``, ``event`` (its number
-        in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value`` (`Monitor.event_chances`),
-        and ``is_called``.
+        in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value`` (`Monitor.event_p_values`),
+        and ``is_discovery``.
     p_values : Series
         By bridge that was judged: that of its highest event, 1 without one.
     not_judged : list
@@ -54,10 +54,10 @@ class Discoveries:
     @property
     def called(self) -> list[Hashable]:
         """Names of the bridges that are called, the least probable first."""
-        return self.table.loc[self.table["is_called"]].sort_values("p_value")["bridge"].unique().tolist()
+        return self.table.loc[self.table["is_discovery"]].sort_values("p_value")["bridge"].unique().tolist()
 
     @property
-    def n_judged(self) -> int:
+    def n_evaluated(self) -> int:
         """Number of bridges that were judged."""
         return len(self.p_values)
 
@@ -78,12 +78,12 @@ class Discoveries:
         )
         names = ", ".join(map(str, self.called))
         lines = [
-            f"{len(self.called)} of {self.n_judged} judged bridges stand out{f': {names}' if names else ''}.",
+            f"{len(self.called)} of {self.n_evaluated} judged bridges stand out{f': {names}' if names else ''}.",
             f"Where p values hold, {percent(self.share)} of those called are false on average, and about {left} a year "
             f"over all bridges, where single monitors promise {promised}. Outliers and new weather make more.",
         ]
         if self.not_judged:
-            lines.append(f"Not judged, and so not known to be healthy: {', '.join(map(str, self.not_judged))}.")
+            lines.append(f"Not evaluated, and so not known to be healthy: {', '.join(map(str, self.not_judged))}.")
         return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -99,12 +99,12 @@ def discover(
     for name in monitors:
         try:
             monitor = monitors[name]
-            promised += monitor.promise_.expected
+            promised += monitor.false_alarm_estimate_.expected
             table, n_years = _compared(monitor, begin)
         except Exception:  # damaged files raise errors of every type, and the table of errors tells them
             not_judged.append(name)
             continue
-        is_blind = standings[name]["state"] == "not judged" or not n_years
+        is_blind = standings[name]["state"] == "not evaluated" or not n_years
         if (is_blind and not len(table)) or table["p_value"].isna().any():
             not_judged.append(name)
             continue
@@ -117,7 +117,7 @@ def discover(
     columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value"]
     tables = [table for table in tables if len(table)]
     table = pd.concat(tables, ignore_index=True)[columns] if tables else pd.DataFrame(columns=columns)
-    table["is_called"] = table["p_value"].astype(float) <= limit
+    table["is_discovery"] = table["p_value"].astype(float) <= limit
     false = float((-np.log1p(-level) / np.array(list(years.values()), dtype=float)).sum()) if len(p) else 0.0
     return Discoveries(share, table, p, not_judged, false, promised)
 
@@ -136,7 +136,7 @@ def _compared(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, floa
     if not len(monitor.days_) or pd.isna(begin):
         return monitor.events_.iloc[:0].assign(p_value=0.0), 0.0
     since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
-    chances = monitor.event_chances(since)
+    chances = monitor.event_p_values(since)
     table = monitor.events_.loc[chances.index].assign(p_value=chances)
     table = table[~table["harmless"].astype(bool)]
     return table, monitor.years_watched(min([since, *table.loc[table["end"].isna(), "start"]]))

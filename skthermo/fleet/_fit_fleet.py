@@ -125,7 +125,11 @@ def fit_fleet(
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 if not result.is_as_before:
                     before = tasks[name].known
-                    if before is not None and before.standing["n_judged"] and before.content != result.outcome.content:
+                    if (
+                        before is not None
+                        and before.standing["n_evaluated"]
+                        and before.content != result.outcome.content
+                    ):
                         kept.set_aside(name)
                         begun_again.append(name)
                     kept.put(result.outcome, result.fitted)

@@ -53,14 +53,14 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
     if len(watched):
         state = watched["state"]
         yield (
-            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not judged').sum()} "
+            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not evaluated').sum()} "
             f"cannot judge, {(state == 'healthy').sum()} saw no change in their newest record."
         )
         if (state == "alarm").any():
             yield f"In alarm: {named(watched.index[state == 'alarm'])}."
-        if (state == "not judged").any():
-            yield f"Not judged, and so not known to be healthy: {named(watched.index[state == 'not judged'])}."
-        silent = watched.index[(state != "not judged") & (watched["days_silent"] > SILENT)]
+        if (state == "not evaluated").any():
+            yield f"Not evaluated, and so not known to be healthy: {named(watched.index[state == 'not evaluated'])}."
+        silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
         if len(silent):
             yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."
     failed = fitted.index[fitted["error"] != ""]
@@ -124,12 +124,13 @@ class Fleet:
     Columns of ``table``: ``is_fitted``; ``error``, "" where there is none; ``n_records`` of the fit; ``gaps``, the
     share of their values that are missing; ``mape``, mean absolute error of the training frequencies in percent,
     in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor ("healthy",
-    "alarm", "not judged", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the newest
-    record of all bridges; ``n_judged`` records, and the share ``not_judged``; ``alarm_rate``, the share of judged
-    records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest change of
-    stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted objects.
+    "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the
+    newest record of all bridges; ``n_evaluated`` records, and the share ``not_judged``; ``alarm_rate``, the share of
+    judged records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest
+    change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted
+    objects.
 
-    A bridge whose new records could not be judged is "not judged", or "alarm" while an event is open.
+    A bridge whose new records could not be judged is "not evaluated", or "alarm" while an event is open.
 
     Examples
     --------
@@ -161,7 +162,7 @@ class Fleet:
     def __repr__(self) -> str:
         states = self._states()
         watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
-        told = {"alarm": "in alarm", "not judged": "not judged"}
+        told = {"alarm": "in alarm", "not evaluated": "not evaluated"}
         watched += [f"{states[state]} {words}" for state, words in told.items() if states.get(state)]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
@@ -250,7 +251,7 @@ class Fleet:
         DataFrame
             A row for each record that was judged: ``bridge``, ``time`` and the columns of
             `~skthermo.monitoring.Monitor.update`. A bridge whose records could not be judged has one row without a
-            time: "not judged", and the error as the reason.
+            time: "not evaluated", and the error as the reason.
 
         Raises
         ------

@@ -40,7 +40,7 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     Warns
     -----
     UserWarning
-        How many records are not judged, if any.
+        How many records are not evaluated, if any.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
     Warns
     -----
     UserWarning
-        How many records are not judged, if any.
+        How many records are not evaluated, if any.
 
     Examples
     --------
@@ -159,8 +159,8 @@ def time_to_detection(damage_index: ArrayLike, threshold: float, onset: Any = No
     Parameters
     ----------
     damage_index : array-like or Series of shape (n_samples,)
-        Damage index of records in order of time. A record with NaN is not judged: it raises no alarm, and the wait goes
-        on.
+        Damage index of records in order of time. A record with NaN is not evaluated: it raises no alarm, and the wait
+        goes on.
     threshold : float
         A damage index above it is an alarm.
     onset : int or time, optional
@@ -213,8 +213,8 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     present = index[~np.isnan(index)]
     if len(present) < len(index):
         warn_user(
-            f"{len(index) - len(present)} of {len(index)} records are not judged, their damage index is NaN: the rate "
-            f"is that of the other {len(present)}",
-            "records not judged",
+            f"{len(index) - len(present)} of {len(index)} records are not evaluated, their damage index is NaN: the "
+            f"rate is that of the other {len(present)}",
+            "records not evaluated",
         )
     return float((present > limit).mean()) if present.size else float("nan")

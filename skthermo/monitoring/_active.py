@@ -270,7 +270,8 @@ class ActiveDetector(SavesFrames):
         return causes
 
     def reasons(self, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str]) -> list[str]:
-        """Why records from a position on are not judged, and what else is worth saying of them, beside their marks."""
+        """Why records from a position on are not evaluated, and what else is worth saying of them, beside their
+        marks."""
         unknown = np.flatnonzero(np.isnan(index))
         causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
         outside = self.far_outside(records.iloc[first:])

@@ -176,7 +176,7 @@ def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], 
 
 
 def nothing_judged(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
-    """A row for each of some records that are not judged."""
+    """A row for each of some records that are not evaluated."""
     modes, number = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=np.int64)
     return _answers(stamps, np.full(len(stamps), np.nan), threshold, modes, list(reasons), {"damage": number})
 
@@ -191,7 +191,7 @@ def _answers(
 ) -> pd.DataFrame:
     """A row for each record."""
     judged, is_alarm = ~np.isnan(index), numbers["damage"] > 0
-    state = np.where(judged, np.where(is_alarm, "alarm", "healthy"), "not judged")
+    state = np.where(judged, np.where(is_alarm, "alarm", "healthy"), "not evaluated")
     event = np.where(is_alarm, numbers["damage"], numbers.get("stiffening", 0))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
@@ -207,14 +207,14 @@ def _answers(
 def _days_of(answers: pd.DataFrame) -> pd.DataFrame:
     """A row for each calendar day that has records, from the judgements of all of them in order of time.
 
-    ``n_records``, of which ``n_judged`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if none is judged.
+    ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if none is judged.
     """
     by_day = answers.assign(is_alarm=answers["state"] == "alarm").groupby(answers.index.normalize().rename("day"))
     index = by_day["index"]
     return pd.DataFrame(
         {
             "n_records": by_day.size(),
-            "n_judged": index.count(),
+            "n_evaluated": index.count(),
             "n_alarms": by_day["is_alarm"].sum().astype("int64"),
             "index_median": index.median(),
             "index_max": index.max(),

@@ -40,7 +40,7 @@ from skthermo.monitoring._records import Intake, RecordStore, read_records
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 from skthermo.preprocessing.checks import Plausible
 
-COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_judged", "n_implausible")
+COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_evaluated", "n_implausible")
 MOST_CAUSES = 3  # in a warning
 
 
@@ -78,14 +78,14 @@ class Monitor(SavesFrames, Estimator):
         Fitted clone.
     targets_ : list of str
         Names of the frequency columns.
-    promise_ : object
+    false_alarm_estimate_ : object
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
     promises_ : tuple of (Timestamp, object)
         The promises of all detectors that were in charge, and since when.
     threshold_ : float
         A damage event opens with an index above it.
-    release_ : float
+    clear_threshold_ : float
         An event closes when the index has stayed at or below it.
     memory_ : object
         Which earlier records the judgement of a record needs.
@@ -94,7 +94,7 @@ class Monitor(SavesFrames, Estimator):
         after it, NaT while it is open), ``peak`` (highest index), ``peak_time``, ``modes``, ``n_alarms`` (records
         judged while it was open), ``acknowledged``, ``harmless`` and ``note``.
     days_ : DataFrame
-        A row for each day with records: ``n_records``, ``n_judged``, ``n_alarms``, ``index_median``, ``index_max``
+        A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``index_median``, ``index_max``
         and, where drift is followed, a column ``drift GROUP`` for each group.
     judged_ : DataFrame
         The latest judgement of each record that is kept, as `update` gives it.
@@ -104,16 +104,16 @@ class Monitor(SavesFrames, Estimator):
         Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
         ``per_year_error``, ``significant``; None without ``fem``.
     counts_ : dict
-        ``n_records`` that came, without repeated ones; of these ``n_not_judged``, ``n_late`` (judged all the same) and
-        ``n_too_late`` (not judged); ``n_repeated``, and ``n_implausible``: values that were taken as missing.
+        ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (judged all the same)
+        and ``n_too_late`` (not evaluated); ``n_repeated``, and ``n_implausible``: values that were taken as missing.
     baseline_, records_, corrected_ : DataFrame
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
     trained_ : DataFrame
-        What the detector in charge was fitted on: the baseline, or what `refit` or `begin_again` made of it.
+        What the detector in charge was fitted on: the baseline, or what `refit` or `rebaseline` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
-        After `begin_again`: records from before the intervention, and when it was complete.
+        After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
     active_, store_, course_, said_ : object
@@ -254,7 +254,7 @@ class Monitor(SavesFrames, Estimator):
         active.check_memory()
         self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
         self.active_, self.course_ = active, Course.of(active, baseline)
-        self.promises_ = ((self.last_, self.promise_),)
+        self.promises_ = ((self.last_, self.false_alarm_estimate_),)
         self.counts_ = dict.fromkeys(COUNTS, 0)
         self.said_: tuple[Acknowledgement, ...] = ()
         self.prior_, self.since_ = None, None
@@ -273,9 +273,10 @@ class Monitor(SavesFrames, Estimator):
         -------
         DataFrame
             On the stamps of new records, and of known ones that are judged anew because others came late: ``state``
-            ("healthy", "alarm" or "not judged"), ``index`` (damage index), ``threshold``, ``modes`` (names of the
-            modes that drive an alarm, the worst first), ``reason`` (why a record is not judged, or what else is worth
-            saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was judged before).
+            ("healthy", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names of the
+            modes that drive an alarm, the worst first), ``reason`` (why a record is not evaluated, or what else is
+            worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was judged
+            before).
 
         Raises
         ------
@@ -286,7 +287,7 @@ class Monitor(SavesFrames, Estimator):
         Warns
         -----
         UserWarning
-            If new records are not judged: how many, and why.
+            If new records are not evaluated: how many, and why.
         """
         check_is_fitted(self)
         intake = self.store_.sort_in(read_records(new, self.baseline_.columns, self.baseline_.index.tz))
@@ -298,22 +299,22 @@ class Monitor(SavesFrames, Estimator):
             refused = nothing_judged(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
-        _warn_of_not_judged(answers)
+        _warn_of_not_evaluated(answers)
         self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
         return answers
 
-    def state(self) -> Literal["healthy", "alarm", "not judged"]:
+    def state(self) -> Literal["healthy", "alarm", "not evaluated"]:
         """How the structure is, by the newest record.
 
         Returns
         -------
         str
-            "alarm" while a damage event is open, else "healthy" or "not judged", as the newest record was.
+            "alarm" while a damage event is open, else "healthy" or "not evaluated", as the newest record was.
         """
         check_is_fitted(self)
         if self.course_.log.is_open("damage"):
             return "alarm"
-        return self.judged_["state"].iloc[-1] if len(self.judged_) else "not judged"
+        return self.judged_["state"].iloc[-1] if len(self.judged_) else "not evaluated"
 
     def years_watched(self, since: Any = None) -> float:
         """Time in which records were judged.
@@ -330,7 +331,7 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         days = self.days_
-        judged = days.index[days["n_judged"] > 0]
+        judged = days.index[days["n_evaluated"] > 0]
         if since is not None:
             judged = judged[judged >= pd.Timestamp(since).floor("D")]
         if not len(judged):
@@ -339,7 +340,7 @@ class Monitor(SavesFrames, Estimator):
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
-    def event_chances(self, since: Any = None) -> pd.Series:
+    def event_p_values(self, since: Any = None) -> pd.Series:
         """How probable so high a peak is for a healthy structure, by event.
 
         Parameters
@@ -447,7 +448,7 @@ class Monitor(SavesFrames, Estimator):
             self._take_over(retraining)
         return retraining
 
-    def begin_again(self, since: Any, *, until: Any = None) -> Retraining:
+    def rebaseline(self, since: Any, *, until: Any = None) -> Retraining:
         """Begin a new baseline after an intervention that has changed the structure, such as a repair.
 
         Parameters
@@ -571,19 +572,19 @@ class Monitor(SavesFrames, Estimator):
         return self.active_.memory
 
     @property
-    def promise_(self) -> Promise:
+    def false_alarm_estimate_(self) -> Promise:
         """How the threshold was set, and how many false events to expect."""
         return self.active_.promises["damage"]
 
     @property
     def threshold_(self) -> float:
         """A damage event opens with an index above it."""
-        return self.promise_.rule.threshold
+        return self.false_alarm_estimate_.rule.threshold
 
     @property
-    def release_(self) -> float:
+    def clear_threshold_(self) -> float:
         """An event closes when the index has stayed at or below it."""
-        return self.promise_.rule.release
+        return self.false_alarm_estimate_.rule.release
 
     @property
     def baseline_(self) -> pd.DataFrame:
@@ -664,30 +665,30 @@ class Monitor(SavesFrames, Estimator):
         """The counts after a batch."""
         counts = self.counts_
         n_too_late = counts["n_too_late"] + len(intake.too_late)
-        n_records, n_judged = course.days[["n_records", "n_judged"]].sum()
+        n_records, n_evaluated = course.days[["n_records", "n_evaluated"]].sum()
         return {
             "n_records": int(n_records) + n_too_late,
             "n_repeated": counts["n_repeated"] + intake.n_repeated,
             "n_late": counts["n_late"] + intake.n_late,
             "n_too_late": n_too_late,
-            "n_not_judged": int(n_records - n_judged) + n_too_late,
+            "n_not_evaluated": int(n_records - n_evaluated) + n_too_late,
             "n_implausible": counts["n_implausible"]
             + int(self.active_.plausible.implausible(intake.fresh.to_numpy()).sum()),
         }
 
 
-def _warn_of_not_judged(answers: pd.DataFrame) -> None:
+def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     new = answers[~answers["revised"]]
-    unknown = new[new["state"] == "not judged"]
+    unknown = new[new["state"] == "not evaluated"]
     if not len(unknown):
         return
     counts = unknown["reason"].value_counts()
     causes = [f"{n} because {cause}" for cause, n in counts.iloc[:MOST_CAUSES].items()]
     more = f"; and {counts.iloc[MOST_CAUSES:].sum()} for other reasons" if len(counts) > MOST_CAUSES else ""
     warn_user(
-        f"{len(unknown)} of {len(new)} new records are not judged, the first {unknown.index[0]}: {'; '.join(causes)}"
+        f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
-        "records not judged",
+        "records not evaluated",
     )
 
 

@@ -38,7 +38,8 @@ class EventState:
 class EventRule(SavesFrames):
     """An event opens with a record above ``threshold`` and closes when those of ``hold`` stayed within ``release``.
 
-    Records that are not judged (NaN) neither open nor close it: the time of silence counts only between judged records.
+    Records that are not evaluated (NaN) neither open nor close it: the time of silence counts only between judged
+    records.
     """
 
     threshold: float

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 class DamageIndexDisplay(Display):
     """Damage index of every record, the threshold above which it is an alarm, and the onset of damage.
 
-    Records without an index, which are not judged, are grey ticks at the bottom, with their number. A few indices far
-    above the others do not stretch the axis: triangles at its edge and a number stand for them.
+    Records without an index, which are not evaluated, are grey ticks at the bottom, with their number. A few indices
+    far above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
     It is best made by `from_estimator`, `from_predictions`, or `from_study` with a panel for each detector.
 
@@ -123,7 +123,7 @@ class DamageIndexDisplay(Display):
         scenarios: Sequence[str] | None = None,
         *,
         detectors: Sequence[str] | None = None,
-        source: str = "data-informed",
+        source: str = "simulated",
         **options: object,
     ) -> DamageIndexDisplay:
         """Draw the records of the first repeat of a study, one panel for each detector.
@@ -136,8 +136,8 @@ class DamageIndexDisplay(Display):
             Those that are drawn beside each other in each panel; by default all.
         detectors : sequence of str, optional
             Those that are drawn; by default all that did not fail.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         **options : dict
             ``onset`` and ``label`` of the display, and options of `plot`.
 

@@ -24,11 +24,19 @@ if TYPE_CHECKING:
 
     from skthermo.studies import DetectabilityStudy
 
-SIMULATED, REFERENCE = "data-informed", "reference"
-OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "band_lowest", "band_highest"]
+SIMULATED, REFERENCE = "simulated", "reference"
+OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
 OF_RANKING = [
-    *("false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit", "pod", "pod_lowest", "pod_highest"),
-    *("pod_equal", "behind", "behind_lowest", "behind_highest", "clearly_behind"),
+    *(
+        "false_alarms",
+        "false_alarms_ci_low",
+        "false_alarms_ci_high",
+        "within_limit",
+        "pod",
+        "pod_ci_low",
+        "pod_ci_high",
+    ),
+    *("pod_at_equal_pfa", "pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high", "significantly_worse"),
 ]
 LEVEL, ONE_REPEAT = "best, or not clearly behind", "order not sure: one repeat"
 BEHIND, FAILED = "clearly behind", "failed"
@@ -72,7 +80,7 @@ class DetectorsDisplay(Display):
     all simulated ones, a dot the measured rate; a reference of several repeats is a mean, too, and not compared with
     the band. Detectors are in the order of the damage that they find in simulation.
 
-    Failures, and shares of records that are not judged, which count neither as healthy nor as alarms, are told in
+    Failures, and shares of records that are not evaluated, which count neither as healthy nor as alarms, are told in
     words. The axis of false alarms is even in their square root, so that small ones are told apart.
 
     It is best made by `from_estimator` or `from_predictions`.
@@ -115,10 +123,10 @@ class DetectorsDisplay(Display):
     >>> import pandas as pd
     >>> from skthermo.plotting import DetectorsDisplay
     >>> ranking = pd.DataFrame(
-    ...     {"false_alarms": [0.01, 0.02], "false_alarms_lowest": [0.0, 0.01], "false_alarms_highest": [0.02, 0.03],
-    ...      "keeps_limit": True, "pod": [0.9, 0.5], "pod_lowest": [0.8, 0.4], "pod_highest": [1.0, 0.6],
-    ...      "pod_equal": [0.92, 0.5], "behind": [0.0, 0.42], "behind_lowest": [0.0, 0.3], "behind_highest": [0.0, 0.5],
-    ...      "clearly_behind": [False, True]}, index=["whitened", "raw"])
+    ...     {"false_alarms": [0.01, 0.02], "false_alarms_ci_low": [0.0, 0.01], "false_alarms_ci_high": [0.02, 0.03],
+    ...      "within_limit": True, "pod": [0.9, 0.5], "pod_ci_low": [0.8, 0.4], "pod_ci_high": [1.0, 0.6],
+    ...      "pod_at_equal_pfa": [0.92, 0.5], "pod_deficit": [0.0, 0.42], "pod_deficit_ci_low": [0.0, 0.3],
+    ...      "pod_deficit_ci_high": [0.0, 0.5], "significantly_worse": [False, True]}, index=["whitened", "raw"])
     >>> display = DetectorsDisplay.from_predictions(ranking)
     >>> [text.get_text() for text in display.axes_[0].get_yticklabels()]
     ['best, or not clearly behind', 'whitened', 'clearly behind', 'raw']
@@ -140,7 +148,7 @@ class DetectorsDisplay(Display):
         *,
         max_false_alarms: float = 0.02,
         source: str = SIMULATED,
-        by: Literal["pod", "pod_equal"] = "pod",
+        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         **options: object,
     ) -> DetectorsDisplay:
         """Draw the ranking of the detectors of a study, or its simulated rates beside measured ones.
@@ -153,9 +161,9 @@ class DetectorsDisplay(Display):
             What is drawn; "agreement" needs a run with a ``reference``.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms in a ranking.
-        source : str, default="data-informed"
-            Records of a ranking: "data-informed" (simulated) or "reference".
-        by : {"pod", "pod_equal"}, default="pod"
+        source : str, default="simulated"
+            Records of a ranking: "simulated" (simulated) or "reference".
+        by : {"pod", "pod_at_equal_pfa"}, default="pod"
             What a ranking compares: detectors as they are, or with thresholds moved to equal false alarms.
         **options : dict
             Options of `from_predictions` and of `plot`.
@@ -185,7 +193,7 @@ class DetectorsDisplay(Display):
         table: pd.DataFrame,
         *,
         max_false_alarms: float = 0.02,
-        by: Literal["pod", "pod_equal"] = "pod",
+        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         scenarios: Sequence[str] | None = None,
         groups: Mapping[str, str] | None = None,
         **options: object,
@@ -199,7 +207,7 @@ class DetectorsDisplay(Display):
             or rows of several results, for example false alarms in one weather and found damage in another.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which a ranking was made.
-        by : {"pod", "pod_equal"}, default="pod"
+        by : {"pod", "pod_at_equal_pfa"}, default="pod"
             What was compared with the best in a ranking.
         scenarios : sequence of str, optional
             Scenarios of results that are drawn, in this order. By default all, false alarms first.
@@ -219,7 +227,7 @@ class DetectorsDisplay(Display):
             rates of one scenario; if a scenario or a detector of a group is not in the table.
         """
         columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
-        needed = OF_RANKING if "keeps_limit" in columns else OF_RESULTS
+        needed = OF_RANKING if "within_limit" in columns else OF_RESULTS
         missing = [name for name in needed if name not in columns]
         if missing or not len(table):
             got = f"lacks the columns {missing}" if columns and missing else f"is {table!r:.200}"
@@ -299,27 +307,27 @@ class DetectorsDisplay(Display):
 
 def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
     """What a display of a ranking is made of."""
-    level = LEVEL if ranking["behind_lowest"].notna().any() else ONE_REPEAT
+    level = LEVEL if ranking["pod_deficit_ci_low"].notna().any() else ONE_REPEAT
     loud = f"more than {percent(limit)} false alarms"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
-    kinds = ranking["clearly_behind"].astype(bool).map({True: BEHIND, False: level})
-    kinds = kinds.where(ranking["keeps_limit"].astype(bool), loud).where(is_tested, FAILED)
+    kinds = ranking["significantly_worse"].astype(bool).map({True: BEHIND, False: level})
+    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, FAILED)
     kinds = kinds.sort_values(key=lambda names: names.map([level, BEHIND, loud, FAILED].index), kind="stable")
     tested = ranking[is_tested]
 
     def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:
-        table = tested[[f"{name}_lowest", f"{name}_highest", name]].set_axis(RATES[:3], axis=1)
+        table = tested[[f"{name}_ci_low", f"{name}_ci_high", name]].set_axis(RATES[:3], axis=1)
         return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
 
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
     unjudged = tested["not_judged"] if "not_judged" in tested else pd.Series(dtype=float)
-    notes = {name: f"{share_text(share)} not judged" for name, share in unjudged.items() if share > 0}
+    notes = {name: f"{share_text(share)} not evaluated" for name, share in unjudged.items() if share > 0}
     label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
     false, found = "healthy records in alarm (%)", "damaged records in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
-        "pod": RatesPanel("damage found", found, rates("pod", tested["pod_equal"]), notes),
-        "behind": RatesPanel("less found than by the best", label, rates("behind"), axis="free"),
+        "pod": RatesPanel("damage found", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
+        "pod_deficit": RatesPanel("less found than by the best", label, rates("pod_deficit"), axis="free"),
     }
     colours = {name: {LEVEL: BLUE, ONE_REPEAT: BLUE, BEHIND: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
     labels = ["bounds", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
@@ -396,8 +404,8 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
             f"{first['source']!r}; expected one: of each study, keep the scenarios that are to be compared"
         )
     share = np.nan
-    if {"n_records", "n_not_judged"} <= set(results.columns):
-        share = results["n_not_judged"] / (results["n_records"] + results["n_not_judged"])
+    if {"n_records", "n_not_evaluated"} <= set(results.columns):
+        share = results["n_not_evaluated"] / (results["n_records"] + results["n_not_evaluated"])
     results = results.assign(not_judged=share)
     simulated, measured = (results[results["source"] == source] for source in (SIMULATED, REFERENCE))
     both = set(simulated["scenario"]) & set(measured["scenario"])
@@ -406,7 +414,7 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
             f"no scenario of {results['scenario'].unique().tolist()} has both simulated and measured records; expected "
             "the results of a run with a reference"
         )
-    left = simulated.rename(columns={"rate": "value", "band_lowest": "low", "band_highest": "high"})
+    left = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
     right = measured.set_index(keys)
     is_single = right.get("n_repeats", pd.Series(1, right.index)) == 1
     right = right[["rate", "not_judged"]].set_axis(["mark", "not_judged_measured"], axis=1).assign(single=is_single)
@@ -418,11 +426,11 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
 
 
 def _unjudged(row: pd.Series) -> str:
-    """What share of the measured and of the simulated records is not judged; nothing if all are."""
+    """What share of the measured and of the simulated records is not evaluated; nothing if all are."""
     measured, simulated = row["not_judged_measured"], row["not_judged"]
     if measured > 0:
-        return f"{share_text(measured)} not judged{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
-    return f"{share_text(simulated)} of simulated not judged" if simulated > 0 else ""
+        return f"{share_text(measured)} not evaluated{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
+    return f"{share_text(simulated)} of simulated not evaluated" if simulated > 0 else ""
 
 
 def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) -> dict[tuple[Hashable, Hashable], int]:

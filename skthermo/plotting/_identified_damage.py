@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 NEEDED = {
     "told": {"probability"},
-    "table": {"probability", "severity", "lowest", "highest"},
+    "table": {"probability", "severity", "ci_low", "ci_high"},
     "shifts": {"measured", "explained", "standard_error"},
 }
 N_ERRORS = 2  # standard errors on either side of a measured shift
@@ -72,7 +72,7 @@ class IdentifiedDamageDisplay(Display):
     >>> identified = SimpleNamespace(
     ...     told=pd.DataFrame({"probability": [0.8, 0.2]}, ["piers 20 %", "deck 4 %, piers 12 %"]),
     ...     table=pd.DataFrame(
-    ...         {"probability": [0.2, 1.0], "severity": [0.01, 0.18], "lowest": [0, 0.1], "highest": [0.04, 0.22]},
+    ...         {"probability": [0.2, 1.0], "severity": [0.01, 0.18], "ci_low": [0, 0.1], "ci_high": [0.04, 0.22]},
     ...         ["deck", "piers"]),
     ...     shifts=pd.DataFrame(
     ...         {"measured": [-0.01, -0.05], "explained": [-0.012, -0.049], "standard_error": [0.002, 0.003]},
@@ -163,7 +163,7 @@ class IdentifiedDamageDisplay(Display):
         """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
         table, unseen = self.identified.table, set(getattr(self.identified, "unseen", ()))
         places, is_known = np.arange(len(table)), ~table.index.isin(unseen)
-        severity, lowest, highest = 100 * table[["severity", "lowest", "highest"]].to_numpy(dtype=float).T
+        severity, lowest, highest = 100 * table[["severity", "ci_low", "ci_high"]].to_numpy(dtype=float).T
         probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()
         if "highest_if_damaged" in table:
             possible = np.where(is_known, 100 * table["highest_if_damaged"].to_numpy(dtype=float), np.nan)

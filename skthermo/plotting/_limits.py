@@ -1,4 +1,4 @@
-"""Axes that a few outliers do not stretch: marks at the edges count what lies beyond, or is not judged."""
+"""Axes that a few outliers do not stretch: marks at the edges count what lies beyond, or is not evaluated."""
 
 from __future__ import annotations
 
@@ -84,16 +84,16 @@ def _mark_edge(
 
 
 def mark_unjudged(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
-    """Grey ticks at the bottom where records of each label are not judged, and a text that counts them."""
+    """Grey ticks at the bottom where records of each label are not evaluated, and a text that counts them."""
     texts = []
     for label, x in places.items():
         if len(x):
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
-            ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not judged", **style)
+            ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not evaluated", **style)
             nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
-            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not judged")
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
     if texts:
-        _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not judged")
+        _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not evaluated")
 
 
 def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:

@@ -42,8 +42,8 @@ SHADES: dict[str, dict[str, object]] = {
 class MonitorDisplay(Display):
     """Damage index of a monitor over time with its threshold and events; below it, drift and failed sensors.
 
-    Records in alarm are orange triangles, others blue dots. Records or days that are not judged are grey ticks at the
-    bottom, with their number. Events are shaded.
+    Records in alarm are orange triangles, others blue dots. Records or days that are not evaluated are grey ticks at
+    the bottom, with their number. Events are shaded.
 
     It is best made by `from_estimator`.
 

@@ -47,9 +47,9 @@ class PODCurveDisplay(Display):
         The curve.
     band_ : PolyCollection
         Its bounds.
-    worlds_ : PolyCollection or None
+    replicates_ : PolyCollection or None
         The band in which the curve of a measured campaign should lie, ``curve.band(severity)``, where the study has
-        worlds: paler, with dashed edges.
+        replicates: paler, with dashed edges.
     errorbar_ : ErrorbarContainer
         Observed shares with Wilson's intervals of 95 %, which hold for independent records.
     marks_ : dict of str to artist
@@ -84,7 +84,7 @@ class PODCurveDisplay(Display):
         family: str,
         *,
         detector: str | None = None,
-        source: str = "data-informed",
+        source: str = "simulated",
         label: str | None = None,
         **options: object,
     ) -> PODCurveDisplay:
@@ -98,8 +98,8 @@ class PODCurveDisplay(Display):
             Of the scenarios.
         detector : str, optional
             Name of the detector, where there are several; draw one after the other into the same axes to compare them.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         label : str, optional
             Legend of the curve; by default the name of the detector, or the family where none is named.
         **options : dict
@@ -179,7 +179,7 @@ class PODCurveDisplay(Display):
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
         self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
-        self.worlds_ = self._draw_worlds(drawn, colour)
+        self.replicates_ = self._draw_worlds(drawn, colour)
         self.marks_ = self._draw_marks(colour) if marks else {}
         self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
         self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
@@ -187,7 +187,7 @@ class PODCurveDisplay(Display):
 
     def _draw_worlds(self, drawn: Array, colour: str) -> PolyCollection | None:
         """The band of a measured campaign; None for a curve without one."""
-        if not getattr(self.curve, "worlds", ()):
+        if not getattr(self.curve, "replicates", ()):
             return None
         low, high = (100 * np.asarray(values) for values in self.curve.band(drawn))
         style = {"facecolor": colour, "edgecolor": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8}

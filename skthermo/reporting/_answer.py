@@ -57,9 +57,9 @@ def answer(study: DetectabilityStudy, findings: Sequence[Finding], identified: S
 
 def how_soon(study: DetectabilityStudy) -> Html:
     """Sentences on the smallest damage of each family, and a table of all scenarios."""
-    waits = study.time_to_find(level=RELIABLE)
+    waits = study.time_to_detection(level=RELIABLE)
     is_healthy = dict(zip(study.results_["scenario"], study.results_["measure"] == "PFA", strict=True))
-    told = study.time_to_find(level=RELIABLE, smallest=True)
+    told = study.time_to_detection(level=RELIABLE, smallest=True)
     items = [
         element("span", element("strong", f"{row['scenario']}:"), f" {row['text']}.")
         for _, row in told.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable").iterrows()
@@ -90,7 +90,7 @@ def how_soon(study: DetectabilityStudy) -> Html:
 def _chance(row: pd.Series, name: str) -> str:
     if np.isnan(row[name]):
         return "records too short or too rare"
-    return f"{share_text(row[name])} ({bounds_text(*(row[name + bound] for bound in (' lowest', ' highest')))})"
+    return f"{share_text(row[name])} ({bounds_text(*(row[name + bound] for bound in (' ci_low', ' ci_high')))})"
 
 
 def _time(wait: pd.Timedelta | float) -> str:
@@ -174,9 +174,9 @@ def _alarms(study: DetectabilityStudy, scenarios: Mapping[str, State]) -> Html:
             row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
             element("span", described(scenarios.get(row["scenario"])), class_="text"),
             bar(row["rate"], share_text(row["rate"])),
-            bounds_text(row["lowest"], row["highest"]),
-            *([bounds_text(row["band_lowest"], row["band_highest"])] if has_bands else []),
-            f"{row['n_records']:,}{_share_not_judged(study, row)}",
+            bounds_text(row["ci_low"], row["ci_high"]),
+            *([bounds_text(row["pi_low"], row["pi_high"])] if has_bands else []),
+            f"{row['n_records']:,}{_share_not_evaluated(study, row)}",
             duration_text(row["time_to_detection"]),
         ]
         for _, row in study.results_.iterrows()
@@ -184,10 +184,10 @@ def _alarms(study: DetectabilityStudy, scenarios: Mapping[str, State]) -> Html:
     return table("Alarms in every scenario.", columns, cells)
 
 
-def _share_not_judged(study: DetectabilityStudy, row: pd.Series) -> str:
-    """What share of the records of a scenario was not judged; nothing if all were."""
+def _share_not_evaluated(study: DetectabilityStudy, row: pd.Series) -> str:
+    """What share of the records of a scenario was not evaluated; nothing if all were."""
     share = float(study.indices_[row["detector"], row["scenario"], row["source"]].isna().mean())
-    return f" ({share_text(share)} not judged)" if share else ""
+    return f" ({share_text(share)} not evaluated)" if share else ""
 
 
 def _beginning(study: DetectabilityStudy) -> str:
@@ -238,7 +238,7 @@ def _false_alarms(rows: pd.DataFrame) -> Html:
             text = f"Of the records of {name}, {share_text(row['rate'])} raise an alarm, {often}"
         else:
             text = f"No record of {name} raises an alarm"
-        sentences.append(f"{text} (bounds: {bounds_text(row['lowest'], row['highest'])}).")
+        sentences.append(f"{text} (bounds: {bounds_text(row['ci_low'], row['ci_high'])}).")
     return paragraphs(*sentences)
 
 

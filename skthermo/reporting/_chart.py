@@ -24,7 +24,7 @@ def chart(
     alt: str,
     events: Iterable[tuple[pd.Timestamp, pd.Timestamp]] = (),
 ) -> Html:
-    """Highest damage index of each day as dots over its threshold; ticks for days not judged, events shaded.
+    """Highest damage index of each day as dots over its threshold; ticks for days not evaluated, events shaded.
 
     ``index`` has a row for each day, NaN where none was judged, on midnights without a time zone.
     """

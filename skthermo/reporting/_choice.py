@@ -45,7 +45,7 @@ class Choice:
         """Which detector is recommended, and which one the report is on."""
         best, limit = quoted(self.best.name), percent(self.limit)
         text = f"Recommended is {best}, with a limit of {limit} false alarms."
-        if not self.best["keeps_limit"]:
+        if not self.best["within_limit"]:
             text = (
                 f"None keeps the limit of {limit} false alarms, so that none is recommended; {best} raises the fewest."
             )
@@ -57,13 +57,13 @@ class Choice:
         results = self.study.results_
         damaged = results[(results["measure"] == "POD") & (results["source"] == SIMULATED)]
         n_states = counted(damaged["scenario"].nunique(), "damaged state")
-        n_judged = counted(int((self.ranking["error"] == "").sum()), "alarm system")
+        n_evaluated = counted(int((self.ranking["error"] == "").sum()), "alarm system")
         introduction = (
-            f"{n_judged} judged the same simulated records: those of the healthy "
+            f"{n_evaluated} judged the same simulated records: those of the healthy "
             f"structure and of {n_states}. The damage found is the mean over these states."
         )
         columns = ["Alarm system", "False alarms", "Bounds", "Damage found", "Bounds"]
-        columns += [f"Less than {quoted(self.best.name)} (percentage points)", "Not judged"]
+        columns += [f"Less than {quoted(self.best.name)} (percentage points)", "Not evaluated"]
         caution = (
             "Differences hold for all alarm systems together with "
             f"{percent(self.study.confidence_)} confidence. They cover the scatter of the measurements, but neither "
@@ -86,9 +86,9 @@ class Choice:
             return [name, "failed", *[""] * 5]
         cells = [name]
         for rate in ("false_alarms", "pod"):
-            bounds = bounds_text(row[f"{rate}_lowest"], row[f"{rate}_highest"])
+            bounds = bounds_text(row[f"{rate}_ci_low"], row[f"{rate}_ci_high"])
             cells += [bar(row[rate], share_text(row[rate])), bounds]
-        points = [100 * row[f"behind{end}"] for end in ("", "_lowest", "_highest")]
+        points = [100 * row[f"pod_deficit{end}"] for end in ("", "_ci_low", "_ci_high")]
         ends = f" ({points[1]:.1f} to {points[2]:.1f})" if np.isfinite(points[1]) else ""
         behind = "" if name == self.best.name else f"{points[0]:.1f}{ends}"
         return [*cells, behind, share_text(row["not_judged"])]

@@ -144,7 +144,7 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
     threshold = study.thresholds_[study.detector_name()]
     above = "; ".join(
         f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
-        + (f", {counted(int(index.isna().sum()), 'record')} not judged" if index.isna().any() else "")
+        + (f", {counted(int(index.isna().sum()), 'record')} not evaluated" if index.isna().any() else "")
         for name, index in shown.items()
     )
 

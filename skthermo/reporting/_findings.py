@@ -11,7 +11,7 @@ from skthermo._tables.text import percent
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies import DetectabilityStudy, PODCurve
 
-SIMULATED, REFERENCE = "data-informed", "reference"
+SIMULATED, REFERENCE = "simulated", "reference"
 """Sources of records in the table of a study."""
 
 LEVEL = 0.9  # share of records in alarm from which on damage counts as found reliably
@@ -117,7 +117,7 @@ def _finding(study: DetectabilityStudy, family: object, rows: pd.DataFrame) -> F
     severities = rows["severity"].to_numpy(dtype=float)
     try:
         smallest, lowest, highest = (
-            minimum_detectable_damage(severities, rows[name], LEVEL) for name in ("rate", "highest", "lowest")
+            minimum_detectable_damage(severities, rows[name], LEVEL) for name in ("rate", "ci_high", "ci_low")
         )
     except ValueError:  # damage and strengthening in one family, or one severity twice
         return None

@@ -84,8 +84,8 @@ def _row(cause: str, row: pd.Series, is_unseen: bool) -> list[str]:
     """Cells of one cause."""
     if is_unseen:
         return [cause, "cannot be seen", UNITS[row["kind"]], "not known", "", ""]
-    amounts = row[["severity", "lowest", "highest", "highest_if_damaged"]].astype(float)
-    lowest, highest = sorted(amounts[["lowest", "highest"]].abs())
+    amounts = row[["severity", "ci_low", "ci_high", "highest_if_damaged"]].astype(float)
+    lowest, highest = sorted(amounts[["ci_low", "ci_high"]].abs())
     return [
         cause,
         chance_text(row["probability"]),

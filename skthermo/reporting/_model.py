@@ -197,6 +197,6 @@ def _agreement(results: pd.DataFrame) -> list[Html]:
     single = results[(results["source"] == REFERENCE) & (results["n_repeats"] == 1)].set_index("scenario")["rate"]
     bands = results[results["source"] == SIMULATED].set_index("scenario").reindex(single.index)
     if len(single):
-        inside = int(single.between(bands["band_lowest"], bands["band_highest"]).sum())
+        inside = int(single.between(bands["pi_low"], bands["pi_high"]).sum())
         text += f" Of {counted(len(single), 'reference rate')}, {inside:,} lie where single simulated campaigns lie."
     return [heading, paragraphs(f"{text} The table of all scenarios, further below, has both.")]

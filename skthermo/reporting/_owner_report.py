@@ -70,7 +70,7 @@ def owner_report(
     detector: str | None = None,
     max_false_alarms: float = 0.02,
     drift_limit: float = 0.1,
-    false_share: float = 0.1,
+    fdr: float = 0.1,
     now: str | pd.Timestamp | None = None,
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
@@ -79,12 +79,12 @@ def owner_report(
     model is, which damage was identified, and with which settings and warnings all this was computed. If the study has
     several detectors, it says which one is recommended and why, and the rest is on that one.
 
-    Of a monitor, it says whether the structure is healthy today, in alarm or not judged, since when and why; which
-    events there were; how the damage index, the stiffness and the sensors changed; what was not judged; and what the
+    Of a monitor, it says whether the structure is healthy today, in alarm or not evaluated, since when and why; which
+    events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and what the
     promise of few false alarms means. A monitor that has had no record for two days more than usual is not called
     healthy.
 
-    Of a fleet, it says how many bridges are in alarm, not judged, not fitted and healthy, and how many of the alarms
+    Of a fleet, it says how many bridges are in alarm, not evaluated, not fitted and healthy, and how many of the alarms
     chance explains; a table has a row for each bridge, the worst first. Each row opens that bridge's own page, in a
     folder beside the file: ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced; those of bridges
     that are no longer in the fleet stay.
@@ -109,7 +109,7 @@ def owner_report(
         Limit of the share of false alarms, by which several detectors are ranked.
     drift_limit : float, default=0.1
         Loss of stiffness of which the page on a monitor says when slow drift reaches it.
-    false_share : float, default=0.1
+    fdr : float, default=0.1
         Share of false ones among the events of all bridges that the page on a fleet singles out, on average.
     now : time, optional
         When the page on a monitor or a fleet is written, in the time zone of the records; by default the clock's time.
@@ -177,8 +177,8 @@ def owner_report(
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
     heading = KINDS[kind].title if title is None else title
     if kind == "Fleet":
-        check_size(false_share, "false_share", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
-        introduction, sections = fleet_page(subject, file, heading, now, limit, false_share)
+        check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
+        introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)
     elif kind == "Monitor":
         introduction, sections = monitor_page(Standing.of(subject, now, limit))
         sections[-1:-1] = [] if identified is None else [identified_damage(identified)]

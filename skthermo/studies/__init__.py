@@ -1,7 +1,7 @@
 """Studies of what a monitoring system would detect."""
 
 from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
-from skthermo.studies.extension import what_to_add
+from skthermo.studies.extension import compare_extensions
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage
 from skthermo.studies.location import LocatedDamage, locate_damage
 from skthermo.studies.scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
@@ -21,5 +21,5 @@ __all__ = [
     "locate_damage",
     "pod_curve",
     "sweep",
-    "what_to_add",
+    "compare_extensions",
 ]

@@ -208,7 +208,7 @@ METHODS = {
 
 
 class Decisions:
-    """What a detector says of records: alarm, healthy or not judged, and what is called healthy without an index."""
+    """What a detector says of records: alarm, healthy or not evaluated, and what is called healthy without an index."""
 
     def __init__(self, detector, records):
         residuals = detector[:-1].transform(records)
@@ -330,7 +330,7 @@ def by_day(detector, records, before):
 
     Returns
     -------
-    (differences, not judged only so, called healthy without being judged)
+    (differences, not evaluated only so, called healthy without being judged)
     """
     whole = Decisions(detector, records)
     parts = []
@@ -366,7 +366,7 @@ def print_method(name, bridge, years, dirty, n_days):
         rates = [rate for damage in DAMAGES for rate in (found[damage].rate, days[damage])]
         rows[condition] = [*rates, healthy.unknown.sum(), healthy.silent.sum()]
     columns = [f"{damage}{by}" for damage in DAMAGES for by in ("", ", days")] + [
-        "not judged",
+        "not evaluated",
         "of them called healthy",
     ]
     table = pd.DataFrame(rows, columns).T
@@ -381,7 +381,7 @@ def print_method(name, bridge, years, dirty, n_days):
         n = sum(map(len, stream))
         print(
             f"  {n} records day by day{f', with the {before} before' if before else ''}: {counts[0]} decisions differ "
-            f"from one pass, {counts[1]} not judged only so, {counts[2]} called healthy without being judged"
+            f"from one pass, {counts[1]} not evaluated only so, {counts[2]} called healthy without being judged"
         )
         batches.print("of them", 160)
     print(f"  {time.perf_counter() - start:.0f} s")
@@ -444,7 +444,7 @@ def targets(table, silent):
     yield "days in false alarm, %", same["healthy, days"], "<=", 4
     yield "side span found by days, %", same["side span 12 %, days"], ">=", 95
     yield "main stays found by days, %", same["main stays 6 %, days"], ">=", 95
-    yield "records not judged without the girder's thermometer", dead["not judged"], "<=", 100
+    yield "records not evaluated without the girder's thermometer", dead["not evaluated"], "<=", 100
     yield "days in false alarm without it, %", dead["healthy, days"], "<=", 4
 
 

@@ -160,7 +160,7 @@ def days(seeds, regressors):
     silent = judged & ~np.isclose(alone, expected, rtol=1e-9) | ~judged & (not told)
     otherwise = (behind > limit) != (expected > limit)
     print(f"Year 2 in batches of a day, {regressors[0]}: {len(expected)} rows, {(expected > limit).sum()} in alarm\n")
-    print(f"alone: {(~judged).sum()} rows not judged, {silent.sum()} rows silently worse, at most 0")
+    print(f"alone: {(~judged).sum()} rows not evaluated, {silent.sum()} rows silently worse, at most 0")
     print(f"behind the 30 hours before: {otherwise.sum()} rows decided otherwise than in one pass, at most 0")
     print("what is said of the first day:", *told.values(), sep="\n- ")
     return int(silent.sum() + otherwise.sum())

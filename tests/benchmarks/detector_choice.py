@@ -199,7 +199,7 @@ class KW51:
 STRUCTURES = {"truss": (Truss, (0.1, 0.2, 0.3), 365, 20), "kw51": (KW51, (0.05, 0.1, 0.2), 4000, 10)}
 RULES = {  # what is compared, and whether of those only that keep the limit of false alarms
     "found at the own threshold": ("pod", True),
-    "found, threshold moved to the limit": ("pod_equal", True),
+    "found, threshold moved to the limit": ("pod_at_equal_pfa", True),
     "found, threshold raised where needed": ("pod_raised", True),
     "area under the ROC curve": ("auc", True),
     "found at the own threshold, no limit": ("pod", False),
@@ -217,7 +217,7 @@ def ranking(study, source, limit):
         decisions = [study.decisions_[name, scenario, source] for scenario in damaged]
         shares = [(some < threshold).sum() / np.count_nonzero(~np.isnan(some)) for some in decisions]
         table.loc[name, "pod_raised"] = np.mean(shares)
-    return table[["false_alarms", "keeps_limit", "pod", "pod_equal", "pod_raised", "auc"]]
+    return table[["false_alarms", "within_limit", "pod", "pod_at_equal_pfa", "pod_raised", "auc"]]
 
 
 def both_studies(structure, n_repeats, seed):
@@ -238,11 +238,11 @@ def outcome(simulated, true, rule):
     """What a rule chooses from simulated records, and what that is worth in truth; NaN where none keeps the limit."""
     measure, limited = RULES[rule]
     found = {"rule": rule, "Spearman": spearmanr(simulated[measure], true[measure].loc[simulated.index]).statistic}
-    candidates = simulated[simulated["keeps_limit"]] if limited else simulated
+    candidates = simulated[simulated["within_limit"]] if limited else simulated
     if candidates.empty:
         return found | dict.fromkeys(["chosen", *LOSSES, "true false alarms"], np.nan)
     chosen = candidates[measure].astype(float).idxmax()
-    best = true["pod"][true["keeps_limit"]].max()  # NaN if none does
+    best = true["pod"][true["within_limit"]].max()  # NaN if none does
     losses = best - true["pod"][chosen], true["pod_raised"].max() - true["pod_raised"][chosen]
     found |= {name: 100 * loss for name, loss in zip(LOSSES, losses, strict=True)}
     return found | {"chosen": chosen, "true false alarms": 100 * true["false_alarms"][chosen]}
@@ -257,7 +257,7 @@ def one_seed(options, kind, seed):
         assumed, coming = both_studies(made, options.repeats, seed)
     tables, outcomes = [], []
     for limit in options.limits:
-        simulated, true = ranking(assumed, "data-informed", limit), ranking(coming, "reference", limit)
+        simulated, true = ranking(assumed, "simulated", limit), ranking(coming, "reference", limit)
         spearman = spearmanr(simulated["false_alarms"], true["false_alarms"].loc[simulated.index]).statistic
         common = {"limit": limit, "Spearman, false alarms": spearman}
         outcomes += [outcome(simulated, true, rule) | common for rule in RULES]

@@ -80,7 +80,7 @@ def answered(found, truth, groups):
             for label, p in found.explanations["probability"].items()
         ]
         true_one = float(sum(p for causes, p in every if causes == damaged))
-        lowest, highest, likely = table["lowest"], table["highest"], table["probability"]
+        lowest, highest, likely = table["ci_low"], table["ci_high"], table["probability"]
     else:
         said, probability, true_one = set(table.index[table["significant"].eq(True)]), np.nan, np.nan
         error = NORMAL * table["standard_error"]

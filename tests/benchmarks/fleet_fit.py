@@ -118,7 +118,9 @@ def bits(fleet, names, campaign):
         if name in fleet.chains:
             weather = campaign[name].records(30).temperatures
             monitor = fleet.monitors[name]
-            found[name] = joblib.hash((fleet.chains[name].predict(weather), monitor.threshold_, monitor.release_))
+            found[name] = joblib.hash(
+                (fleet.chains[name].predict(weather), monitor.threshold_, monitor.clear_threshold_)
+            )
     return found
 
 
@@ -183,7 +185,7 @@ def main():
         start = time.perf_counter()
         same = fit_fleet(makers, records, **given)
         print(f"the same call again: {time.perf_counter() - start:.0f} s")
-        good &= same.table["n_judged"].equals(fleet.table["n_judged"])
+        good &= same.table["n_evaluated"].equals(fleet.table["n_evaluated"])
 
     some = ({n: makers[n] for n in again} | {"killer": end_process}, {n: records[n] for n in again})
     some[0]["broken"], some[1]["broken"], some[1]["killer"] = makers[again[0]], no_records, records[again[0]]

@@ -18,7 +18,7 @@ lines        broken lines of all temperatures, the library's default, on the bri
 neighbours   distance to the 20th nearest of the raw frequencies of the baseline
 fleet chain  with --chains: a ``DataInformedFEM`` whose mapper is the fleet's prior on the parameters of FE models
 
-"within" is the share of bridges whose number of events lies below the highest that the monitor's ``promise_`` names for
+"within" is the share of bridges whose number of events lies below the highest that ``false_alarm_estimate_`` names for
 a single year; "promised" those whose monitor could be made at all. The exit code is 1 if the fleet's monitors have more
 than 1.5 false events a year on average, or fewer than 90 % of them are within their promise, after any number of days;
 or if the fleet finds no more of the damage than the best of the others whose false events are as few.
@@ -141,7 +141,7 @@ class Kind:
     """The fleet of one kind of bridge, and what it gives new ones."""
 
     def __init__(self, kind, n_fleet, n_new, seed, with_chains):
-        made = make_fleet(n_fleet + n_new, kinds=(kind,), aliens=0.05, random_state=seed)
+        made = make_fleet(n_fleet + n_new, kinds=(kind,), atypical=0.05, random_state=seed)
         names = list(made)
         self.kind, self.new = kind, [made[name] for name in names[n_fleet:]]
         members = {name: made[name] for name in names[:n_fleet]}
@@ -193,7 +193,7 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
     Damage is found by an event that opens after it has set in; while a false one is open, none can.
     """
     monitor = Monitor(detector, targets=modes, sensors=False).fit(baseline)
-    rule, before = monitor.promise_.rule, baseline[-MEMORY:]
+    rule, before = monitor.false_alarm_estimate_.rule, baseline[-MEMORY:]
 
     def index_of(new):
         values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor.active_.columns])
@@ -213,7 +213,7 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
         assert list(monitor.events_["start"]) == list(events["start"])
     return {
         "events": len(events),
-        "within": len(events) <= monitor.promise_.highest,
+        "within": len(events) <= monitor.false_alarm_estimate_.highest,
         "in alarm": float((calm > rule.threshold).mean()),
         **found,
         "threshold": rule.threshold,
@@ -235,7 +235,13 @@ def rows_of(kind, bridge, number, options):
         for name, detector in detectors(kind, bridge, modes, days, options.chains, options.scale).items():
             if options.detectors is not None and name not in options.detectors:
                 continue
-            row = {"kind": kind.kind, "bridge": bridge.name, "alien": bridge.is_alien, "days": days, "detector": name}
+            row = {
+                "kind": kind.kind,
+                "bridge": bridge.name,
+                "alien": bridge.is_atypical,
+                "days": days,
+                "detector": name,
+            }
             try:
                 found = served(detector, modes, baseline, healthy[first:], damaged, number == 0)
                 yield row | {"promised": 1.0, "error": ""} | found

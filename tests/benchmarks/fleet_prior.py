@@ -23,7 +23,7 @@ to a fleet in which every bridge has such laws. Shares of measured records withi
 frequencies alone, of the posterior and the scatter of the bridge's own residuals.
 
 Targets: the prior's mean error is below that of alone and no more than 2 % above the best of mean, pooled and ridge, at
-each number of days and start; with aliens at most 5 % above alone; 85 to 95 % of the records of the year are in
+each number of days and start; with atypical at most 5 % above alone; 85 to 95 % of the records of the year are in
 intervals of 90 %. The exit code is 1 if one is missed.
 """
 
@@ -384,7 +384,7 @@ def main():
     parser.add_argument("--starts", nargs="+", choices=list(STARTS), default=list(STARTS))
     parser.add_argument("--worlds", nargs="+", choices=["frequencies", "chains"], default=["frequencies", "chains"])
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--quick", action="store_true", help="15 bridges, 60 days from winter, no fleet of aliens")
+    parser.add_argument("--quick", action="store_true", help="15 bridges, 60 days from winter, no fleet of atypical")
     options = parser.parse_args()
     if options.quick:
         options.bridges, options.groups, options.newcomers = 15, 3, 3
@@ -393,8 +393,8 @@ def main():
     missed = []
     for seed in options.seeds:
         fleet = make_fleet(options.bridges, random_state=seed)
-        lawless = make_fleet(max(options.bridges // 2, 9), aliens=1.0, random_state=100 + seed)
-        strangers = make_fleet(options.newcomers, aliens=1.0, random_state=200 + seed)
+        lawless = make_fleet(max(options.bridges // 2, 9), atypical=1.0, random_state=100 + seed)
+        strangers = make_fleet(options.newcomers, atypical=1.0, random_state=200 + seed)
         strangers = type(strangers)([type(b)(f"alien {n}", b.kind, b.seed, b.alien) for n, b in strangers.items()])
         for name in options.worlds:
             world = {"frequencies": Frequencies, "chains": Chain}[name]
@@ -406,7 +406,7 @@ def main():
             shown(f"{label}: mean error by kind, %", table(rows, by=("kind", "start", "days")))
             shown(f"{label}: share of records in 90 % intervals", table(rows, what="inside"))
             if (rows["alien"] != "").any():
-                shown(f"{label}: mean error of the aliens among them, %", table(rows[rows["alien"] != ""]))
+                shown(f"{label}: mean error of the atypical among them, %", table(rows[rows["alien"] != ""]))
             print(prior.summary())
             print(f"a prior of {len(fleet) - len(fleet) // options.groups} bridges: {seconds / options.groups:.1f} s")
             missed += misses_of(label, rows)
@@ -414,14 +414,14 @@ def main():
             shown(f"{label}: new bridges with thermal laws of their own, mean error, %", table(rows))
             shown(f"{label}: what the fleet costs them", losses(rows))
             shown(f"{label}: the same by law", table(rows, by=("alien", "days")))
-            missed += losses_of(f"{label}, aliens", rows)
+            missed += losses_of(f"{label}, atypical", rows)
             if options.quick:
                 continue
             groups = min(options.groups, 5)
             rows, _, prior = campaign_rows(world, lawless, groups, options.days, options.starts)
             shown(f"{label}: a fleet of bridges with thermal laws of their own, mean error, %", table(rows))
             print(prior.summary(), flush=True)
-            missed += losses_of(f"{label}, fleet of aliens", rows)
+            missed += losses_of(f"{label}, fleet of atypical", rows)
     print("\nmissed:", *missed or ["nothing"], sep="\n")
     sys.exit(bool(missed))
 

@@ -85,7 +85,7 @@ def errors(prior, X, F, days):
         complete = later.notna().all(axis=1).to_numpy()
         mapper = TemperatureMapper().fit(X[known], F.loc[known, mode])
         default[complete, i] = np.ravel(mapper.predict(later[complete]))
-    follows = {mode: round(share, 2) for mode, share in pooled.follows_.items()}
+    follows = {mode: round(share, 2) for mode, share in pooled.pooling_probability_.items()}
     found = {"never pools": error(alone.predict(later)), "prior": error(pooled.predict(later))}
     return found | {"default mapper": error(default), "follows": follows}
 

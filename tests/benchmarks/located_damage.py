@@ -120,7 +120,7 @@ def judged(truth, fem, places, seed, n_cases):
                 "of": len(located.table),
                 "first": located.groups["probability"].idxmax() == group,
                 "plain first": plain.idxmax() == group,
-                "plain else": located.found.probability_of_else > LEVEL / 2,
+                "plain else": located.found.probability_other > LEVEL / 2,
                 "plain size": len(places[group].members),
                 "seconds": time.perf_counter() - start,
             }

@@ -71,7 +71,7 @@ def by_year(answers, events, start):
     for year in (4, 5):
         begin, end = (start + pd.DateOffset(years=n) for n in (year - 1, year))
         part = answers[(answers.index >= begin) & (answers.index < end)]
-        known = part["state"] != "not judged"
+        known = part["state"] != "not evaluated"
         found[f"alarms {year}, %"] = 100 * (part["state"] == "alarm").sum() / max(known.sum(), 1)
         found[f"events {year}"] = ((events["start"] >= begin) & (events["start"] < end)).sum()
     return found

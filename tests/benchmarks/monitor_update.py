@@ -65,7 +65,7 @@ def main():
     campaign = make_truss_campaign(max(options.years) + 1, samples_per_year=YEAR, samples_per_day=DAY, random_state=0)
     records = campaign.temperatures.join(campaign.frequencies)
     targets = list(campaign.frequencies)
-    warnings.simplefilter("ignore", UserWarning)  # of first windows that are not judged
+    warnings.simplefilter("ignore", UserWarning)  # of first windows that are not evaluated
     start = time.perf_counter()
     monitor = new_monitor(targets, records[:YEAR], follows_drift=options.fem, watches_sensors=not options.no_sensors)
     print(f"fit to a year of hourly records: {time.perf_counter() - start:.1f} s")

@@ -191,7 +191,7 @@ def one_study(structure, seed, is_cleaned):
 
     results = study.run(later, reference=reference)
     rates = 100 * results.pivot_table("rate", ["detector", "scenario"], "source", sort=False)
-    rates = rates.rename(columns={"data-informed": "expected", "simulated": "expected", "reference": "true"})
+    rates = rates.rename(columns={"simulated": "expected", "reference": "true"})
     return rates.reset_index().assign(structure=structure, seed=seed)
 
 

@@ -144,16 +144,16 @@ def promised(fem, T, F, real, models, options):
         scenarios,
         uncertainty=PARTS if models else PARTS[:-1],
         models=models,
-        n_worlds=options.worlds,
+        n_replicates=options.worlds,
         random_state=real.seed,
     )
     study.run(T, T.join(F), confidence=CONFIDENCE)
-    keys = list(study.worlds_.rates)
+    keys = list(study.replicates_.rates)
     bands = {"noise": {}, "weather, baseline": {}}
-    found = study.worlds_
+    found = study.replicates_
     without = replace(found, parts=found.parts[:2], rates={key: rates[:, :2] for key, rates in found.rates.items()})
     for key in keys:
-        rates = np.nanmean(study.decisions_[*key, "data-informed"] < 0, axis=1)
+        rates = np.nanmean(study.decisions_[*key, "simulated"] < 0, axis=1)
         bands["noise"][key] = np.quantile(rates, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
         bands["weather, baseline"][key] = without.band(key, CONFIDENCE)
     if models:

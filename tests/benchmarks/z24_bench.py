@@ -35,13 +35,13 @@ TARGETS = {  # rank correlation, share in the band
 LIMIT, LEAST_FOUND, MOST_FALSE = 0.02, 90.0, 3.0
 SHOWN = [
     "false_alarms",
-    "keeps_limit",
+    "within_limit",
     "pod",
-    "pod_equal",
-    "behind",
-    "behind_lowest",
-    "behind_highest",
-    "clearly_behind",
+    "pod_at_equal_pfa",
+    "pod_deficit",
+    "pod_deficit_ci_low",
+    "pod_deficit_ci_high",
+    "significantly_worse",
 ]
 
 
@@ -64,10 +64,10 @@ def print_agreement(name, results):
 def print_choice(study, measured):
     """The ranking, what those that are not clearly behind find on measured records, and whether the first does."""
     ranking = study.ranking(max_false_alarms=LIMIT)
-    equal = study.ranking(max_false_alarms=LIMIT, by="pod_equal").index[0]
+    equal = study.ranking(max_false_alarms=LIMIT, by="pod_at_equal_pfa").index[0]
     print((ranking[SHOWN].astype(float)).round(3).to_string(), end="\n\n")
     first = ranking.index[0]
-    tied = ranking.index[ranking["keeps_limit"].eq(True) & ~ranking["clearly_behind"].eq(True)]
+    tied = ranking.index[ranking["within_limit"].eq(True) & ~ranking["significantly_worse"].eq(True)]
     false, found = (measured[state, "measured"] for state in ("false alarms", "damage found"))
     met = found[first] >= LEAST_FOUND and false[first] <= MOST_FALSE
     print(f"chosen: {first}; measured: {false[first]:.1f} % false alarms, {found[first]:.1f} % found; target at most")

@@ -69,7 +69,7 @@ def test_healthy_records(bridge, records):
     assert lines[0].startswith("read from ")
     assert lines[0].endswith(f"new.csv: 4, {records.index[FIRST + 10]} to {records.index[FIRST + 13]}")
     assert lines[1:] == [
-        "new: 4 (4 healthy, 0 alarm, 0 not judged); 0 repeated, 0 late, 0 too late",
+        "new: 4 (4 healthy, 0 alarm, 0 not evaluated); 0 repeated, 0 late, 0 too late",
         f"state: healthy (newest record {records.index[FIRST + 13]})",
         "open events: none",
     ]
@@ -87,7 +87,7 @@ def test_records_are_read_to_the_last_bit(bridge, records):
 def test_an_alarm(bridge, records):
     done = bridge("update", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
     assert done.code == ALARM
-    assert "new: 2 (0 healthy, 2 alarm, 0 not judged)" in done.out
+    assert "new: 2 (0 healthy, 2 alarm, 0 not evaluated)" in done.out
     event = load_monitor(done.file).events_.loc[1]
     assert f"open event 1: damage since {event['start']}, {event['modes']}, index up to" in done.out
 
@@ -108,10 +108,10 @@ def test_records_that_cannot_be_judged(bridge, records):
     done = bridge("update", new=new)
     assert done.code == NOT_JUDGED
     judged = load_monitor(done.file).judged_[-10:]
-    reasons = judged.loc[judged["state"] == "not judged", "reason"].value_counts()
+    reasons = judged.loc[judged["state"] == "not evaluated", "reason"].value_counts()
     assert len(reasons)
     for reason, number in reasons.items():
-        assert f"not judged, {reason}: {number}\n" in done.out
+        assert f"not evaluated, {reason}: {number}\n" in done.out
 
 
 @pytest.mark.parametrize("new", ["known", "none", "too late"])
@@ -206,7 +206,7 @@ def test_stamps_with_offsets_come_in_the_time_zone_of_the_baseline(records, tmp_
     monitor, file = fitted_monitor(zoned), tmp_path / "bridge.joblib"
     monitor.save(file)
     new = zoned[FIRST + 84 : FIRST + 90]  # the clocks change in between
-    with pytest.warns(UserWarning, match="2 of 6 new records are not judged"):
+    with pytest.warns(UserWarning, match="2 of 6 new records are not evaluated"):
         monitor.update(new)
     new.to_csv(tmp_path / "new.csv")
     assert len({line[:25][-6:] for line in (tmp_path / "new.csv").read_text().splitlines()[1:]}) == 2  # offsets
@@ -252,7 +252,7 @@ def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch
 
 
 @pytest.mark.parametrize("arguments", [[], ["updates"], ["update", "bridge.joblib"], ["acknowledge", "b.skops", "1"]])
-def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_judged(arguments, capsys):
+def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_evaluated(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == FAILED

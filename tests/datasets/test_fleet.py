@@ -47,12 +47,12 @@ def test_seeds_give_other_bridges(fleet):
     assert make_fleet(2, random_state=None)["bridge 000"] != make_fleet(2, random_state=None)["bridge 000"]
 
 
-@pytest.mark.parametrize("aliens", [0.0, 0.05, 0.3, 1.0])
-def test_the_share_of_aliens_holds_in_every_kind(aliens):
-    fleet = make_fleet(300, aliens=aliens, random_state=3)
-    shares = pd.Series({name: bridge.is_alien for name, bridge in fleet.items()}).groupby(fleet.covariates["kind"])
-    assert (shares.sum() - 100 * aliens).abs().max() <= 1
-    if aliens:
+@pytest.mark.parametrize("atypical", [0.0, 0.05, 0.3, 1.0])
+def test_the_share_of_aliens_holds_in_every_kind(atypical):
+    fleet = make_fleet(300, atypical=atypical, random_state=3)
+    shares = pd.Series({name: bridge.is_atypical for name, bridge in fleet.items()}).groupby(fleet.covariates["kind"])
+    assert (shares.sum() - 100 * atypical).abs().max() <= 1
+    if atypical:
         assert {bridge.alien for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
 
 
@@ -195,7 +195,7 @@ def test_bridges_with_other_thermometers_have_the_same_inputs(fleet):
     [
         ({"n_bridges": 0}, "n_bridges is 0; expected a positive integer"),
         ({"kinds": ("truss", "tunnel")}, "expected some of"),
-        ({"aliens": 1.2}, "expected a share from 0 to 1"),
+        ({"atypical": 1.2}, "expected a share from 0 to 1"),
     ],
 )
 def test_wrong_fleets_are_refused(wrong, message):

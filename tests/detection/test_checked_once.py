@@ -163,7 +163,9 @@ class TestRows:
     def test_rows_that_lack_something_else_are_counted_beside(self, last):
         fitted = detector(LinearRegression()).fit(X)
         alarms, texts = said(fitted.predict, without([4], list(MODES), without([3], list(T))))
-        for text, expected in zip(texts, ("cannot be predicted and are NaN: 1", "are not judged (pred"), strict=True):
+        for text, expected in zip(
+            texts, ("cannot be predicted and are NaN: 1", "are not evaluated (pred"), strict=True
+        ):
             assert text.startswith(f"1 of 73 rows {expected}")
         assert f"the first row 4 ({LATER.index[4]})" in texts[1]
         np.testing.assert_array_equal(np.flatnonzero(alarms == 0), [3, 4])
@@ -183,17 +185,17 @@ class TestRows:
         with pytest.warns(UserWarning, match="3 of .* rows cannot be predicted"):
             residuals = compensator.transform(gaps)
         residuals.iloc[5] = np.nan
-        with pytest.warns(UserWarning, match="^1 of .* rows are not judged"):
+        with pytest.warns(UserWarning, match="^1 of .* rows are not evaluated"):
             detector.predict(residuals)
         residuals.loc[residuals.index.max() + pd.Timedelta("1D")] = 0.0
-        with pytest.warns(UserWarning, match="^4 of .* rows are not judged"):
+        with pytest.warns(UserWarning, match="^4 of .* rows are not evaluated"):
             assert len(detector.predict(residuals)) == len(LATER) + 1
 
     def test_lags_that_find_nothing_are_told_once(self):
         lags = make_pipeline(LagFeatures([0, 1], freq="2D", tolerance="0h", padding="nan"), LinearRegression())
         fitted, _ = said(detector(lags).fit, X)
         alarms, texts = said(fitted.predict, LATER)
-        assert [text for text in texts if "rows are not judged" in text] == []
+        assert [text for text in texts if "rows are not evaluated" in text] == []
         assert any(f"{(alarms == 0).sum()} of 73 rows cannot be predicted" in text for text in texts)
 
     def test_several_detectors_tell_it_once(self):

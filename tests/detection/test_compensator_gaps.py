@@ -111,7 +111,7 @@ EMPTY = r"ignore:[0-9]+ of [0-9]+ rows cannot be predicted and are NaN"
 @pytest.mark.filterwarnings(EMPTY)
 @pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
 @pytest.mark.parametrize("estimator", [KNeighborsRegressor(3), RandomForestRegressor(5, random_state=0)], ids=str)
-def test_rows_without_any_temperature_are_not_judged(data, estimator):
+def test_rows_without_any_temperature_are_not_evaluated(data, estimator):
     holed, kept = with_gaps(list(T), [0, 7]), np.delete(np.arange(len(X)), [0, 7])
     fitted = compensator(estimator, targets=POSITIONS).fit(data(holed))
     for residuals in (fitted.transform(data(holed)), fitted.fit_transform(data(holed))):

@@ -218,7 +218,7 @@ def test_a_shrunk_covariance_judges_rows_with_gaps_and_learns_from_complete_ones
         MahalanobisDetector(covariance=LedoitWolf()).fit(np.where(np.eye(3)[np.arange(400) % 3] > 0, np.nan, F))
 
 
-def test_only_rows_without_any_mode_have_no_index_and_are_not_judged():
+def test_only_rows_without_any_mode_have_no_index_and_are_not_evaluated():
     stamps = pd.date_range("2025", periods=400, freq="h")
     frame = pd.DataFrame(GAPPY, stamps, ["f1", "f2", "f3"])
     frame.iloc[[3, 7]] = np.nan
@@ -228,7 +228,7 @@ def test_only_rows_without_any_mode_have_no_index_and_are_not_judged():
     index = detector.damage_index(frame)
     assert index.index.equals(stamps)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    with pytest.warns(UserWarning, match=r"2 of 400 rows are not judged \(predict gives 0\), the first row 3"):
+    with pytest.warns(UserWarning, match=r"2 of 400 rows are not evaluated \(predict gives 0\), the first row 3"):
         alarms = detector.predict(frame)
     np.testing.assert_array_equal(alarms[[3, 7, 8]], [0, 0, -1])
 

@@ -111,7 +111,7 @@ def test_an_estimator_that_is_certain_changes_nothing(scale):
     records = bridge(0, 500)
     certain, silent = knowing(0.0, scale=scale), unknowing(scale=scale)
     np.testing.assert_array_equal(certain.fit_transform(records[:200]), silent.fit_transform(records[:200]))
-    inside = (silent.applicability(records) == 0).all(axis=1)
+    inside = (silent.extrapolation_distance(records) == 0).all(axis=1)
     assert 200 <= inside.sum() < 500
     np.testing.assert_array_equal(certain.transform(records[inside]), silent.transform(records[inside]))
 

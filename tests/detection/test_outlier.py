@@ -91,7 +91,7 @@ def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance()
 
 
 @pytest.mark.nightly
-def test_rows_with_missing_modes_are_not_judged():
+def test_rows_with_missing_modes_are_not_evaluated():
     holed = DAMAGED.copy()
     holed.iloc[[3, 7], 1] = np.nan
     detector = OutlierDetector(IsolationForest(random_state=0)).fit(F)
@@ -99,7 +99,7 @@ def test_rows_with_missing_modes_are_not_judged():
     assert index.index.equals(STAMPS)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
     message = (
-        r"2 of 400 rows are not judged \(predict gives 0\), the first row 3 \(2025-01-01 03:00:00\): this detector "
+        r"2 of 400 rows are not evaluated \(predict gives 0\), the first row 3 \(2025-01-01 03:00:00\): this detector "
         "needs every column, and f2 in 2 of them are missing"
     )
     with pytest.warns(UserWarning, match=message):

@@ -86,7 +86,7 @@ def test_global_whitening_multiplies_by_the_symmetric_inverse_root():
 
 def test_the_index_of_globally_whitened_residuals_is_that_of_the_residuals():
     plain, white = (make_pipeline(compensator(s), MahalanobisDetector()).fit(X) for s in (None, "global"))
-    inside = LATER[(compensator("global").fit(X).applicability(LATER) == 0).all(axis=1)]
+    inside = LATER[(compensator("global").fit(X).extrapolation_distance(LATER) == 0).all(axis=1)]
     indices = [pipeline[-1].damage_index(pipeline[0].transform(inside)) for pipeline in (plain, white)]
     np.testing.assert_allclose(*indices, rtol=1e-9)
     assert white[-1].threshold_ == pytest.approx(plain[-1].threshold_, rel=1e-9)
@@ -153,7 +153,7 @@ def test_weather_beyond_the_baseline_widens_the_local_spread(scale, width_of_one
     for steps in (0.2, 1.0, 3.0):
         far = hot.assign(T1=hot["T1"] + steps * width[0], T2=hot["T2"] + steps * width[1])
         far[MODES] = residual + fitted.estimator_.predict(far[["T1", "T2"]])
-        np.testing.assert_allclose(fitted.applicability(far), steps, rtol=1e-9)
+        np.testing.assert_allclose(fitted.extrapolation_distance(far), steps, rtol=1e-9)
         if steps > 0.25:
             with pytest.warns(UserWarning, match="1 of 1 rows have temperatures far outside"):
                 white = fitted.transform(far).to_numpy()
@@ -169,7 +169,7 @@ def test_weather_outside_the_baseline_is_counted_in_one_warning(scale):
     with pytest.warns(UserWarning, match="3 of 3000 rows have temperatures far outside") as given:
         fitted.transform(hot)
     assert len(given) == 1
-    assert (fitted.applicability(hot)["T2"] > 0.25).sum() == 3
+    assert (fitted.extrapolation_distance(hot)["T2"] > 0.25).sum() == 3
 
 
 def test_the_row_outside_the_baseline_is_named_beside_gaps():

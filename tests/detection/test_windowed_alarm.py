@@ -40,7 +40,9 @@ HOLED = LATER.mask(np.random.default_rng(0).random(LATER.shape) < 0.4)
 
 
 # A call does not know the records before its first ones, whose windows therefore hold too few.
-pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows are not judged \(predict gives 0\), the first row 0 ")
+pytestmark = pytest.mark.filterwarnings(
+    r"ignore:\d+ of \d+ rows are not evaluated \(predict gives 0\), the first row 0 "
+)
 
 
 # The mean of a window
@@ -188,7 +190,7 @@ def test_a_window_of_time_holds_the_records_that_fall_into_it(rule):
 
 
 @each_rule
-def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_judged(rule):
+def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_evaluated(rule):
     holed = LATER.copy()
     holed.iloc[200:230] = np.nan
     holed.iloc[213:216, 1] = 9.0  # one mode is enough for a record to count
@@ -196,7 +198,9 @@ def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_j
     judged = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
     np.testing.assert_array_equal(alarm.damage_index(holed).notna(), judged)
     assert (~judged).sum() == 2 + (215 - 203) + (232 - 219)
-    message = f"{(~judged).sum()} of 1500 rows are not judged .* their windows hold fewer than 3 records with a value"
+    message = (
+        f"{(~judged).sum()} of 1500 rows are not evaluated .* their windows hold fewer than 3 records with a value"
+    )
     with pytest.warns(UserWarning, match=message):
         alarms = alarm.predict(holed)
     np.testing.assert_array_equal(alarms == 0, ~judged)

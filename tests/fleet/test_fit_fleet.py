@@ -125,12 +125,12 @@ def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
 
 
 def test_nothing_known_is_never_healthy(fleet):
-    assert set(fleet.table["state"]) == {"not judged", ""}
+    assert set(fleet.table["state"]) == {"not evaluated", ""}
     text = fleet.summary()
     assert "5 of 6 bridges are fitted." in text
     assert "Not fitted: broken." in text
     assert "5 of 5 monitors have had no record since they were fitted: nothing is known of their bridges." in text
-    assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not judged)"
+    assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not evaluated)"
 
 
 @pytest.mark.nightly
@@ -212,7 +212,7 @@ def test_a_second_call_fits_only_what_has_changed(tmp_path, fleet):
     same = {name[0] for name in after if after[name] == before.get(name)}
     assert same == {"a", "d"}
     assert again.table["is_fitted"].all()
-    assert again.table.loc["a", "n_judged"] == 100  # a monitor goes on with what it has seen
+    assert again.table.loc["a", "n_evaluated"] == 100  # a monitor goes on with what it has seen
     pd.testing.assert_frame_equal(Fleet(tmp_path).table.loc[again.table.index], again.table)
 
 
@@ -220,7 +220,12 @@ def test_records_that_cannot_be_had_leave_what_was_fitted_and_an_alarm(tmp_path)
     makers, records = asked()
     fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01", step=0.1)})
     lost = fit_fleet(makers, records | {"a": missing_file, "b": missing_file}, monitor=watch, folder=tmp_path)
-    assert lost.table["state"].to_dict() == {"a": "alarm", "b": "not judged", "c": "not judged", "d": "not judged"}
+    assert lost.table["state"].to_dict() == {
+        "a": "alarm",
+        "b": "not evaluated",
+        "c": "not evaluated",
+        "d": "not evaluated",
+    }
     assert lost.table["is_fitted"].all()
     assert lost.errors["bridge"].tolist() == ["a", "b"]
     found = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
@@ -265,17 +270,17 @@ def test_monitors_judge_new_records_each_alone(fleet):
     answers = made.update(new | {"d": year(33, 60, "2026-01-01")[1]})
     states = answers.groupby(["bridge", "state"]).size().to_dict()
     assert states[("b", "alarm")] > 50
-    assert states[("c", "not judged")] == states[("d", "not judged")] == 1
+    assert states[("c", "not evaluated")] == states[("d", "not evaluated")] == 1
     assert answers.loc[answers["bridge"] == "c", "reason"].item() == "FileNotFoundError: no records of this bridge"
     alone = fleet.monitors["b"]
     alone.update(new["b"]()[0].join(new["b"]()[1]))
     pd.testing.assert_frame_equal(made.monitors["b"].events_, alone.events_)
     table = made.table
     assert table["state"].to_dict() | {"a": ""} == {
-        "a": "", "b": "alarm", "c": "not judged", "d": "not judged", "broken": "", "odd": "not judged"
+        "a": "", "b": "alarm", "c": "not evaluated", "d": "not evaluated", "broken": "", "odd": "not evaluated"
     }  # fmt: skip
     assert table.loc["b", ["n_events", "n_open"]].tolist() == [1, 1]
-    assert table.loc["b", "alarm_rate"] == alone.days_["n_alarms"].sum() / alone.days_["n_judged"].sum()
+    assert table.loc["b", "alarm_rate"] == alone.days_["n_alarms"].sum() / alone.days_["n_evaluated"].sum()
     assert made.events.loc[made.events["bridge"] == "b", "event"].tolist() == [1]
     found = made.discoveries()
     assert found.called == ["b"]
@@ -308,7 +313,7 @@ def test_a_monitor_that_is_replaced_is_kept_beside_and_told(tmp_path):
     makers = dict.fromkeys(makers, LinearRegression(positive=True))
     with pytest.warns(UserWarning, match=r"^1 of 4 bridges were fitted anew.*\(a\): their monitors begin again"):
         again = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
-    assert again.table["n_judged"].eq(0).all()
+    assert again.table["n_evaluated"].eq(0).all()
     assert [file.read_bytes() for file in tmp_path.glob("*.replaced")] == [judged]
     assert len(Fleet(tmp_path)) == 4
 

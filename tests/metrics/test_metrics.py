@@ -25,7 +25,7 @@ MEASURED = RNG.uniform(3, 5, (60, 2))
 PREDICTED = MEASURED * RNG.normal(1, 0.02, (60, 2))
 
 
-@pytest.mark.filterwarnings("ignore:.* records are not judged, their damage index is NaN")
+@pytest.mark.filterwarnings("ignore:.* records are not evaluated, their damage index is NaN")
 @given(st.lists(st.floats(0, 10), min_size=1), st.floats(0, 10), st.integers(0, 5))
 def test_probabilities_are_shares_above_the_threshold(index, threshold, n_missing):
     expected = sum(value > threshold for value in index) / len(index)
@@ -35,7 +35,7 @@ def test_probabilities_are_shares_above_the_threshold(index, threshold, n_missin
 
 
 def test_nothing_to_count_is_nan_and_bad_input_is_named():
-    with pytest.warns(UserWarning, match="1 of 1 records are not judged"):
+    with pytest.warns(UserWarning, match="1 of 1 records are not evaluated"):
         assert np.isnan(probability_of_detection([np.nan], 1.0))
     with pytest.raises(ValueError, match=r"damage_index has shape \(1, 2\)"):
         probability_of_false_alarm([[1.0, 2.0]], 1.0)
@@ -215,5 +215,5 @@ def test_masked_and_missing_values_are_ignored():
     ):
         np.testing.assert_array_equal(mape(missing, PREDICTED), mape(holed, PREDICTED))
     index = np.ma.masked_array([1.0, 99.0, 3.0, 4.0], [False, True, False, False])
-    with pytest.warns(UserWarning, match="1 of 4 records are not judged, .* the rate is that of the other 3"):
+    with pytest.warns(UserWarning, match="1 of 4 records are not evaluated, .* the rate is that of the other 3"):
         assert probability_of_detection(index, 2.0) == pytest.approx(2 / 3)

@@ -31,7 +31,7 @@ TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*(season|baseline|independent|not judged|far beyond)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(season|baseline|independent|not evaluated|far beyond)")
 
 
 def campaign(n, seed, start="2025-01-01"):
@@ -129,7 +129,7 @@ def assert_same_course(monitor, answers, after, parts):
     pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
     for name in ("events_", "days_", "judged_", "faults_", "records_", "corrected_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
-    for count in ("n_records", "n_not_judged", "n_implausible"):
+    for count in ("n_records", "n_not_evaluated", "n_implausible"):
         assert monitor.counts_[count] == after.counts_[count]
     assert monitor.state() == after.state()
 
@@ -205,7 +205,7 @@ def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch
 
 def test_events_are_those_of_the_rule_on_the_whole_series():
     _, answers, after = fitted("lags")
-    events = find_events(answers["index"].to_numpy(), answers.index, after.promise_.rule)
+    events = find_events(answers["index"].to_numpy(), answers.index, after.false_alarm_estimate_.rule)
     assert len(events) >= 1
     pd.testing.assert_frame_equal(
         after.events_[list(events)], events, check_dtype=False, check_exact=True, check_index_type=False
@@ -222,12 +222,12 @@ def test_days_summarise_their_records():
     _, answers, after = fitted("whitened, mean by time")
     by_day = answers.groupby(answers.index.normalize())
     assert after.days_["n_records"].tolist() == by_day.size().tolist()
-    assert after.days_["n_judged"].tolist() == by_day["index"].count().tolist()
+    assert after.days_["n_evaluated"].tolist() == by_day["index"].count().tolist()
     np.testing.assert_array_equal(after.days_["index_max"], by_day["index"].max())
     np.testing.assert_array_equal(after.days_["index_median"], by_day["index"].median())
 
 
-def test_reasons_say_why_a_record_is_not_judged():
+def test_reasons_say_why_a_record_is_not_evaluated():
     _, answers, after = fitted("lags")
     stamp = ALL.index[N_BASELINE:]
     assert answers.loc[stamp[20], "reason"] == "no mode has a value"
@@ -235,7 +235,7 @@ def test_reasons_say_why_a_record_is_not_judged():
     assert "lags find no record" in answers.loc[stamp[64], "reason"]
     assert "f2 is -999: taken as missing" in answers.loc[stamp[30], "reason"]
     assert "T1 is 285: taken as missing" in answers.loc[stamp[31], "reason"]
-    assert (answers["state"] == "not judged").equals(answers["index"].isna())
+    assert (answers["state"] == "not evaluated").equals(answers["index"].isna())
     assert after.counts_["n_implausible"] == 2
     for name, reason in (
         ("mean by number", "its window holds fewer than"),
@@ -259,13 +259,13 @@ def test_a_baseline_without_records_is_refused():
         Monitor(MahalanobisDetector(), targets=MODES).fit(BASELINE[:0])
 
 
-def test_too_late_records_are_told_and_not_judged():
+def test_too_late_records_are_told_and_not_evaluated():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[50:80])
     before = monitor.judged_
-    with pytest.warns(UserWarning, match="2 of 2 new records are not judged"):
+    with pytest.warns(UserWarning, match="2 of 2 new records are not evaluated"):
         answers = monitor.update(SERVICE[:2])
-    assert answers["state"].eq("not judged").all()
+    assert answers["state"].eq("not evaluated").all()
     assert answers["reason"].str.contains("came too late, more than 7D after newer records").all()
     early = BASELINE.iloc[[0]].set_axis(BASELINE.index[[0]] + pd.Timedelta("1h"))
     with pytest.warns(UserWarning, match="before the end of the baseline"):
@@ -337,7 +337,7 @@ def test_a_batch_without_records_changes_nothing():
         got = monitor.update(empty)
         assert len(got) == 0
         assert list(got) == [*ANSWER, "revised"]
-    assert monitor.state() == "not judged"
+    assert monitor.state() == "not evaluated"
     assert monitor.last_ == BASELINE.index[-1]
 
 

@@ -71,7 +71,7 @@ def renewed(fitted, records):
     """A monitor with a new baseline three weeks after an intervention, one of whose records comes later."""
     monitor, new = deepcopy(fitted), records["repaired"][YEAR : YEAR + 21]
     quietly(monitor.update, new.drop(new.index[17]))
-    return monitor, quietly(monitor.begin_again, new.index[0])
+    return monitor, quietly(monitor.rebaseline, new.index[0])
 
 
 @pytest.mark.nightly
@@ -209,7 +209,7 @@ def test_a_second_intervention_begins_from_the_first(renewed, records):
     monitor = deepcopy(renewed[0])
     both = joined(make_truss_campaign(2, damage={"diagonal": -0.15, "bottom": -0.2}, random_state=0))
     quietly(monitor.update, both[YEAR + 21 : YEAR + 51])
-    found = quietly(monitor.begin_again, both.index[YEAR + 21])
+    found = quietly(monitor.rebaseline, both.index[YEAR + 21])
     truth = both.mean() / records["repaired"].mean() - 1
     assert (np.abs(found.table["change"] - truth[found.table.index]) < 4 * found.table["standard_error"]).all()
     assert monitor.state() == "healthy"
@@ -219,8 +219,8 @@ def test_a_second_intervention_begins_from_the_first(renewed, records):
 def test_a_new_baseline_needs_every_mode_and_something_before(monitor, records):
     repaired = records["repaired"][YEAR : YEAR + 20].assign(f3=np.nan)
     quietly(monitor.update, repaired)
-    found = quietly(monitor.begin_again, repaired.index[0])
+    found = quietly(monitor.rebaseline, repaired.index[0])
     assert not found.accepted
     assert "f3" in found.reasons[0]
     with pytest.raises(ValueError, match="expected a later time"):
-        monitor.begin_again("2020-01-01")
+        monitor.rebaseline("2020-01-01")

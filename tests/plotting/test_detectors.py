@@ -22,12 +22,12 @@ FOUND = "piers 18 %"
 def results_of(simulated, measured, scenario="healthy", measure="PFA", half=0.02):
     """Rows of a study with one scenario; a rate that is None is not there."""
     rows = []
-    for source, rates in (("data-informed", simulated), ("reference", measured)):
+    for source, rates in (("simulated", simulated), ("reference", measured)):
         for detector, rate in rates.items():
             row = {"detector": detector, "scenario": scenario, "source": source, "measure": measure, "rate": rate}
-            row |= {"n_records": 200, "n_not_judged": 0, "error": ""}
-            if source == "data-informed":
-                row |= {"band_lowest": max(rate - half, 0), "band_highest": min(rate + half, 1)}
+            row |= {"n_records": 200, "n_not_evaluated": 0, "error": ""}
+            if source == "simulated":
+                row |= {"pi_low": max(rate - half, 0), "pi_high": min(rate + half, 1)}
             rows.append(row)
     return pd.DataFrame(rows)
 
@@ -60,9 +60,9 @@ def test_measured_rates_stand_beside_bands_and_are_counted():
     names = rows_named(healthy)
     assert names == ["raw, a", "whitened", "raw, b", "linear"]  # by the damage that they find
     for detector, bar in zip(SIMULATED, display.bars_["healthy"], strict=True):
-        row = HEALTHY[(HEALTHY["detector"] == detector) & (HEALTHY["source"] == "data-informed")].iloc[0]
+        row = HEALTHY[(HEALTHY["detector"] == detector) & (HEALTHY["source"] == "simulated")].iloc[0]
         low, width = bar.get_x(), bar.get_width()
-        np.testing.assert_allclose([low, low + width], 100 * row[["band_lowest", "band_highest"]].astype(float))
+        np.testing.assert_allclose([low, low + width], 100 * row[["pi_low", "pi_high"]].astype(float))
         assert bar.get_y() + bar.get_height() / 2 == pytest.approx(names.index(detector))
     inside, outside = display.marks_["healthy"]
     drawn = {names[int(y)]: x for points in (inside, outside) for x, y in points.get_offsets()}
@@ -78,7 +78,7 @@ def test_measured_rates_stand_beside_bands_and_are_counted():
 @pytest.mark.parametrize(
     ("changed", "n_bands"),
     [
-        ({"band_lowest": np.nan, "band_highest": np.nan}, 0),
+        ({"pi_low": np.nan, "pi_high": np.nan}, 0),
         ({"n_repeats": [20 if source == "reference" else 40 for source in HEALTHY["source"]]}, 0),  # a mean
         ({"n_repeats": [1 if source == "reference" else 40 for source in HEALTHY["source"]]}, 4),
     ],
@@ -102,11 +102,11 @@ def test_groups_are_headings():
 
 def test_failures_and_records_that_are_not_judged_are_told():
     results = pd.concat([BOTH, FAILED], ignore_index=True)
-    results.loc[(results["detector"] == "linear") & (results["source"] == "reference"), "n_not_judged"] = 50
+    results.loc[(results["detector"] == "linear") & (results["source"] == "reference"), "n_not_evaluated"] = 50
     display = DetectorsDisplay.from_predictions(results)
     assert rows_named(display.axes_[0])[-1] == "cointegration"
-    assert texts(display.axes_[0]) == ["20\N{NO-BREAK SPACE}% not judged", "failed: LinAlgError: singular"]
-    assert texts(display.axes_[1]) == ["20\N{NO-BREAK SPACE}% not judged"]
+    assert texts(display.axes_[0]) == ["20\N{NO-BREAK SPACE}% not evaluated", "failed: LinAlgError: singular"]
+    assert texts(display.axes_[1]) == ["20\N{NO-BREAK SPACE}% not evaluated"]
 
 
 def test_a_detector_that_failed_in_one_of_two_studies_is_told_there():
@@ -132,7 +132,7 @@ def test_scenarios_can_be_chosen_and_those_without_measured_records_are_not_draw
     [
         (BOTH.drop(columns="detector"), r"lacks the columns \['detector'\]"),
         (None, "table is None"),
-        (pd.concat([BOTH, HEALTHY]), r"'raw, a' has 2 rows of scenario 'healthy', source 'data-informed'"),
+        (pd.concat([BOTH, HEALTHY]), r"'raw, a' has 2 rows of scenario 'healthy', source 'simulated'"),
     ],
 )
 def test_what_is_no_result_is_named(table, message):
@@ -146,10 +146,10 @@ def test_what_is_no_result_is_named(table, message):
 
 def ranking_of(**rows):
     """A ranking of detectors by their false alarms, found damage, found damage at equal false alarms, and distance."""
-    table = pd.DataFrame(rows, index=["false_alarms", "pod", "pod_equal", "behind"], dtype=float).T
-    for name in ("false_alarms", "pod", "behind"):
-        table[f"{name}_lowest"], table[f"{name}_highest"] = table[name] - 0.01, table[name] + 0.01
-    table["keeps_limit"], table["clearly_behind"] = table["false_alarms"] < 0.03, table["behind_lowest"] > 0
+    table = pd.DataFrame(rows, index=["false_alarms", "pod", "pod_at_equal_pfa", "pod_deficit"], dtype=float).T
+    for name in ("false_alarms", "pod", "pod_deficit"):
+        table[f"{name}_ci_low"], table[f"{name}_ci_high"] = table[name] - 0.01, table[name] + 0.01
+    table["within_limit"], table["significantly_worse"] = table["false_alarms"] < 0.03, table["pod_deficit_ci_low"] > 0
     return table.assign(not_judged=0.0, error="")
 
 
@@ -162,7 +162,9 @@ RANKING = ranking_of(
 
 
 def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
-    failed = pd.DataFrame({"error": "LinAlgError: singular", "keeps_limit": False, "clearly_behind": False}, ["none"])
+    failed = pd.DataFrame(
+        {"error": "LinAlgError: singular", "within_limit": False, "significantly_worse": False}, ["none"]
+    )
     ranking = pd.concat([RANKING, failed])
     ranking.loc["raw", "not_judged"] = 0.25
     display = DetectorsDisplay.from_predictions(ranking)
@@ -172,14 +174,14 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
         *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
     ]
     assert texts(display.axes_[0]) == ["LinAlgError: singular"]
-    assert texts(display.axes_[1]) == ["25\N{NO-BREAK SPACE}% not judged"]
+    assert texts(display.axes_[1]) == ["25\N{NO-BREAK SPACE}% not evaluated"]
     assert limit_of(display) == 2
     heights = [names.index(name) for name in RANKING.index]
-    for name, points in {**display.values_, "pod_equal": display.marks_["pod"][1]}.items():
+    for name, points in {**display.values_, "pod_at_equal_pfa": display.marks_["pod"][1]}.items():
         np.testing.assert_allclose(points.get_offsets(), np.c_[100 * RANKING[name], heights])
     for name, bars in display.bars_.items():
         ends = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
-        np.testing.assert_allclose(ends, 100 * RANKING[[f"{name}_lowest", f"{name}_highest"]])
+        np.testing.assert_allclose(ends, 100 * RANKING[[f"{name}_ci_low", f"{name}_ci_high"]])
     colours = [bar.get_facecolor() for bar in display.bars_["pod"]]
     assert colours[0] == colours[2]
     assert len(set(colours)) == 3
@@ -192,11 +194,13 @@ def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
     display = DetectorsDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
     assert asked == [(0.05, "reference", "pod")]
     assert limit_of(display) == 5
-    bounds = ["behind_lowest", "behind_highest"]
-    display = DetectorsDisplay.from_predictions(RANKING.assign(clearly_behind=False, **dict.fromkeys(bounds, np.nan)))
+    bounds = ["pod_deficit_ci_low", "pod_deficit_ci_high"]
+    display = DetectorsDisplay.from_predictions(
+        RANKING.assign(significantly_worse=False, **dict.fromkeys(bounds, np.nan))
+    )
     assert rows_named(display.axes_[0])[0] == "order not sure: one repeat"
-    with pytest.raises(ValueError, match=r"lacks the columns \['behind'\]"):
-        DetectorsDisplay.from_predictions(RANKING.drop(columns="behind"))
+    with pytest.raises(ValueError, match=r"lacks the columns \['pod_deficit'\]"):
+        DetectorsDisplay.from_predictions(RANKING.drop(columns="pod_deficit"))
 
 
 def made_study():
@@ -209,7 +213,7 @@ def made_study():
     random, rows, decisions = np.random.default_rng(0), [], {}
     for detector in ("raw", "whitened"):
         for number, scenario in enumerate(scenarios):
-            key = (detector, scenario.name, "data-informed")
+            key = (detector, scenario.name, "simulated")
             decisions[key] = (random.normal(size=(3, 20)) + 1 - number).astype("f4")
             row = {"detector": detector, "scenario": scenario.name, "source": key[2], "error": ""}
             rows.append(row | {"measure": "POD" if number else "PFA", "rate": (decisions[key] < 0).mean()})
@@ -230,8 +234,8 @@ def test_labelled_scores_are_of_judged_records_from_the_onset_on():
         given.results_, given.scenarios_, indices=given.indices_, decisions=given.decisions_
     )
     for name in ("raw", "whitened"):
-        study.decisions_[name, "deck", "data-informed"][0, :4] = np.nan
-        healthy, deck, later = (study.decisions_[name, s.name, "data-informed"] for s in given.scenarios)
+        study.decisions_[name, "deck", "simulated"][0, :4] = np.nan
+        healthy, deck, later = (study.decisions_[name, s.name, "simulated"] for s in given.scenarios)
         damaged = np.concatenate([deck.ravel(), later[:, 5:].ravel()])
         is_damaged, scores = study.labelled_scores(name)
         assert (is_damaged.sum(), (~is_damaged).sum()) == (105 - 4, 60)
@@ -254,7 +258,7 @@ def test_damage_indices_of_a_study_have_a_panel_for_each_detector():
     assert [line.get_ydata()[0] for line in display.threshold_lines_] == [2.0, 2.5]
     for name, points in display.points_.items():
         for line, state in zip(points, ["healthy", "deck"], strict=True):
-            np.testing.assert_array_equal(line.get_ydata(), study.indices_[name, state, "data-informed"])
+            np.testing.assert_array_equal(line.get_ydata(), study.indices_[name, state, "simulated"])
     assert "unsquared" in display.axes_[0].get_ylabel()
     study.detectors_["raw"] = IsolationForest()
     assert "unsquared" not in DamageIndexDisplay.from_study(study).axes_[0].get_ylabel()

@@ -1,4 +1,4 @@
-"""Axes that outliers do not stretch, marks that count them, and records that are not judged."""
+"""Axes that outliers do not stretch, marks that count them, and records that are not evaluated."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -59,11 +59,11 @@ def test_records_without_an_index_are_grey_ticks_with_their_number(index):
     index.iloc[[3, 4, 5, 300]] = np.nan
     panels = {"first": {"healthy": index}, "second": {"healthy": index, "damaged": index[:3]}}
     display = DamageIndexDisplay.from_predictions(panels, THRESHOLD)
-    assert [texts(ax) for ax in display.axes_] == [["4 not judged"], ["healthy: 4 not judged"]]
-    (ticks,) = (line for line in display.ax_.lines if line.get_gid() == "not judged")
+    assert [texts(ax) for ax in display.axes_] == [["4 not evaluated"], ["healthy: 4 not evaluated"]]
+    (ticks,) = (line for line in display.ax_.lines if line.get_gid() == "not evaluated")
     np.testing.assert_array_equal(ticks.get_xdata(), index.index[[3, 4, 5, 300]])
     assert ticks.get_color() == "#555555"
-    assert texts(DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD).ax_) == ["365 not judged"]
+    assert texts(DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD).ax_) == ["365 not evaluated"]
 
 
 def test_one_legend_names_the_labels_of_all_panels_which_keep_their_colours(index):

@@ -27,10 +27,10 @@ def test_days_without_a_judged_record_are_ticks_and_counted():
     monitor = FakeMonitor(freq="12h", n_days=80, n_unjudged=6)
     monitor.days_ = monitor.days_.drop(monitor.days_.index[10:14])  # four days without any record
     display = MonitorDisplay.from_estimator(monitor)
-    (ticks,) = [line for line in display.ax_.lines if line.get_gid() == "not judged"]
+    (ticks,) = [line for line in display.ax_.lines if line.get_gid() == "not evaluated"]
     assert len(ticks.get_xdata()) == 3 + 4
-    assert "7 days not judged" in [text.get_text() for text in display.ax_.texts]
-    assert drawn_rows(display) == monitor.days_["n_judged"].gt(0).sum()
+    assert "7 days not evaluated" in [text.get_text() for text in display.ax_.texts]
+    assert drawn_rows(display) == monitor.days_["n_evaluated"].gt(0).sum()
     assert display.threshold_line_.get_ydata()[0] == monitor.threshold_
 
 

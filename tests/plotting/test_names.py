@@ -28,13 +28,13 @@ RATES = pd.DataFrame(
     [
         [name, HOSTILE, source, measure, 0.5, 0.4, 0.6]
         for name, measure in ((HOSTILE, "POD"), (LONG, "POD"))
-        for source in ("data-informed", "reference")
+        for source in ("simulated", "reference")
     ],
-    columns=["detector", "scenario", "source", "measure", "rate", "band_lowest", "band_highest"],
+    columns=["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"],
 )
-SHARES = ["false_alarms", "pod", "behind"]
-RANKED = pd.DataFrame(0.5, [HOSTILE, LONG], [*SHARES, *(f"{n}_{end}" for n in SHARES for end in ("lowest", "highest"))])
-RANKED = RANKED.assign(pod_equal=0.5, keeps_limit=True, clearly_behind=False, not_judged=0.1, error="")
+SHARES = ["false_alarms", "pod", "pod_deficit"]
+RANKED = pd.DataFrame(0.5, [HOSTILE, LONG], [*SHARES, *(f"{n}_{end}" for n in SHARES for end in ("ci_low", "ci_high"))])
+RANKED = RANKED.assign(pod_at_equal_pfa=0.5, within_limit=True, significantly_worse=False, not_judged=0.1, error="")
 RANKED.loc[LONG, ["false_alarms", "error"]] = np.nan, HOSTILE
 
 

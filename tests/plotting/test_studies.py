@@ -141,7 +141,7 @@ def given(n_groups=3, **changed):
     groups = ["deck", "piers", "soil", *(f"E_{number}" for number in range(4, n_groups + 1))][:n_groups]
     first = [0.3, 0.05, 0.02, 0.1, 0.16, 0.18]
     values = np.vstack([first, *[[0.8, 0.2, 0.15, 0.25, 0.2, 0.25]] * (n_groups - 1)])
-    columns = ["probability", "severity", "lowest", "highest", "if_damaged", "highest_if_damaged"]
+    columns = ["probability", "severity", "ci_low", "ci_high", "if_damaged", "highest_if_damaged"]
     labels = ["piers 20 %", "deck 4 %, piers 12 %", "soil 8 %", "deck 5 %", "piers 3 %, soil 2 %", "no damage"]
     frames = {
         "told": pd.DataFrame({"probability": [0.5, 0.2, 0.1, 0.08, 0.06, 0.05]}, labels),

@@ -27,7 +27,7 @@ class FakeFleet:
             if monitor is not None
             for number in monitor.events_.index[monitor.events_["kind"] == "damage"]
         ]
-        table = pd.DataFrame(rows, columns=["bridge", "event", "is_called"]).astype({"is_called": bool})
+        table = pd.DataFrame(rows, columns=["bridge", "event", "is_discovery"]).astype({"is_discovery": bool})
         table["p_value"] = np.linspace(0, 1, len(table))
         p_values = pd.Series(1.0, list(self.monitors))
         return Discoveries(share, table, p_values, [], 0.5, float(len(self.monitors)))

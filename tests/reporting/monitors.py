@@ -25,7 +25,7 @@ def event_row(start, end, kind="damage", modes="f1", acknowledged=False, harmles
 
 
 class FakeMonitor:
-    """Records of 2025 to its July, or of so many days; the last ones not judged (None: all)."""
+    """Records of 2025 to its July, or of so many days; the last ones not evaluated (None: all)."""
 
     def __init__(
         self,
@@ -51,25 +51,25 @@ class FakeMonitor:
         index = 1 + np.abs(np.sin(np.arange(len(stamps))))
         index[len(index) - n_unjudged if n_unjudged is not None else 0 :] = np.nan
         known = ~np.isnan(index)
-        judged = {"state": np.where(known, "healthy", "not judged"), "index": index, "threshold": 3.0}
+        judged = {"state": np.where(known, "healthy", "not evaluated"), "index": index, "threshold": 3.0}
         judged = pd.DataFrame(judged, stamps).assign(reason=np.where(known, "", reason), modes="", event=0)
         columns = ["kind", "start", "end", "peak", "peak_time", "modes", "n_alarms", "acknowledged", "harmless", "note"]
         self.events_ = pd.DataFrame(list(events), range(1, len(events) + 1), columns)
         for name in ("start", "end", "peak_time"):
             self.events_[name] = pd.to_datetime(self.events_[name]).dt.tz_localize(zone)
         groups = pd.Series(index, stamps.normalize()).groupby(level=0)
-        self.days_ = pd.DataFrame({"n_records": groups.size(), "n_judged": groups.count(), "n_alarms": 0})
+        self.days_ = pd.DataFrame({"n_records": groups.size(), "n_evaluated": groups.count(), "n_alarms": 0})
         self.days_ = self.days_.assign(index_median=groups.median(), index_max=groups.max())
         for group in () if drift is None else drift.index:
             self.days_[f"drift {group}"] = np.linspace(0, drift["change"][group], len(self.days_))
         self.judged_ = judged[judged.index > stamps[-1] - pd.Timedelta("400D")]
         self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
-        self.targets_, self.threshold_, self.release_ = ["f1", "f2"], 3.0, 2.0
+        self.targets_, self.threshold_, self.clear_threshold_ = ["f1", "f2"], 3.0, 2.0
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
         self.trained_, self.since_ = self.baseline_, None
-        self.counts_ = {"n_records": len(stamps), "n_not_judged": int((~known).sum()), "n_repeated": 2}
+        self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}
         rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
-        self.promise_ = SimpleNamespace(
+        self.false_alarm_estimate_ = SimpleNamespace(
             rule=rule, expected=false_alarms_per_year, lowest=0, highest=3, n_years=2.0, method="by hand", unseen=""
         )
         self.detector_ = SimpleNamespace()

@@ -62,7 +62,7 @@ def test_the_rest_is_that_of_a_study_with_this_detector_alone(study):
     )
     alone.run(fitted_chain()[1])
     one = choice.only()
-    columns = ["scenario", "source", "rate", "lowest", "highest"]
+    columns = ["scenario", "source", "rate", "ci_low", "ci_high"]
     assert one.results_[columns].equals(alone.results_[columns])
     assert one.detector_name() == LOUD
     assert {key[0] for key in one.indices_} == {LOUD}
@@ -71,7 +71,7 @@ def test_the_rest_is_that_of_a_study_with_this_detector_alone(study):
 
 def test_none_is_recommended_if_none_keeps_the_limit(study):
     ranking = study.ranking(0.1)
-    ranking["keeps_limit"] = False
+    ranking["within_limit"] = False
     text = Choice(study, ranking, 0.1, ranking.index[0]).sentence()
     assert text.startswith("None keeps the limit of 10\N{NO-BREAK SPACE}% false alarms")
 

@@ -108,12 +108,12 @@ def test_every_bridge_has_a_page_that_links_back(page, file, fleet):
 
 def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
     assert "2 of 13 bridges are in alarm" in page.text
-    counts = "2 in alarm; 1 without an alarm, but with much stiffness lost slowly; 4 not judged by the monitor"
+    counts = "2 in alarm; 1 without an alarm, but with much stiffness lost slowly; 4 not evaluated by the monitor"
     assert f"Of 13\xa0bridges: {counts}; 1 that could not be fitted; 1 without a monitor; 4 healthy." in page.text
     assert "Nothing is known of 6\xa0bridges" in page.text
     for name in ("broken_file", "silent", "blind", "not_updated", "failed", "only_fitted"):
         text = (file.parent / "all of #1_pages" / f"{name}.html").read_text(encoding="utf-8")
-        assert '"state not-judged"' in text
+        assert '"state not-evaluated"' in text
         assert "Healthy" not in Page(text).paragraphs[2]
 
 
@@ -144,8 +144,8 @@ def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
 def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
     with pytest.raises(ValueError, match="detector given for a FakeFleet; expected only for a DetectabilityStudy"):
         owner_report(fleet, tmp_path / "a.html", detector="x")
-    with pytest.raises(ValueError, match="false_share is 2; expected a share"):
-        owner_report(fleet, tmp_path / "a.html", false_share=2)
+    with pytest.raises(ValueError, match="fdr is 2; expected a share"):
+        owner_report(fleet, tmp_path / "a.html", fdr=2)
     with pytest.raises(ValueError, match="now is 'soon'; expected a time"):
         owner_report(fleet, tmp_path / "a.html", now="soon")
     assert not list(tmp_path.iterdir())

@@ -112,7 +112,7 @@ def test_names_of_data_are_text_and_nothing_else(page, study, file):
 
 
 def test_the_page_says_what_the_table_says(page, study):
-    limits = study.minimum_detectable_damage()["mdd"].xs("data-informed", level="source")
+    limits = study.minimum_detectable_damage()["mdd"].xs("simulated", level="source")
     for family, limit in limits.items():
         said = f"damage of {100 * limit:g}\xa0% or more is found" if limit > 0 else "no tested damage is found reliably"
         assert f"{family}: {said}" in page.text
@@ -245,7 +245,7 @@ def test_records_that_cannot_be_judged_are_counted_and_not_called_healthy(chain,
     n_states = len(study.results_)
     assert f"could not judge {30 * n_states:,} of {120 * n_states:,}\xa0records of the first simulation" in text
     assert "These count neither as healthy nor as alarms" in text
-    assert Page(found_and_missed(partly, [])).text.count("(25\xa0% not judged)") == n_states
+    assert Page(found_and_missed(partly, [])).text.count("(25\xa0% not evaluated)") == n_states
 
 
 @pytest.mark.parametrize("number", [0, 1], ids=["light", "dark"])
@@ -296,10 +296,10 @@ def test_what_does_not_fit_is_named(study, tmp_path, place, options, message):
 
 
 def test_it_leads_with_how_soon_damage_is_found(study, page):
-    waits, told = study.time_to_find(), study.time_to_find(smallest=True)
+    waits, told = study.time_to_detection(), study.time_to_detection(smallest=True)
     assert page.text.index("How soon damage is found") < page.text.index("False alarms")
     for text in told["text"]:
         assert text in page.text
     for _, row in waits.iterrows():
-        assert f"{share_text(row['7D'])} ({bounds_text(row['7D lowest'], row['7D highest'])})" in page.cells
+        assert f"{share_text(row['7D'])} ({bounds_text(row['7D ci_low'], row['7D ci_high'])})" in page.cells
     assert "Alarm within a week" in page.heads

@@ -48,11 +48,11 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
         "severity": severities,
         "measure": "POD",
         "rate": rates,
-        "lowest": np.clip(rates - error, 0, 1),
-        "highest": np.clip(rates + error, 0, 1),
+        "ci_low": np.clip(rates - error, 0, 1),
+        "ci_high": np.clip(rates + error, 0, 1),
         "n_effective": n_records,
     }
-    healthy = common | {"measure": "PFA", "rate": false_alarms, "highest": false_alarms + 0.01}
+    healthy = common | {"measure": "PFA", "rate": false_alarms, "ci_high": false_alarms + 0.01}
     study = DetectabilityStudy(None, None, [])
     study.findings_ = StudyFindings(pd.concat([pd.DataFrame([healthy]), pd.DataFrame(rows)], ignore_index=True))
     return findings_of(study)

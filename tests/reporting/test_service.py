@@ -90,7 +90,7 @@ def test_it_says_what_the_real_monitor_says(page, real):
     start = event["start"]
     assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"
     assert f"modes that drive it: {event['modes']}." in page.text
-    assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not judged." in page.text
+    assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not evaluated." in page.text
     assert f"There was no record on 4 of 80{SPACE}days." in page.text
     assert "Slow drift is not followed" in page.text
     numbers = [head for head in page.heads if head.isdigit()]
@@ -100,8 +100,8 @@ def test_it_says_what_the_real_monitor_says(page, real):
 def test_a_monitor_that_has_judged_nothing_is_not_called_healthy(real, tmp_path):
     file = owner_report(real[1], tmp_path / "a.html", now=real[1].last_)
     page = Page(file.read_text(encoding="utf-8"))
-    assert state_of(page) == "not-judged"
-    assert "Not judged: no record since the baseline" in page.text
+    assert state_of(page) == "not-evaluated"
+    assert "Not evaluated: no record since the baseline" in page.text
     assert "Check the data logger" in page.text
     assert not page.all("img")
 
@@ -109,7 +109,7 @@ def test_a_monitor_that_has_judged_nothing_is_not_called_healthy(real, tmp_path)
 def test_healthy_only_as_long_as_records_come():
     monitor = FakeMonitor()
     last = monitor.last_
-    for wait, state in {"1h": "healthy", "2D": "healthy", "73h": "not-judged", "40D": "not-judged"}.items():
+    for wait, state in {"1h": "healthy", "2D": "healthy", "73h": "not-evaluated", "40D": "not-evaluated"}.items():
         page = today_of(monitor, last + pd.Timedelta(wait))
         assert state_of(page) == state
         assert ("Healthy" in headline(page)) == (state == "healthy")
@@ -117,7 +117,7 @@ def test_healthy_only_as_long_as_records_come():
     assert "the newest is 40 days old" in page.text
     hourly = FakeMonitor(freq="1h")
     states = [state_of(today_of(hourly, hourly.last_ + pd.Timedelta(h, "h"))) for h in (48, 50)]
-    assert states == ["healthy", "not-judged"]
+    assert states == ["healthy", "not-evaluated"]
 
 
 def test_an_alarm_stays_one_without_records_and_says_so():
@@ -133,13 +133,13 @@ def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
     reason = f"all of {QUOTED} are missing"
     monitor = FakeMonitor(n_unjudged=n_unjudged, reason=reason)
     page = today_of(monitor)
-    assert state_of(page) == "not-judged"
+    assert state_of(page) == "not-evaluated"
     since = monitor.judged_.index[-n_unjudged if n_unjudged else 0]
-    assert headline(page) == f"Not judged since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    assert headline(page) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
     assert f"Because: {reason}." in page.text
-    number = int(monitor.counts_["n_not_judged"])
+    number = int(monitor.counts_["n_not_evaluated"])
     page = Page(unjudged(standing_of(monitor)))
-    assert f"{number:,} ({share_text(number / 180)}) were not judged" in page.text
+    assert f"{number:,} ({share_text(number / 180)}) were not evaluated" in page.text
     assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
     assert page.cells == [str(number), "2"]
 
@@ -227,10 +227,12 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
     monitor = FakeMonitor(n_days=900, n_unjudged=500)
     since = monitor.days_.index[400]
     assert since < monitor.judged_.index[0]
-    assert headline(today_of(monitor)) == f"Not judged since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    assert (
+        headline(today_of(monitor)) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
+    )
     n_kept = len(monitor.judged_)
     text = Page(unjudged(standing_of(monitor))).text
-    assert f"Why {500 - n_kept} of them, which are older, were not judged is no longer kept." in text
+    assert f"Why {500 - n_kept} of them, which are older, were not evaluated is no longer kept." in text
 
 
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
@@ -275,7 +277,7 @@ def test_time_zones_and_the_clock():
         today_of(FakeMonitor(), utc)
     early = FakeMonitor()
     page = today_of(early, early.last_ - pd.Timedelta("3D"))
-    assert state_of(page) == "not-judged"  # records of a time to come
+    assert state_of(page) == "not-evaluated"  # records of a time to come
     assert "the dates of the records are wrong" in page.text
 
 

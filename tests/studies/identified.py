@@ -33,7 +33,7 @@ def identified(explanations, *, groups=None, kinds=None, alike=(), shifts=None, 
             draws[cause][here] = np.abs(random.normal(severity, error, count)) * np.sign(severity)
             holds[cause][here] = True
     estimates = pd.DataFrame.from_dict(
-        rows, orient="index", columns=["severity", "standard_error", "lowest", "highest"]
+        rows, orient="index", columns=["severity", "standard_error", "ci_low", "ci_high"]
     )
     estimates.index = (
         pd.MultiIndex.from_tuples(rows, names=["explanation", "cause"]) if rows else pd.MultiIndex.from_arrays([[], []])
@@ -43,8 +43,8 @@ def identified(explanations, *, groups=None, kinds=None, alike=(), shifts=None, 
             "probability": [holds[cause].mean() for cause in causes],
             "severity": [draws[cause].mean() for cause in causes],
             "standard_error": [draws[cause].std() for cause in causes],
-            "lowest": [np.quantile(draws[cause], 0.05) for cause in causes],
-            "highest": [np.quantile(draws[cause], 0.95) for cause in causes],
+            "ci_low": [np.quantile(draws[cause], 0.05) for cause in causes],
+            "ci_high": [np.quantile(draws[cause], 0.95) for cause in causes],
             "if_damaged": [draws[cause][holds[cause]].mean() if holds[cause].any() else np.nan for cause in causes],
             "highest_if_damaged": [
                 np.quantile(draws[cause][holds[cause]], 0.95) if holds[cause].any() else 0.031 for cause in causes
@@ -84,7 +84,7 @@ def identified(explanations, *, groups=None, kinds=None, alike=(), shifts=None, 
         "rest": max(1 - probabilities.sum(), 0.0),
         "most_probable": (),
         "probability_of_damage": 1 - explanations.get("no damage", (0.0,))[0],
-        "probability_of_else": sum(p for name, (p, _) in explanations.items() if name.endswith("something else")),
+        "probability_other": sum(p for name, (p, _) in explanations.items() if name.endswith("something else")),
         "similarity": similarity,
         "confused": [tuple(members) for members in alike],
         "unseen": [],

@@ -46,7 +46,7 @@ def study(fem):
 
 def test_a_detector_that_finds_far_less_in_truth_ranks_below(study):
     simulated, true = study.ranking(), study.ranking(source="reference")
-    kept = true.index[true["keeps_limit"]]
+    kept = true.index[true["within_limit"]]
     clear = [(one, other) for one, other in combinations(kept, 2) if true["pod"][one] - true["pod"][other] > 0.05]
     assert ("neighbours", "raw") in clear
     order = simulated.index.tolist()
@@ -57,5 +57,5 @@ def test_a_detector_that_keeps_no_limit_in_truth_is_not_chosen_for_what_it_finds
     simulated, true = study.ranking(), study.ranking(source="reference")
     assert simulated["pod"].idxmax() == true["pod"].idxmax() == "in-sample"
     for table in (simulated, true):
-        assert not table.loc["in-sample", "keeps_limit"]
+        assert not table.loc["in-sample", "within_limit"]
         assert table.index[-1] == "in-sample"

@@ -193,7 +193,7 @@ def test_more_false_alarms_do_not_pay(task):
     search = GridSearchCV(detector, grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
     assert search.best_params_ == {"mahalanobisdetector__contamination": 0.02}
     loud = task.confirm(detector.set_params(mahalanobisdetector__contamination=0.1), OTHER, random_state=0)
-    assert not loud["keeps_limit"].item()
+    assert not loud["within_limit"].item()
 
 
 def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
@@ -299,8 +299,8 @@ def test_confirmation_judges_fresh_noise_and_weather(fem):
     assert tuned["fresh"] == pytest.approx(np.mean([np.mean(np.array(each) < limit) for each in decisions.values()]))
     assert tuned["false_alarms"] == pytest.approx((known < 0).mean())
     assert tuned["not_judged"] == pytest.approx(np.isnan(healthy).mean())
-    assert tuned["fresh_lowest"] < tuned["fresh"] < tuned["fresh_highest"]
-    assert tuned["keeps_limit"] == (tuned["false_alarms_lowest"] <= 0.02)
+    assert tuned["fresh_ci_low"] < tuned["fresh"] < tuned["fresh_ci_high"]
+    assert tuned["within_limit"] == (tuned["false_alarms_ci_low"] <= 0.02)
     single = task.confirm(WindowedAlarm(1), OTHER, random_state=3)
     pd.testing.assert_series_equal(single.loc["WindowedAlarm"], table.loc["single"], check_names=False)
 

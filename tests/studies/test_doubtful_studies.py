@@ -6,7 +6,7 @@ from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
-from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
+from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
 from skthermo.studies.detectability._judged import band_of
 
 YEAR = make_truss_campaign(random_state=0)
@@ -32,7 +32,7 @@ def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expecte
 
 def test_one_repeat_has_no_band(fem):
     results = study(fem, [Scenario("healthy")], n_repeats=1).run(WEATHER)
-    assert results[["band_lowest", "band_highest"]].isna().all(axis=None)
+    assert results[["pi_low", "pi_high"]].isna().all(axis=None)
 
 
 def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
@@ -50,11 +50,11 @@ def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     assert [both.is_undetected(family) for family in ("bottom", "vertical")] == [False, True]
     with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase.*as rare as for the healthy"):
         curve = both.minimum_detectable_damage(method="curve")
-    assert 0.1 < curve.loc[("bottom", "data-informed"), "mdd"] < 0.3
-    unknown = curve.loc[("vertical", "data-informed")]
-    assert (np.isnan(unknown["mdd"]), unknown["lowest"], np.isnan(unknown["highest"])) == (True, 0.002, True)
+    assert 0.1 < curve.loc[("bottom", "simulated"), "mdd"] < 0.3
+    unknown = curve.loc[("vertical", "simulated")]
+    assert (np.isnan(unknown["mdd"]), unknown["ci_low"], np.isnan(unknown["ci_high"])) == (True, 0.002, True)
     with pytest.warns(UserWarning, match=r"families \['vertical'\] have candidates without a gain"):
-        table = what_to_add(both, WEATHER, modes=[], baseline_factors=(2,))
+        table = compare_extensions(both, WEATHER, modes=[], baseline_factors=(2,))
     assert np.isfinite(table.set_index("family")["gain"]["bottom"])
 
 
@@ -117,6 +117,6 @@ def test_strengthening_is_compared_by_its_magnitude(fem):
     stronger = study(fem, sweep(fem, (-0.1, -0.2, -0.3), ["bottom"]))
     stronger.run(WEATHER)
     found = stronger.minimum_detectable_damage(method="curve")["mdd"].iloc[0]
-    table = what_to_add(stronger, WEATHER, modes=[], baseline_factors=(2,))
+    table = compare_extensions(stronger, WEATHER, modes=[], baseline_factors=(2,))
     assert -0.3 < found < -0.1
     assert table["mdd_now"][0] == pytest.approx(-found, abs=0.05)

@@ -227,7 +227,7 @@ def test_known_standard_error_of_a_single_group(fem):
     assert found.table.loc["top", "error_alone"] == pytest.approx(two_errors * deviation / slope_at(0.0), rel=0.01)
     assert found.table.loc["top", "standard_error"] == pytest.approx(deviation / slope_at(0.2), rel=0.05)
     assert found.table.loc["top", "if_damaged"] == pytest.approx(0.2, abs=2e-3)
-    width = found.table.loc["top", "highest"] - found.table.loc["top", "lowest"]
+    width = found.table.loc["top", "ci_high"] - found.table.loc["top", "ci_low"]
     assert width == pytest.approx(2 * norm.isf(0.05) * found.table.loc["top", "standard_error"], rel=0.1)
 
 

@@ -187,7 +187,7 @@ def test_draws_follow_the_law_of_the_amounts(problem):
     assert one.draws.std() == pytest.approx(law.std(), rel=0.15)
     table = posterior.table(["a", "b", "c"])
     assert table["probability"].sum() == pytest.approx(1)
-    assert (table["lowest"] <= table["severity"]).all()
+    assert (table["ci_low"] <= table["severity"]).all()
     drawn = posterior.drawn(["a", "b", "c"], 2000, np.random.RandomState(0))
     np.testing.assert_allclose((drawn > 0).mean(axis=0), table["probability"], atol=0.04)
 

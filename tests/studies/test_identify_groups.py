@@ -106,7 +106,7 @@ def test_shifts_that_no_group_makes_are_something_else(fem):
     for change in (1.05, [1, 1, 1, 1.03, 1, 1]):
         found = identify_damage(fem, WEATHER, simulated(fem, WEATHER) * change, GROUPS, random_state=0)
         assert found.most_probable == ("something else",)
-        assert found.probability_of_else > 0.9
+        assert found.probability_other > 0.9
         assert found.probability_of_damage > 0.99
         assert found.damage == {}
         assert found.p_value < 0.01
@@ -122,7 +122,7 @@ def test_damage_beside_something_else_is_still_found(fem):
     assert found.estimates.loc[("top + something else", "top"), "severity"] == pytest.approx(0.4, abs=0.05)
     without = DamagePrior(something_else=0)
     forced = identify_damage(fem, WEATHER, F, GROUPS, prior=without, random_state=0)
-    assert forced.probability_of_else == 0
+    assert forced.probability_other == 0
     assert forced.misfit_p_value < found.misfit_p_value
 
 
@@ -132,7 +132,7 @@ def test_a_severity_at_its_bound(fem):
     F = simulated(fem, WEATHER, {"diagonal": 0.98})
     found = identify_damage(fem, WEATHER, F, "diagonal", noise=0.05, random_state=0)
     assert 0.9 < found.severities["diagonal"] <= 0.95
-    assert found.table.loc["diagonal", "highest"] == pytest.approx(0.95)
+    assert found.table.loc["diagonal", "ci_high"] == pytest.approx(0.95)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

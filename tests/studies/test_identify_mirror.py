@@ -38,5 +38,5 @@ def test_mirror_images_are_named_and_share_the_probability():
     assert 0.3 < alone["pier_2"] / alone["pier_1"] < 3
     assert (found.table.loc[["pier_1", "pier_2"], "standard_error"] > 0.05).all()
     assert found.estimates.loc[("pier_2", "pier_2"), "severity"] == pytest.approx(0.2, abs=0.02)
-    assert (found.table["lowest"] == 0).all()
-    assert found.table.loc["pier_2", "highest"] > 0.18
+    assert (found.table["ci_low"] == 0).all()
+    assert found.table.loc["pier_2", "ci_high"] > 0.18

@@ -36,7 +36,7 @@ def later():
 def test_models_like_the_chains_own_change_nothing_and_jobs_neither(fem, later):
     alone = identify_damage(fem, *later, GROUPS, random_state=0).table
     same = identify_damage(fem, *later, GROUPS, models=[TRUSS, TRUSS], random_state=0).table
-    columns = ["probability", "severity", "standard_error", "lowest", "highest"]
+    columns = ["probability", "severity", "standard_error", "ci_low", "ci_high"]
     np.testing.assert_allclose(same[columns], alone[columns], atol=0.006)
     with parallel_config("threading"):
         again = identify_damage(fem, *later, GROUPS, models=[TRUSS, TRUSS], n_jobs=2, random_state=0).table
@@ -52,8 +52,8 @@ def test_severities_are_averages_over_models_and_bands_hold_what_each_says(fem, 
     average = both.table.loc["diagonal"]
     assert one["severity"] > 1.2 * other["severity"]
     assert average["severity"] == pytest.approx((one["severity"] + other["severity"]) / 2, rel=0.03)
-    assert average["highest"] == pytest.approx(one["highest"], rel=0.05)
-    assert average["lowest"] == pytest.approx(other["lowest"], rel=0.05)
+    assert average["ci_high"] == pytest.approx(one["ci_high"], rel=0.05)
+    assert average["ci_low"] == pytest.approx(other["ci_low"], rel=0.05)
     assert average["standard_error"] > 1.5 * max(one["standard_error"], other["standard_error"])
 
 

@@ -165,8 +165,8 @@ def test_shapes_find_what_frequencies_hardly_show(fem, later):
     found = identify_damage(fem, *records, shapes=shapes, dofs=DOFS, shape_noise="fitted", random_state=0)
     assert found.most_probable == ("vertical",)
     assert found.table.loc["vertical", "probability"] > max(0.95, without.table.loc["vertical", "probability"])
-    bands = [table.loc["vertical", ["lowest", "highest"]] for table in (found.table, without.table)]
-    assert bands[0]["lowest"] < 0.3 < bands[0]["highest"]
+    bands = [table.loc["vertical", ["ci_low", "ci_high"]] for table in (found.table, without.table)]
+    assert bands[0]["ci_low"] < 0.3 < bands[0]["ci_high"]
     assert np.diff(bands[0]) < 0.5 * np.diff(bands[1])
     precision = found.precision
     np.testing.assert_allclose(precision["together_without_shapes"], without.precision["together"], rtol=1e-9)

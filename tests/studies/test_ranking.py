@@ -19,7 +19,7 @@ from skthermo.studies.detectability._ranking import rank
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures
 MODES = list(YEAR.frequencies)
-SIMULATED = "data-informed"
+SIMULATED = "simulated"
 
 
 class Dice(OutlierMixin, BaseEstimator):
@@ -78,11 +78,11 @@ def damaged(study, name):
 
 def test_best_first_then_those_with_too_many_false_alarms_then_failures(table):
     assert table.index.tolist() == ["lines", "raw", "twin", "dice", "loud", "broken"]
-    assert table["keeps_limit"].tolist() == [True] * 4 + [False] * 2
-    assert table.loc["loud", "false_alarms_lowest"] > 0.02
+    assert table["within_limit"].tolist() == [True] * 4 + [False] * 2
+    assert table.loc["loud", "false_alarms_ci_low"] > 0.02
     assert table["error"].tolist() == [""] * 5 + ["OSError: no dice"]
-    assert table.loc["broken"].drop(["keeps_limit", "clearly_behind", "error"]).isna().all()
-    assert table["keeps_limit"].dtype == table["clearly_behind"].dtype == bool
+    assert table.loc["broken"].drop(["within_limit", "significantly_worse", "error"]).isna().all()
+    assert table["within_limit"].dtype == table["significantly_worse"].dtype == bool
     ranked = table["pod"][:4]
     assert ranked.is_monotonic_decreasing
     assert table.loc["loud", "pod"] > table.loc["raw", "pod"]
@@ -93,8 +93,8 @@ def test_rates_are_means_of_those_of_the_results(study, table):
     for name, row in table.drop(index="broken").iterrows():
         rates = results.loc[name]
         np.testing.assert_array_equal(
-            row[["false_alarms", "false_alarms_lowest", "false_alarms_highest"]].astype(float),
-            rates.loc["healthy", ["rate", "lowest", "highest"]].astype(float),
+            row[["false_alarms", "false_alarms_ci_low", "false_alarms_ci_high"]].astype(float),
+            rates.loc["healthy", ["rate", "ci_low", "ci_high"]].astype(float),
         )
         assert row["pod"] == pytest.approx(rates["rate"].iloc[1:].mean())
         assert row["pod bottom"] == pytest.approx(rates["rate"].iloc[1:3].mean())
@@ -111,7 +111,7 @@ def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study,
         n_tied = (calibration == threshold).sum()  # resampled noise repeats some records
         assert 0 <= int(0.02 * calibration.size) - (calibration < threshold).sum() < n_tied
         pod = np.mean([(decisions < threshold).mean() for decisions in damaged(study, name)])
-        assert table.loc[name, "pod_equal"] == pytest.approx(pod)
+        assert table.loc[name, "pod_at_equal_pfa"] == pytest.approx(pod)
 
 
 @pytest.mark.nightly
@@ -133,20 +133,20 @@ def test_differences_of_the_rates_have_t_intervals_over_the_repeats(study, table
         confidence = 1 - 0.05 / 4  # Bonferroni, four comparisons with the best
         difference = shares["lines"] - shares[name]
         lowest, highest = ttest_1samp(difference, 0).confidence_interval(confidence)
-        assert table.loc[name, "behind"] == pytest.approx(difference.mean())
+        assert table.loc[name, "pod_deficit"] == pytest.approx(difference.mean())
         np.testing.assert_allclose(
-            table.loc[name, ["behind_lowest", "behind_highest"]].astype(float), [lowest, highest], atol=1e-9
+            table.loc[name, ["pod_deficit_ci_low", "pod_deficit_ci_high"]].astype(float), [lowest, highest], atol=1e-9
         )
-        assert table.loc[name, "clearly_behind"] == (lowest > 0)
-    assert table.loc["lines", ["behind", "behind_lowest", "behind_highest"]].tolist() == [0, 0, 0]
+        assert table.loc[name, "significantly_worse"] == (lowest > 0)
+    assert table.loc["lines", ["pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high"]].tolist() == [0, 0, 0]
 
 
 def test_equal_detectors_tie(study):
-    for by in ("pod", "pod_equal"):
+    for by in ("pod", "pod_at_equal_pfa"):
         table = study.ranking(by=by).drop(index=["lines", "loud"])
-        columns = [name for name in table if not name.startswith("behind")]
+        columns = [name for name in table if not name.startswith("pod_deficit")]
         assert table.loc["raw", columns].tolist() == table.loc["twin", columns].tolist()
-        assert table.loc["raw", "behind"] == table.loc["twin", "behind"]
+        assert table.loc["raw", "pod_deficit"] == table.loc["twin", "pod_deficit"]
     pair = DetectabilityStudy(
         study.fem,
         {"b": MahalanobisDetector(), "a": MahalanobisDetector()},
@@ -158,15 +158,19 @@ def test_equal_detectors_tie(study):
     pair.run(WEATHER)
     table = pair.ranking()
     assert table.index.tolist() == ["a", "b"]
-    assert (table[["behind", "behind_lowest", "behind_highest"]] == 0).all(axis=None)
-    assert not table["clearly_behind"].any()
+    assert (table[["pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high"]] == 0).all(axis=None)
+    assert not table["significantly_worse"].any()
 
 
 def test_by_moved_thresholds_a_detector_that_is_loud_by_its_threshold_alone_is_not_behind(study):
-    table = study.ranking(by="pod_equal")
-    assert table.loc["loud", "pod_equal"] == pytest.approx(table.loc["raw", "pod_equal"], abs=0.01)
-    assert table.loc["lines", "behind"] == 0
-    assert table.loc["raw", "behind_lowest"] < table.loc["raw", "behind"] < table.loc["raw", "behind_highest"]
+    table = study.ranking(by="pod_at_equal_pfa")
+    assert table.loc["loud", "pod_at_equal_pfa"] == pytest.approx(table.loc["raw", "pod_at_equal_pfa"], abs=0.01)
+    assert table.loc["lines", "pod_deficit"] == 0
+    assert (
+        table.loc["raw", "pod_deficit_ci_low"]
+        < table.loc["raw", "pod_deficit"]
+        < table.loc["raw", "pod_deficit_ci_high"]
+    )
 
 
 def test_bounds_at_equal_false_alarms_hold_the_error_of_the_moved_thresholds(study):
@@ -175,12 +179,14 @@ def test_bounds_at_equal_false_alarms_hold_the_error_of_the_moved_thresholds(stu
         threshold = calibration[int(0.02 * calibration.size)]
         return np.mean([(decisions[kept] < threshold).mean() for decisions in damaged(study, name)])
 
-    table, repeats = study.ranking(by="pod_equal"), np.arange(8)
+    table, repeats = study.ranking(by="pod_at_equal_pfa"), np.arange(8)
     for name in ("raw", "dice"):
         without = np.array([found("lines", repeats != r) - found(name, repeats != r) for r in repeats])
-        pseudo = 8 * table.loc[name, "behind"] - 7 * without
+        pseudo = 8 * table.loc[name, "pod_deficit"] - 7 * without
         lowest, highest = ttest_1samp(pseudo, 0).confidence_interval(1 - 0.05 / 4)
-        assert table.loc[name, "behind_highest"] - table.loc[name, "behind_lowest"] == pytest.approx(highest - lowest)
+        assert table.loc[name, "pod_deficit_ci_high"] - table.loc[name, "pod_deficit_ci_low"] == pytest.approx(
+            highest - lowest
+        )
 
 
 def test_area_under_the_curve(study, table):
@@ -196,23 +202,23 @@ def test_area_under_the_curve(study, table):
 
 def test_a_higher_confidence_has_wider_bounds_of_the_same_rates(study, table):
     wide = study.ranking(confidence=0.999).loc[table.index]
-    for name in ("false_alarms", "pod", "behind", "pod bottom"):
+    for name in ("false_alarms", "pod", "pod_deficit", "pod bottom"):
         pd.testing.assert_series_equal(wide[name], table[name])
     own = table.index[1:-1]
-    for name in ("behind_lowest", "pod_lowest", "false_alarms_lowest"):
+    for name in ("pod_deficit_ci_low", "pod_ci_low", "false_alarms_ci_low"):
         assert (wide.loc[own, name] < table.loc[own, name]).all()
     pd.testing.assert_frame_equal(study.ranking(confidence=0.95), table)
 
 
 def test_a_limit_that_nobody_keeps_is_said(study):
     table = study.ranking(0.0001)
-    assert not table["keeps_limit"].any()
+    assert not table["within_limit"].any()
     assert table["false_alarms"][:-1].is_monotonic_increasing
     quietest = table.index[0]
     assert study.summary(0.0001).startswith(
         f"No detector keeps the limit of 0.0% false alarms. With the fewest, {quietest!r} finds "
     )
-    assert study.ranking(0.3)["keeps_limit"][:-1].all()
+    assert study.ranking(0.3)["within_limit"][:-1].all()
     assert study.ranking(0.3).index[0] in ("loud", "lines")
 
 
@@ -239,8 +245,8 @@ def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
     study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0, uncertainty="noise")
     study.run(WEATHER)
     table = study.ranking()
-    assert table.loc["deaf", ["clearly_behind", "pod"]].tolist() == [True, 0.0]
-    assert table.loc["deaf", "behind_lowest"] > 0
+    assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
+    assert table.loc["deaf", "pod_deficit_ci_low"] > 0
     assert "Clearly worse: 'deaf'" in study.summary()
 
 
@@ -262,10 +268,10 @@ def test_without_other_noise_nothing_is_significant(fem, options):
     some = {"raw": MahalanobisDetector(), "lines": compensated()}
     study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], random_state=0, uncertainty="noise", **options)
     study.run(WEATHER)
-    for by in ("pod", "pod_equal"):
+    for by in ("pod", "pod_at_equal_pfa"):
         table = study.ranking(by=by)
-        assert table[["behind_lowest", "behind_highest"]].isna().all(axis=None)
-        assert not table["clearly_behind"].any()
+        assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
+        assert not table["significantly_worse"].any()
     assert "do not tell which detectors are clearly worse" in study.summary()
 
 
@@ -287,18 +293,18 @@ def test_measured_records_rank_by_what_was_found(fem):
     results = study.results_[study.results_["source"] == "reference"].set_index(["detector", "scenario"])["rate"]
     for name, row in table.iterrows():
         assert (row["false_alarms"], row["pod"]) == (results[name, "healthy"], results[name, "top"])
-    assert table["pod"][table["keeps_limit"]].is_monotonic_decreasing
-    assert table[["pod_equal", "behind_lowest"]].isna().all(axis=None)
-    assert not table["clearly_behind"].any()
+    assert table["pod"][table["within_limit"]].is_monotonic_decreasing
+    assert table[["pod_at_equal_pfa", "pod_deficit_ci_low"]].isna().all(axis=None)
+    assert not table["significantly_worse"].any()
     with pytest.raises(ValueError, match="no healthy records to move thresholds by; expected by='pod'"):
-        study.ranking(source="reference", by="pod_equal")
+        study.ranking(source="reference", by="pod_at_equal_pfa")
 
 
 def test_what_cannot_be_ranked_is_an_error(fem, study):
     for options, message in (
         ({"max_false_alarms": 2}, "max_false_alarms is 2"),
-        ({"source": "reference"}, r"source is 'reference'; expected one of \['data-informed'\]"),
-        ({"by": "auc"}, "by is 'auc'; expected 'pod' or 'pod_equal'"),
+        ({"source": "reference"}, r"source is 'reference'; expected one of \['simulated'\]"),
+        ({"by": "auc"}, "by is 'auc'; expected 'pod' or 'pod_at_equal_pfa'"),
         ({"confidence": 95}, "confidence is 95"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -333,7 +339,7 @@ def test_the_best_is_seldom_called_clearly_behind():
     for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
         records, rows = judged(random, names, [0.5] * 6)
         table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
-        wrong += table["clearly_behind"][random.choice(names)]
+        wrong += table["significantly_worse"][random.choice(names)]
     assert wrong <= binom.ppf(0.999, n, 0.05)
 
 
@@ -341,5 +347,5 @@ def test_what_is_clearly_worse_is_called_so():
     random = np.random.default_rng(0)
     records, rows = judged(random, ["good", "bad"], [0.6, 0.3])
     table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
-    assert table["clearly_behind"].to_dict() == {"good": False, "bad": True}
-    assert table.loc["bad", "behind_lowest"] < 0.3 < table.loc["bad", "behind_highest"]
+    assert table["significantly_worse"].to_dict() == {"good": False, "bad": True}
+    assert table.loc["bad", "pod_deficit_ci_low"] < 0.3 < table.loc["bad", "pod_deficit_ci_high"]

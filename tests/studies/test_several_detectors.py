@@ -21,7 +21,7 @@ from skthermo.detection import (
     WindowedAlarm,
 )
 from skthermo.fem import AffineModel
-from skthermo.studies import DetectabilityStudy, Scenario, sweep, what_to_add
+from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
 from skthermo.surrogate import DataInformedFEM
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -158,8 +158,8 @@ def test_the_truth_is_asked_once_for_all_detectors(fem):
 def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
     for name in detectors():
         calibration, healthy = (
-            study.calibration_[name, "data-informed"],
-            study.decisions_[name, "healthy", "data-informed"],
+            study.calibration_[name, "simulated"],
+            study.decisions_[name, "healthy", "simulated"],
         )
         assert calibration.shape == healthy.shape
         assert (calibration == healthy).mean() < 0.05
@@ -266,13 +266,13 @@ def test_what_to_add_asks_for_a_detector_of_several(fem):
     )
     several.run(WEATHER)
     with pytest.raises(ValueError, match="detector is None"):
-        what_to_add(several, WEATHER, modes=[6])
-    found = what_to_add(several, WEATHER, modes=[6], detector="raw")
+        compare_extensions(several, WEATHER, modes=[6])
+    found = compare_extensions(several, WEATHER, modes=[6], detector="raw")
     alone = DetectabilityStudy(
         fem, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
     )
     alone.run(WEATHER)
-    pd.testing.assert_frame_equal(found, what_to_add(alone, WEATHER, modes=[6]))
+    pd.testing.assert_frame_equal(found, compare_extensions(alone, WEATHER, modes=[6]))
 
 
 class Doubtful(MahalanobisDetector):

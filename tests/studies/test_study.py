@@ -46,7 +46,7 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
     for name, damage in (("healthy", None), ("a fifth", {"bottom": 0.2})):
         records = fem.simulate(WEATHER, damage=damage, noise=noise, random_state=first_seed(3))
         index = detector.damage_index(records)
-        pd.testing.assert_series_equal(study.indices_[ONLY, name, "data-informed"], index)
+        pd.testing.assert_series_equal(study.indices_[ONLY, name, "simulated"], index)
         assert results.loc[name, "rate"] == probability_of_detection(index, detector.threshold_)
         wait = time_to_detection(index, detector.threshold_)
         assert results.loc[name, "time_to_detection"] == wait
@@ -96,7 +96,7 @@ def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
     expected = -detector.score_samples(records.join(WEATHER)[[*MODES, "T2", "T1", "T3"]])
-    np.testing.assert_allclose(study.indices_[ONLY, "top 10 %", "data-informed"], expected)
+    np.testing.assert_allclose(study.indices_[ONLY, "top 10 %", "simulated"], expected)
 
 
 def test_a_detector_may_see_some_of_the_modes(fem):
@@ -127,10 +127,10 @@ def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
             frames = expected.run(WEATHER, baseline)
         else:
             frames = expected.set_params(detectors=compensated()).run(WEATHER, baseline)
-        columns = ["rate", "lowest", "highest", "n_effective"]
+        columns = ["rate", "ci_low", "ci_high", "n_effective"]
         pd.testing.assert_frame_equal(arrays.run(WEATHER.to_numpy(), baseline.to_numpy())[columns], frames[columns])
         assert arrays.results_["time_to_detection"].dtype == float
-    assert isinstance(arrays.indices_[ONLY, "healthy", "data-informed"].index, pd.RangeIndex)
+    assert isinstance(arrays.indices_[ONLY, "healthy", "simulated"].index, pd.RangeIndex)
 
 
 def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
@@ -145,11 +145,11 @@ def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
         fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01, random_state=0, uncertainty="noise"
     )
     results = study.run(WEATHER, reference=truth)
-    assert results["source"].tolist() == ["data-informed", "data-informed", "reference"]
+    assert results["source"].tolist() == ["simulated", "simulated", "reference"]
     simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
     simulated_index, true_index = (study.indices_[ONLY, "top 10 %", source] for source in results["source"][1:])
     assert (simulated_index != true_index).all()  # other seeds
-    assert true.lowest < simulated.rate < true.highest
+    assert true.ci_low < simulated.rate < true.ci_high
     np.testing.assert_array_equal(results["n_repeats"], 3)
 
 
@@ -193,10 +193,10 @@ def test_progressive_damage_counts_from_its_onset(fem):
     study = DetectabilityStudy(
         fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
     )
-    results = study.run(WEATHER).drop(columns=["scenario", "band_lowest", "band_highest"])  # one repeat has no band
+    results = study.run(WEATHER).drop(columns=["scenario", "pi_low", "pi_high"])  # one repeat has no band
     by_time, by_number = results.itertuples(index=False)
     assert by_time == by_number
-    index = study.indices_[ONLY, "by time", "data-informed"]
+    index = study.indices_[ONLY, "by time", "simulated"]
     assert by_time.rate == probability_of_detection(index[index.index >= onset], study.thresholds_[ONLY])
     assert by_time.n_records == 306
     assert by_time.time_to_detection == time_to_detection(index, study.thresholds_[ONLY], onset)
@@ -268,14 +268,14 @@ def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
     grid, curve = (study.minimum_detectable_damage(method=method) for method in ("grid", "curve"))
     for group in ("bottom", "top"):
         smallest = next(s for s in (0.1, 0.2, 0.3) if rates[f"{group} {100 * s:g} %"] >= 0.9)
-        assert grid.loc[(group, "data-informed"), "mdd"] == smallest
-        found = curve.loc[(group, "data-informed")]
+        assert grid.loc[(group, "simulated"), "mdd"] == smallest
+        found = curve.loc[(group, "simulated")]
         assert smallest - 0.1 < found["mdd"] < smallest
-        assert found["lowest"] < found["mdd"] < found["highest"]
+        assert found["ci_low"] < found["mdd"] < found["ci_high"]
         fitted = study.pod_curve(group)
         assert found["mdd"] == fitted.a90
-        assert found["highest"] == fitted.a90_95  # two-sided 90 % bounds
-    assert np.isnan(study.minimum_detectable_damage(level=0.999).loc[("top", "data-informed"), "mdd"])
+        assert found["ci_high"] == fitted.a90_95  # two-sided 90 % bounds
+    assert np.isnan(study.minimum_detectable_damage(level=0.999).loc[("top", "simulated"), "mdd"])
 
 
 def test_damage_between_two_severities_is_bracketed(fem):
@@ -291,7 +291,7 @@ def test_damage_between_two_severities_is_bracketed(fem):
     with pytest.warns(UserWarning, match="infinite or unknown"):
         found = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(found["mdd"])
-    assert (found["lowest"], found["highest"]) == (0.1, 0.5)
+    assert (found["ci_low"], found["ci_high"]) == (0.1, 0.5)
 
 
 @pytest.mark.nightly
@@ -307,10 +307,10 @@ def test_records_that_cannot_be_judged_do_not_count():
     with pytest.warns(UserWarning, match="10 of 365 rows cannot be predicted") as caught:
         results = study.run(weather)
     assert len(caught) == 1
-    n_records, n_not_judged = results.loc[0, ["n_records", "n_not_judged"]]
+    n_records, n_not_evaluated = results.loc[0, ["n_records", "n_not_evaluated"]]
     assert 0.4 * 730 < n_records < 0.75 * 730
-    assert n_records + n_not_judged == 730
-    assert study.indices_["OutlierDetector", "healthy", "data-informed"].iloc[5:15].isna().all()
+    assert n_records + n_not_evaluated == 730
+    assert study.indices_["OutlierDetector", "healthy", "simulated"].iloc[5:15].isna().all()
 
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
@@ -326,7 +326,7 @@ def test_weather_outside_the_training_range_is_said_once(fem):
     assert caught[0].filename == __file__
 
 
-@pytest.mark.filterwarnings("ignore:365 of 365 rows are not judged")
+@pytest.mark.filterwarnings("ignore:365 of 365 rows are not evaluated")
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -363,7 +363,7 @@ def test_impossible_studies_are_errors(fem, options, message):
         (compensated(), {"reference": {"healthy": YEAR.frequencies[:99]}}, "temperatures has 365 rows"),
     ],
 )
-@pytest.mark.filterwarnings("ignore:365 of 365 rows are not judged")  # before the error
+@pytest.mark.filterwarnings("ignore:365 of 365 rows are not evaluated")  # before the error
 def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
     study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0, uncertainty="noise")
     with pytest.raises(ValueError, match=message):
@@ -378,7 +378,7 @@ def test_a_study_must_be_run_before_it_is_asked(fem):
         with pytest.raises(ValueError, match="expected a call of run before"):
             ask()
     study.run(WEATHER)
-    with pytest.raises(ValueError, match="family 'bottom', source 'data-informed' is not in the results"):
+    with pytest.raises(ValueError, match="family 'bottom', source 'simulated' is not in the results"):
         study.pod_curve("bottom")
     with pytest.raises(ValueError, match="level is 90"):
         study.minimum_detectable_damage(level=90)
@@ -415,7 +415,7 @@ def in_service():
         return chain(random_state=0).fit(T, F)
 
 
-@pytest.mark.filterwarnings("ignore:missing temperatures were filled", "ignore:.*not judged")
+@pytest.mark.filterwarnings("ignore:missing temperatures were filled", "ignore:.*not evaluated")
 def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
     scenarios = [{}, {"bottom": 0.2}]
     study = DetectabilityStudy(
@@ -424,7 +424,7 @@ def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_othe
     results = study.run(WEATHER)
     healthy, damaged = (np.isnan(one) for one in study.decisions_.values())
     np.testing.assert_array_equal(healthy, damaged)
-    assert (results["n_not_judged"] == healthy.sum()).all()
+    assert (results["n_not_evaluated"] == healthy.sum()).all()
     assert (healthy[0] != healthy[1]).any()
     assert healthy.any()
     seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(3, 2))[:, 0]

@@ -83,7 +83,7 @@ def test_a_mapper_that_does_not_know_is_refused_by_name():
     fem = chain(TemperatureMapper(LinearRegression())).fit(T, F)
     with pytest.raises(ValueError, match="TemperatureMapper does not state how uncertain it is; expected a mapper"):
         fem.predict_covariance(T)
-    assert "from_fleet" not in fem.applicability(T)
+    assert "from_fleet" not in fem.extrapolation_distance(T)
 
 
 def test_a_mapper_that_is_certain_changes_nothing():
@@ -123,7 +123,7 @@ def test_intervals_after_thirty_days_hold_a_later_year():
 
 def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of():
     fem, T, _ = fitted()
-    table, own = fem.applicability(T), (T[:30].min(), T[:30].max())
+    table, own = fem.extrapolation_distance(T), (T[:30].min(), T[:30].max())
     seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)
     np.testing.assert_array_equal(table["from_fleet"], ~seen)
     assert list(table)[-2:] == ["outside_bounds", "from_fleet"]
@@ -151,7 +151,7 @@ def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     T, F = bridge(0, 120)
     fem = chain(make_pipeline(LagFeatures(2), BayesianLogs(MEAN, WIDTH, 2 * NOISE, EVERYWHERE))).fit(T, F)
     assert fem.predict_covariance(T).shape == (120, 2, 2)
-    assert list(fem.applicability(T)) == [*fem.training_range_.names, "outside_bounds", "from_fleet"]
+    assert list(fem.extrapolation_distance(T)) == [*fem.training_range_.names, "outside_bounds", "from_fleet"]
     assert len(fem.training_range_.names) == 4
 
 

@@ -238,7 +238,7 @@ class TestForeignWeather:
     def test_applicability_is_in_units_of_the_training_range(self, fitted):
         width = T.max() - T.min()
         weather = pd.DataFrame([T.max() + 0.5 * width, T.min(), T.mean(), T.min() - 2 * width], columns=T.columns)
-        table = fitted.applicability(weather)
+        table = fitted.extrapolation_distance(weather)
         np.testing.assert_allclose(table[T.columns], np.outer([0.5, 0, 0, 2], np.ones(3)), atol=1e-9)
         inside = fitted.predict_parameters(weather.iloc[1:3])
         expected = ((inside < 0.7) | (inside > 1.3)).any(axis=1)
@@ -250,7 +250,7 @@ class TestForeignWeather:
         weather.index = weather.index + pd.Timedelta(days=365)
         weather.iloc[5, 0] = T["T1"].max() + (T["T1"].max() - T["T1"].min())
         weather.iloc[9] = np.nan
-        table = lagged.applicability(weather)
+        table = lagged.extrapolation_distance(weather)
         assert list(table.columns) == [f"T{i}_lag{k}" for i in (1, 2, 3) for k in (0, 2)] + ["outside_bounds"]
         np.testing.assert_allclose([table["T1_lag0"].iloc[5], table["T1_lag2"].iloc[7]], 1)
         assert table["T2_lag0"].isna().tolist() == [row == 9 for row in range(365)]
@@ -259,7 +259,7 @@ class TestForeignWeather:
     @pytest.mark.parametrize("extreme", [-60.0, 90.0])
     def test_the_default_mapper_stays_sane_fifty_degrees_beyond(self, fitted, extreme):
         """Its network is piecewise linear in the temperatures and learns ln theta, so theta stays positive."""
-        theta = fitted.applicability(LATER)  # fitted
+        theta = fitted.extrapolation_distance(LATER)  # fitted
         with pytest.warns(UserWarning, match="temperatures far outside"):
             theta = fitted.predict_parameters(pd.DataFrame(np.full((1, 3), extreme), columns=T.columns))
         assert theta.to_numpy().min() > 0.3

@@ -76,7 +76,7 @@ def test_a_record_of_weight_0_counts_as_left_out():
     assert fit.training_range_.excess(T[kept]).max() == 0
     coldest = T["T1"].argsort().to_numpy()[0]
     warm = chain().fit(T, F, sample_weight=np.arange(len(T)) != coldest)
-    assert warm.applicability(T.iloc[[coldest]])["T1"].item() > 0
+    assert warm.extrapolation_distance(T.iloc[[coldest]])["T1"].item() > 0
 
 
 @ROUTING

@@ -377,7 +377,7 @@ def test_a_missing_temperature_is_what_the_other_sensors_foretell():
         theta = FITTED.predict_parameters(without("T2"))
     numerical = FITTED.model.frequencies(theta.to_numpy())
     np.testing.assert_allclose(predicted, as_measured(FITTED, numerical, without("T2")), rtol=1e-12)
-    assert FITTED.applicability(without("T2")).notna().all(axis=None)
+    assert FITTED.extrapolation_distance(without("T2")).notna().all(axis=None)
 
 
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled")

@@ -77,7 +77,7 @@ class FleetBridge:
         return FleetBridge, (self.name, self.kind, self.seed, self.alien)
 
     @property
-    def is_alien(self) -> bool:
+    def is_atypical(self) -> bool:
         """Whether its thermal laws are not those of its family."""
         return self.alien is not None
 

@@ -36,7 +36,7 @@ class BridgeFleet(Mapping[str, FleetBridge]):
     --------
     >>> from skthermo.datasets import make_fleet
     >>> fleet = make_fleet(20, random_state=0)
-    >>> len(fleet), list(fleet)[:2], [name for name, bridge in fleet.items() if bridge.is_alien]
+    >>> len(fleet), list(fleet)[:2], [name for name, bridge in fleet.items() if bridge.is_atypical]
     (20, ['bridge 000', 'bridge 001'], ['bridge 007'])
     """
 
@@ -55,8 +55,8 @@ class BridgeFleet(Mapping[str, FleetBridge]):
     def __repr__(self) -> str:
         kinds = pd.Series([bridge.kind for bridge in self.values()]).value_counts(sort=False)
         counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-        aliens = sum(bridge.is_alien for bridge in self.values())
-        return f"BridgeFleet({counts}; {aliens} with thermal laws of their own)"
+        atypical = sum(bridge.is_atypical for bridge in self.values())
+        return f"BridgeFleet({counts}; {atypical} with thermal laws of their own)"
 
     @cached_property
     def covariates(self) -> pd.DataFrame:
@@ -68,7 +68,7 @@ def make_fleet(
     n_bridges: int = 20,
     *,
     kinds: Sequence[str] = ("truss", "girder", "arch"),
-    aliens: float = 0.05,
+    atypical: float = 0.05,
     random_state: int | np.random.RandomState | None = None,
 ) -> BridgeFleet:
     """Synthetic fleet of bridges with known truth: trusses, girders and tied arches under their own climates.
@@ -83,7 +83,7 @@ def make_fleet(
         Number of bridges.
     kinds : sequence of {"truss", "girder", "arch"}, default=("truss", "girder", "arch")
         Kinds, in turn.
-    aliens : float, default=0.05
+    atypical : float, default=0.05
         Share of bridges with thermal laws of their own, spread evenly over each kind: "reversed", "doubled" or with the
         "knee elsewhere".
     random_state : int, RandomState or None, default=None
@@ -143,15 +143,15 @@ def make_fleet(
     n_bridges = positive_integer(n_bridges, "n_bridges")
     if isinstance(kinds, str) or not kinds or not set(kinds) <= set(KINDS):
         raise ValueError(f"kinds is {kinds!r:.200}; expected some of {tuple(KINDS)}")
-    if not is_real(aliens) or not 0 <= aliens <= 1:
-        raise ValueError(f"aliens is {aliens!r}; expected a share from 0 to 1")
+    if not is_real(atypical) or not 0 <= atypical <= 1:
+        raise ValueError(f"atypical is {atypical!r}; expected a share from 0 to 1")
     root = int(as_random_state(random_state).randint(2**31 - 1))
     first = stream(root).uniform()
     bridges = []
     for k in range(n_bridges):
         round_, turn = divmod(k, len(kinds))
         phase = first + turn / len(kinds)
-        is_alien = np.floor((round_ + 1) * aliens + phase) > np.floor(round_ * aliens + phase)
-        alien = ALIENS[stream(root, k).randint(len(ALIENS))] if is_alien else None
+        is_atypical = np.floor((round_ + 1) * atypical + phase) > np.floor(round_ * atypical + phase)
+        alien = ALIENS[stream(root, k).randint(len(ALIENS))] if is_atypical else None
         bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), alien))
     return BridgeFleet(bridges)

@@ -16,12 +16,12 @@ from skthermo.fleet.prior._posterior import ALIENS, Mixture, follow_chance, mixt
 LEAST_BRIDGES = 3
 LEAST_DEVIATION = 1.0  # of a bridge's gain: that a few are alike is chance
 LEVEL = 0.95  # probability with which a gain must be one
-COUNT = 10.0  # bridges as which it counts that few are aliens
+COUNT = 10.0  # bridges as which it counts that few are atypical
 MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
 FEW = 60  # bridges of which one changes little of what is known of the others: fewer take more steps without it
 FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: an alien, among at least so many
 SETTLED = 0.05
-ROUNDS = 3  # in which aliens are found, and the families learned without them
+ROUNDS = 3  # in which atypical are found, and the families learned without them
 
 
 def groups(n_bridges: int) -> list[list[int]]:
@@ -68,7 +68,7 @@ class PoolingComparison:
     def of(
         cls, members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
     ) -> PoolingComparison:
-        """Learn families, leave bridges out, and learn again without the weight of aliens."""
+        """Learn families, leave bridges out, and learn again without the weight of atypical."""
         probabilities = dict.fromkeys(names, 1 - ALIENS)
         several = [name for name in names if sum(name in member.families for member in members) > 1]
         follows = seem_to_follow(members, several, covariance)

@@ -79,7 +79,7 @@ class FleetMapper(RegressorMixin, Estimator):
     ----------
     families_ : dict
         Family of each output by name, None where it is never pooled.
-    follows_ : dict
+    pooling_probability_ : dict
         By family: probability that this bridge behaves as the fleet does.
     reach_ : TrainingRange
         Lowest and highest value of each input in the fleet and in the bridge's own records.
@@ -172,7 +172,7 @@ class FleetMapper(RegressorMixin, Estimator):
         records = BridgeRecords.of(inputs, values, names, weights, days_of(X))
         families = list(self.families_.values())
         found, state = known.posterior(records, families, self.covariates)
-        self.follows_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
+        self.pooling_probability_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
         self.basis_, self.centre_ = known.basis, found.centre
         self.coefficients_, self.covariance_ = with_levels(found, state)
         self.misfit_ = (FleetNoise() if known.noise is None else known.noise).misfit(found, families)

@@ -76,7 +76,7 @@ class FleetPrior(Estimator):
     Each bridge is left out (of more than 50, one of 50 groups at a time), and judged by the evidence of its records: on
     its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges have
     it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges train a
-    family by their probability of following it, so that aliens do not widen it.
+    family by their probability of following it, so that atypical do not widen it.
 
     What no function of the basis follows, such as the heat of the ground, is told by autocovariances of the residuals
     two and three days apart (two and three rows, without stamps): the median over the bridges of a family. Noise that

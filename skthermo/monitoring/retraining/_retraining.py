@@ -31,7 +31,7 @@ Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
 class Retraining:
     """A detector that has learned anew, and whether it takes over.
 
-    `Monitor.refit` and `Monitor.begin_again` give it.
+    `Monitor.refit` and `Monitor.rebaseline` give it.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ MOST_NAMED = 5  # largest number of bridges in a sentence
 COUNTED = {
     ALARM: "in alarm",
     ATTENTION: "without an alarm, but with much stiffness lost slowly",
-    NOT_JUDGED: "not judged by the monitor",
+    NOT_JUDGED: "not evaluated by the monitor",
     FAILED: "that could not be fitted",
     UNWATCHED: "without a monitor",
     HEALTHY: "healthy",
@@ -107,7 +107,7 @@ def _steps(bridges: Sequence[Bridge]) -> list[str]:
     if ATTENTION in states:
         steps.append("Ask an engineer whether the bridges that lost stiffness slowly can bear it.")
     if NOT_JUDGED in states:
-        steps.append("Check loggers and sensors of the bridges that are not judged.")
+        steps.append("Check loggers and sensors of the bridges that are not evaluated.")
     if FAILED in states:
         steps.append("Ask an engineer to look at the records and the models of the bridges that could not be fitted.")
     if UNWATCHED in states:

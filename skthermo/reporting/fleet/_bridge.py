@@ -20,7 +20,7 @@ MONTH = 31  # days whose share that was judged is told
 
 CALLED, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
 """Places of a bridge, the worst first: an open event that stands out among all bridges; an open event; an event that
-stood out, has ended and was not explained; much stiffness lost; not judged; not fitted; without a monitor; a drift
+stood out, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a monitor; a drift
 beyond its error; healthy."""
 
 
@@ -83,7 +83,7 @@ class Bridge:
             place = DRIFTING
         days = standing.days_until(standing.now)
         month = days.iloc[-MONTH:]
-        n_judged = int((month["n_judged"] > 0).sum())
+        n_evaluated = int((month["n_evaluated"] > 0).sum())
         return cls(
             name,
             standing.state,
@@ -94,7 +94,7 @@ class Bridge:
             _index(standing, threshold, highest),
             line(days["index_max"], threshold),
             drift,
-            f"{n_judged} of {counted(len(month), 'day')}" if standing.has_records else "none",
+            f"{n_evaluated} of {counted(len(month), 'day')}" if standing.has_records else "none",
             n_warnings,
             len(standing.events),
         )

@@ -44,14 +44,14 @@ COLUMNS = [
 ]
 HEADLINES = {
     FAILED: (
-        "Not judged: it could not be fitted",
+        "Not evaluated: it could not be fitted",
         "An engineer should look at the records and at the model of this bridge; the others are not affected.",
     ),
     NOT_JUDGED: (
-        "Not judged: its monitor cannot be used",
+        "Not evaluated: its monitor cannot be used",
         "An engineer should look at the monitor of this bridge; the others are not affected.",
     ),
-    UNWATCHED: ("Not judged: no monitor", "Records that come are judged once the bridge has a monitor."),
+    UNWATCHED: ("Not evaluated: no monitor", "Records that come are judged once the bridge has a monitor."),
 }
 """What heads the page of a bridge without a monitor that can be asked, and what to do."""
 
@@ -97,7 +97,7 @@ class PageWriter:
         """Numbers of the events that stand out among all, by bridge."""
         if self.found is None:
             return {}
-        called = self.found.table[self.found.table["is_called"].astype(bool)]
+        called = self.found.table[self.found.table["is_discovery"].astype(bool)]
         return {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
 
     @cached_property

@@ -59,7 +59,7 @@ def _failing(standing: Standing, event: pd.Series) -> str:
 
 def promise(standing: Standing) -> Section:
     """What was asked for, what is expected, and how many events there were."""
-    monitor, promised = standing.monitor, standing.monitor.promise_
+    monitor, promised = standing.monitor, standing.monitor.false_alarm_estimate_
     asked = counted_number(monitor.false_alarms_per_year, "false alarm")
     expected, years = promised.expected, standing.years
     number = int((standing.events["kind"] == "damage").sum())
@@ -81,7 +81,7 @@ def promise(standing: Standing) -> Section:
     sentences.append("The promise says nothing of damage that is missed: a study of detectability answers that.")
     rows = [
         ["Threshold, above which an event begins", significant(monitor.threshold_, 4)],
-        ["Level at or below which the index stays before it ends", significant(monitor.release_, 4)],
+        ["Level at or below which the index stays before it ends", significant(monitor.clear_threshold_, 4)],
         ["Time for which it stays there", duration_text(pd.Timedelta(promised.rule.hold))],
         ["Years of baseline behind it", significant(promised.n_years, 2)],
         ["How the threshold was found", element("span", promised.method, class_="text")],

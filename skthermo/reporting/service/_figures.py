@@ -38,7 +38,7 @@ def draw_days(standing: Standing) -> list[Html]:
         n_days = (standing.last.normalize() - days.index[0]).days + 1
         alt = (
             f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "
-            f"{n_days - int((days['n_judged'] > 0).sum()):,} without a judged record. {_highest(days['index_max'])}"
+            f"{n_days - int((days['n_evaluated'] > 0).sum()):,} without a judged record. {_highest(days['index_max'])}"
         )
         drawn.append(_drawn(standing, alt, title, start=start, parts=["index"]))
     return drawn

@@ -70,27 +70,29 @@ def _index(standing: Standing, is_small: bool) -> Section:
 
 
 def unjudged(standing: Standing) -> Section:
-    """How many records were not judged, and why."""
+    """How many records were not evaluated, and why."""
     counts, judged, days = standing.monitor.counts_, standing.judged, standing.monitor.days_
-    title = "What was not judged"
+    title = "What was not evaluated"
     if not standing.has_records:
         return section("unjudged", title, paragraphs("No record has come since the baseline."))
-    number, unknown = int(counts["n_records"]), int(counts["n_not_judged"])
+    number, unknown = int(counts["n_records"]), int(counts["n_not_evaluated"])
     n_days = (days.index[-1] - days.index[0]).days + 1
     text = f"All of {counted(number, 'record')} were judged."
     if unknown:
         text = (
-            f"Of {counted(number, 'record')} in service, {unknown:,} ({share_text(unknown / number)}) were not judged. "
-            "They count neither as healthy nor as alarms: nothing is known of them."
+            f"Of {counted(number, 'record')} in service, {unknown:,} ({share_text(unknown / number)}) were not "
+            "evaluated. They count neither as healthy nor as alarms: nothing is known of them."
         )
     silent = n_days - len(days)
     without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
     is_unknown = judged["state"] == NOT_JUDGED
     since = f"since {moment(judged.index[0])}" if len(judged) else ""
     forgotten = unknown - int(is_unknown.sum()) - int(counts.get("n_too_late", 0))
-    older = f"Why {forgotten:,} of them, which are older, were not judged is no longer kept." if forgotten > 0 else ""
+    older = (
+        f"Why {forgotten:,} of them, which are older, were not evaluated is no longer kept." if forgotten > 0 else ""
+    )
     parts = [paragraphs(text, older, without)]
-    caption = f"Why records were not judged: those that are kept, {since}."
+    caption = f"Why records were not evaluated: those that are kept, {since}."
     parts.append(_reasons(caption, judged.loc[is_unknown, "reason"].replace("", "no reason given")))
     remarks = judged.loc[~is_unknown, "reason"]
     parts.append(_reasons(f"Remarks on records that were judged all the same, {since}.", remarks[remarks != ""]))

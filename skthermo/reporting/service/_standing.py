@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
 Time: TypeAlias = str | datetime | None
-ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not judged"
+ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not evaluated"
 
 
 class Doubt(NamedTuple):
@@ -133,19 +133,19 @@ class Standing:
         """Why it is not known whether the structure is healthy, and since when."""
         last, gone = moment(self.last), duration_text(self.now - self.last)
         if self.error:
-            return Doubt(self.last, "Not judged: its new records could not be used", self.error)
+            return Doubt(self.last, "Not evaluated: its new records could not be used", self.error)
         if not self.has_records:
             text = f"No record has come since the baseline, which ends on {last}"
-            return Doubt(self.last, "Not judged: no record since the baseline", text)
+            return Doubt(self.last, "Not evaluated: no record since the baseline", text)
         if self.is_ahead:
             text = f"The newest record is of {last}, a time after {moment(self.now)}, when this page was written"
-            return Doubt(self.last, "Not judged: the dates of the records are wrong", text)
+            return Doubt(self.last, "Not evaluated: the dates of the records are wrong", text)
         if self.is_silent:
             text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
-            return Doubt(self.last, f"Not judged: no record since {last}", text)
+            return Doubt(self.last, f"Not evaluated: no record since {last}", text)
         reason = str(self.judged["reason"].iloc[-1]) if len(self.judged) else ""
         since = self.unjudged_since
-        return Doubt(since, f"Not judged since {moment(since)}", f"Because: {reason or 'no reason is given'}")
+        return Doubt(since, f"Not evaluated since {moment(since)}", f"Because: {reason or 'no reason is given'}")
 
     @property
     def step_text(self) -> str:
@@ -159,7 +159,7 @@ class Standing:
         known = judged.index[judged["state"] != NOT_JUDGED]
         if len(known):
             return judged.index[judged.index > known[-1]][0]
-        some = days.index[days["n_judged"] > 0]
+        some = days.index[days["n_evaluated"] > 0]
         after = days.index[days.index > some[-1]] if len(some) else days.index
         return after[0] if len(after) else self.last
 
@@ -189,7 +189,7 @@ class Standing:
         """How many records of the last month were judged."""
         days = self.monitor.days_
         days = days[days.index > self.last - MONTH]
-        number, judged = int(days["n_records"].sum()), int(days["n_judged"].sum())
+        number, judged = int(days["n_records"].sum()), int(days["n_evaluated"].sum())
         which = f"{judged:,}" if judged < number else "all"
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
 

@@ -45,7 +45,7 @@ class FamilyRates:
         with self._named():
             mdd, lowest, highest = (
                 minimum_detectable_damage(self.tested["severity"], self.tested[rate], level)
-                for rate in ("rate", "highest", "lowest")
+                for rate in ("rate", "ci_high", "ci_low")
             )
         return mdd, lowest, highest
 
@@ -80,7 +80,7 @@ class FamilyRates:
 
 def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], FamilyRates]:
     """Families by detector, name and source."""
-    healthy = results[results["measure"] == "PFA"].groupby(["detector", "source"])["highest"].max()
+    healthy = results[results["measure"] == "PFA"].groupby(["detector", "source"])["ci_high"].max()
     damaged = results[(results["measure"] == "POD") & results["family"].notna()]
     return {
         key: FamilyRates(key[1], key[2], rows, float(healthy.get((key[0], key[2]), np.nan)), confidence)

@@ -18,8 +18,8 @@ from skthermo.studies.detectability._families import FamilyRates, families_of
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
 from skthermo.studies.detectability._ranking import in_words, rank
+from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
 from skthermo.studies.detectability._waits import soonest, waits_table
-from skthermo.studies.detectability._world_rates import WorldRates, sentences
 from skthermo.studies.scenarios import BaseScenario
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
@@ -40,7 +40,7 @@ class StudyFindings:
     transitions: Mapping[tuple[str, str, str], Array] = field(default_factory=dict)
     calibration: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     errors: Mapping[str, str] = field(default_factory=dict)
-    worlds: WorldRates | None = None
+    replicates: ReplicateRates | None = None
     uncertainty: pd.DataFrame | None = None
     warnings: Sequence[str] = ()
 
@@ -51,7 +51,7 @@ class StudyFindings:
         candidates: Mapping[str, Candidate],
         scenarios: list[BaseScenario],
         detectors: Sequence[str],
-        worlds: WorldRates | None,
+        replicates: ReplicateRates | None,
         confidence: float,
         warnings: Sequence[str],
     ) -> StudyFindings:
@@ -63,7 +63,7 @@ class StudyFindings:
         table = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0]))
         judged = {(one.detector, one.scenario.name, one.source): one for name in rows for one in records[name]}
         return cls(
-            table=table if worlds is None else worlds.banded(table, confidence),
+            table=table if replicates is None else replicates.banded(table, confidence),
             scenarios=scenarios,
             confidence=confidence,
             detectors={name: candidates[name].detector for name in rows},
@@ -74,8 +74,8 @@ class StudyFindings:
             transitions={key: np.array(found) for key, found in judgement.transitions.items() if key[0] in rows},
             calibration={key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows},
             errors=errors,
-            worlds=worlds,
-            uncertainty=None if worlds is None else worlds.table(),
+            replicates=replicates,
+            uncertainty=None if replicates is None else replicates.table(),
             warnings=warnings,
         )
 
@@ -99,10 +99,10 @@ class StudyFindings:
         return detector
 
     def pod_curve(self, family: str, source: str, *, log: bool = False, detector: str | None = None) -> PODCurve:
-        """Probability of detection over severity, with the curves of the worlds."""
+        """Probability of detection over severity, with the curves of the replicates."""
         found = self._family(family, source, detector)
-        curves = [] if self.worlds is None else self.worlds.curves(found, log)
-        return replace(found.curve(log), worlds=tuple(curves))
+        curves = [] if self.replicates is None else self.replicates.curves(found, log)
+        return replace(found.curve(log), replicates=tuple(curves))
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -124,13 +124,13 @@ class StudyFindings:
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
         names = ["detector", "family", "source"][-len(next(iter(found))) :]
         index = pd.MultiIndex.from_tuples(list(found), names=names)
-        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "lowest", "highest"])
-        if self.worlds is None:
+        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "ci_low", "ci_high"])
+        if self.replicates is None:
             return table
-        bands = [self.worlds.smallest(one, level, method, self.confidence) for one in families.values()]
-        return table.assign(**dict(zip(["band_lowest", "band_highest"], np.transpose(bands), strict=True)))
+        bands = [self.replicates.smallest(one, level, method, self.confidence) for one in families.values()]
+        return table.assign(**dict(zip(["pi_low", "pi_high"], np.transpose(bands), strict=True)))
 
-    def time_to_find(
+    def time_to_detection(
         self,
         within: Sequence[str | int] | None = None,
         level: float = 0.95,
@@ -159,13 +159,13 @@ class StudyFindings:
         source: str = SIMULATED,
         confidence: float | None = None,
         *,
-        by: Literal["pod", "pod_equal"] = "pod",
+        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
     ) -> pd.DataFrame:
         """Detectors in the order of what they find."""
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
-        if by not in ("pod", "pod_equal"):
-            raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_equal'")
+        if by not in ("pod", "pod_at_equal_pfa"):
+            raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_at_equal_pfa'")
         self._check_source(source)
         rows = self.table[self.table["source"] == source]
         for measure, kind in (("PFA", "healthy"), ("POD", "damaged")):
@@ -175,7 +175,7 @@ class StudyFindings:
                     "expected healthy and damaged ones"
                 )
         calibration = {name: decisions for (name, of), decisions in self.calibration.items() if of == source}
-        if by == "pod_equal" and not calibration:
+        if by == "pod_at_equal_pfa" and not calibration:
             raise ValueError(f"source {source!r} has no healthy records to move thresholds by; expected by='pod'")
         records = list(self._records(source).values())
         if asked != self.confidence:
@@ -204,9 +204,9 @@ class StudyFindings:
     def summary(self, max_false_alarms: float, source: str = SIMULATED) -> str:
         """Which detector finds most, how soon, and which are not clearly worse, in plain sentences."""
         ranking = self.ranking(max_false_alarms, source)
-        waits = self.time_to_find(source=source, detector=ranking.index[0], smallest=True)
+        waits = self.time_to_detection(source=source, detector=ranking.index[0], smallest=True)
         lines = [in_words(ranking, max_false_alarms), *(f"{one.scenario!r} {one.text}." for one in waits.itertuples())]
-        if self.worlds is not None and source == SIMULATED:
+        if self.replicates is not None and source == SIMULATED:
             lines.append(self.uncertainty_summary(ranking.index[0]))
         return "\n".join(lines)
 
@@ -217,7 +217,7 @@ class StudyFindings:
     def many_false_alarms(self) -> str:
         """What is wrong if a detector takes most simulated records of the healthy structure for damaged, or ""."""
         rows = self.table[(self.table["measure"] == "PFA") & (self.table["source"] == SIMULATED)]
-        many = rows[rows["lowest"] > MANY_FALSE_ALARMS]
+        many = rows[rows["ci_low"] > MANY_FALSE_ALARMS]
         if not len(many):
             return ""
         names = ", ".join(map(repr, many["detector"].unique()))

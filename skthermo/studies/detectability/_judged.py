@@ -14,7 +14,7 @@ from skthermo._tables.times import row_times, time_of
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.scenarios import BaseScenario
 
-SIMULATED, REFERENCE = "data-informed", "reference"
+SIMULATED, REFERENCE = "simulated", "reference"
 
 Answer = TypeVar("Answer")
 Key: TypeAlias = tuple[str, ...]
@@ -48,7 +48,7 @@ class JudgedRecords:
                 f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
                 "be judged: they lack what the detector needs, or are before the onset; expected some that it can judge"
             )
-        band_lowest, band_highest = band_of(decisions, confidence)
+        pi_low, pi_high = band_of(decisions, confidence)
         return {
             "detector": self.detector,
             "scenario": scenario.name,
@@ -57,13 +57,13 @@ class JudgedRecords:
             "source": self.source,
             "measure": "PFA" if scenario.is_healthy else "POD",
             "rate": rate.rate,
-            "lowest": rate.lowest,
-            "highest": rate.highest,
-            "band_lowest": band_lowest,
-            "band_highest": band_highest,
+            "ci_low": rate.lowest,
+            "ci_high": rate.highest,
+            "pi_low": pi_low,
+            "pi_high": pi_high,
             "n_alarms": rate.n_alarms,
             "n_records": rate.n_records,
-            "n_not_judged": decisions.size - rate.n_records,
+            "n_not_evaluated": decisions.size - rate.n_records,
             "n_effective": rate.n_effective,
             "n_repeats": len(decisions),
             "time_to_detection": _mean_wait(decisions < 0, waits, self.damage_index),

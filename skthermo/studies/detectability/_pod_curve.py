@@ -41,7 +41,7 @@ class PODCurve:
     bracket : tuple of float
         Magnitudes of the highest tested severity with a POD below 0.9 (0 if there is none) and of the next one (NaN if
         there is none).
-    worlds : tuple of PODCurve, default=()
+    replicates : tuple of PODCurve, default=()
         Curves of measured campaigns as a study expects them where more than the noise is uncertain; see `band`.
 
     Examples
@@ -61,7 +61,7 @@ class PODCurve:
     log: bool
     confidence: float
     bracket: tuple[float, float]
-    worlds: tuple[PODCurve, ...] = ()
+    replicates: tuple[PODCurve, ...] = ()
 
     @property
     def a50(self) -> float:
@@ -137,24 +137,24 @@ class PODCurve:
         Returns
         -------
         lowest : float or ndarray
-            Quantile of ``worlds`` at each severity; NaN without worlds.
+            Quantile of ``replicates`` at each severity; NaN without replicates.
         highest : float or ndarray
             Likewise; the two hold such a curve with the curve's confidence.
         """
         places = real_array(severity, "severity")
-        if not self.worlds:
+        if not self.replicates:
             return np.full(places.shape, np.nan), np.full(places.shape, np.nan)
         tails = (1 - self.confidence) / 2, (1 + self.confidence) / 2
-        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.worlds], tails, axis=0)
+        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.replicates], tails, axis=0)
         return lowest, highest
 
     @property
     def a90_band(self) -> tuple[float, float]:
-        """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without worlds."""
-        if not self.worlds:
+        """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without replicates."""
+        if not self.replicates:
             return float("nan"), float("nan")
         tail = (1 - self.confidence) / 2
-        found = np.abs([one.a90 for one in self.worlds])
+        found = np.abs([one.a90 for one in self.replicates])
         sign = np.sign(self.severities[0])
         return float(sign * np.quantile(found, tail)), float(sign * np.quantile(found, 1 - tail))
 

@@ -80,7 +80,7 @@ def rank(
     errors: Mapping[str, str],
     limit: float,
     confidence: float,
-    by: Literal["pod", "pod_equal"],
+    by: Literal["pod", "pod_at_equal_pfa"],
 ) -> pd.DataFrame:
     """One row for each detector, best first, from its records of one source and their rows in the results.
 
@@ -92,28 +92,39 @@ def rank(
     table = pd.DataFrame.from_dict(
         {
             name: _rates(rows[rows["detector"] == name], limit)
-            | {"pod_equal": contender.pod(limit), "auc": contender.auc()}
+            | {"pod_at_equal_pfa": contender.pod(limit), "auc": contender.auc()}
             | _by_family(name, rows[rows["detector"] == name], families)
             for name, contender in contenders.items()
         },
         orient="index",
     )
     table = table.infer_objects().rename_axis("detector")
-    table["beyond"] = table["false_alarms"].where(~table["keeps_limit"], 0.0)
-    keys = ["keeps_limit", "beyond", by, "auc", "false_alarms", "detector"]
+    table["beyond"] = table["false_alarms"].where(~table["within_limit"], 0.0)
+    keys = ["within_limit", "beyond", by, "auc", "false_alarms", "detector"]
     table = table.sort_values(keys, ascending=[False, True, False, False, True, True]).drop(columns="beyond")
     pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
-    table["behind"] = table[by].iloc[0] - table[by]
+    table["pod_deficit"] = table[by].iloc[0] - table[by]
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
     if not any(one.has_noise() for one in contenders.values()):
         margin = [np.nan] * len(names)
-    table["behind_lowest"], table["behind_highest"] = table["behind"] - margin, table["behind"] + margin
-    table["clearly_behind"] = table["behind_lowest"] > 0
-    first = ["false_alarms", "false_alarms_lowest", "false_alarms_highest", "keeps_limit"]
-    first += ["pod", "pod_lowest", "pod_highest", "pod_equal", "behind", "behind_lowest", "behind_highest"]
-    first += ["clearly_behind", "auc", "time_to_detection", "not_judged"]
+    table["pod_deficit_ci_low"], table["pod_deficit_ci_high"] = (
+        table["pod_deficit"] - margin,
+        table["pod_deficit"] + margin,
+    )
+    table["significantly_worse"] = table["pod_deficit_ci_low"] > 0
+    first = ["false_alarms", "false_alarms_ci_low", "false_alarms_ci_high", "within_limit"]
+    first += [
+        "pod",
+        "pod_ci_low",
+        "pod_ci_high",
+        "pod_at_equal_pfa",
+        "pod_deficit",
+        "pod_deficit_ci_low",
+        "pod_deficit_ci_high",
+    ]
+    first += ["significantly_worse", "auc", "time_to_detection", "not_judged"]
     table = table[[*first, *(name for name in table if name not in first)]].assign(error="")
-    failed = {"keeps_limit": False, "clearly_behind": False, "error": list(errors.values())}
+    failed = {"within_limit": False, "significantly_worse": False, "error": list(errors.values())}
     return pd.concat([table, pd.DataFrame(failed, index=list(errors))]).rename_axis("detector") if errors else table
 
 
@@ -125,15 +136,15 @@ def _contender(name: str, records: Sequence[JudgedRecords], calibration: Array |
 
 def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:
     """Means over the scenarios; means of bounds hold however much the scenarios have in common."""
-    means = rows.groupby("measure")[["rate", "lowest", "highest"]].mean()
+    means = rows.groupby("measure")[["rate", "ci_low", "ci_high"]].mean()
     waits = rows.loc[rows["measure"] == "POD", "time_to_detection"].tolist()
     is_known = len({type(wait) for wait in waits}) == 1 and not any(pd.isna(wait) for wait in waits)
     return {
-        **dict(zip(["false_alarms", "false_alarms_lowest", "false_alarms_highest"], means.loc["PFA"], strict=True)),
-        "keeps_limit": bool(means.loc["PFA", "lowest"] <= limit),
-        **dict(zip(["pod", "pod_lowest", "pod_highest"], means.loc["POD"], strict=True)),
+        **dict(zip(["false_alarms", "false_alarms_ci_low", "false_alarms_ci_high"], means.loc["PFA"], strict=True)),
+        "within_limit": bool(means.loc["PFA", "ci_low"] <= limit),
+        **dict(zip(["pod", "pod_ci_low", "pod_ci_high"], means.loc["POD"], strict=True)),
         "time_to_detection": pd.Series(waits).mean() if is_known else np.nan,
-        "not_judged": rows["n_not_judged"].sum() / (rows["n_not_judged"] + rows["n_records"]).sum(),
+        "not_judged": rows["n_not_evaluated"].sum() / (rows["n_not_evaluated"] + rows["n_records"]).sum(),
     }
 
 
@@ -141,8 +152,8 @@ def _by_family(name: str, rows: pd.DataFrame, families: Mapping[Any, Any]) -> di
     """Probability of detection of each family, and its smallest severity that is found reliably."""
     found = {}
     for family, some in rows[(rows["measure"] == "POD") & rows["family"].notna()].groupby("family", sort=False):
-        rates = some[["rate", "lowest", "highest"]].mean()
-        found |= dict(zip([f"pod {family}", f"pod {family} lowest", f"pod {family} highest"], rates, strict=True))
+        rates = some[["rate", "ci_low", "ci_high"]].mean()
+        found |= dict(zip([f"pod {family}", f"pod {family} ci_low", f"pod {family} ci_high"], rates, strict=True))
         try:
             found[f"mdd {family}"] = families[name, family].on_grid(LEVEL)[0]
         except (KeyError, ValueError):  # no severity, or one twice, or of both signs
@@ -162,7 +173,7 @@ def _margin(best: Array, other: Array, confidence: float, n_comparisons: int) ->
 def in_words(table: pd.DataFrame, limit: float) -> str:
     """What a ranking says, in plain sentences."""
     failed, ranked = table[table["error"] != ""], table[table["error"] == ""]
-    quiet, loud = ranked[ranked["keeps_limit"]], ranked[~ranked["keeps_limit"]]
+    quiet, loud = ranked[ranked["within_limit"]], ranked[~ranked["within_limit"]]
     best = (quiet if len(quiet) else ranked).iloc[0]
     lines = [
         f"{best.name!r} finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
@@ -170,10 +181,10 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
     if not len(quiet):
         lines = [f"No detector keeps the limit of {limit:.1%} false alarms. With the fewest, {lines[0]}"]
     behind = quiet.drop(index=best.name, errors="ignore")
-    if len(behind) and behind["behind_lowest"].isna().all():
+    if len(behind) and behind["pod_deficit_ci_low"].isna().all():
         lines.append("Records of one repeat do not tell which detectors are clearly worse.")
     else:
-        is_clear = behind["clearly_behind"]
+        is_clear = behind["significantly_worse"]
         for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):
             shares = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
             lines += [f"{text}: {', '.join(shares)}."] if shares else []
@@ -187,6 +198,6 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
     unseen = ranked.loc[ranked["not_judged"] > 0, "not_judged"]
     shares = [f"{name!r} {share:.1%}" for name, share in unseen.items()]
-    lines += [f"Records that are not judged, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
+    lines += [f"Records that are not evaluated, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
     lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
     return "\n".join(lines)

@@ -21,15 +21,15 @@ from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._judged import Judgement
 from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
+from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
     clean_frequencies,
 )
-from skthermo.studies.detectability._world_rates import WorldRates
+from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.worlds import Worlds
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
@@ -77,22 +77,23 @@ class DetectabilityStudy(BaseEstimator):
         - "model": another FE model of ``models`` in the chain;
         - "all": all of these, without "model" if there are no ``models`` and none can be drawn.
 
-        Beside the repeats, this takes ``n_worlds`` worlds, in each of which all of it is drawn at once. On one core, a
-        year of days of the truss in 13 scenarios with one detector takes 2 s with the noise alone, which is enough to
-        compare detectors, 19 s with "baseline" and "weather", and 42 s with "all", where 20 chains are refitted.
+        Beside the repeats, this takes ``n_replicates`` replicates, in each of which all of it is drawn at once. On one
+        core, a year of days of the truss in 13 scenarios with one detector takes 2 s with the noise alone, which is
+        enough to compare detectors, 19 s with "baseline" and "weather", and 42 s with "all", where 20 chains are
+        refitted.
     models : sequence of FE models, optional
         Which the structure may have, with parameters, damage groups and modes like the chain's. By default
-        `~skthermo.updating.ModelUpdater.sample_models` draws ``n_worlds`` from the mean of the training records, as it
-        was measured, to which a perfect model would come within 0.5 %; stiffnesses are known to 15 % before.
-    n_worlds : int, default=20
-        How many worlds the bands stand on.
+        `~skthermo.updating.ModelUpdater.sample_models` draws ``n_replicates`` from the mean of the training records,
+        as it was measured, to which a perfect model would come within 0.5 %; stiffnesses are known to 15 % before.
+    n_replicates : int, default=20
+        How many replicates the bands stand on.
     n_jobs : int, optional
-        Number of parallel jobs (joblib), which share the repeats and the worlds. Results do not depend on it.
+        Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None
-        Seed of noise, gaps and outliers, of worlds, and of parts of detectors without a seed of their own.
+        Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats
-        and worlds are done.
+        and replicates are done.
 
     Attributes
     ----------
@@ -108,11 +109,11 @@ class DetectabilityStudy(BaseEstimator):
         Damage index of the records of the first repeat, by detector, scenario and source.
     decisions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_records)
         Threshold less damage index in every repeat, by detector, scenario and source: negative is an alarm, and NaN is
-        not judged. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and a
-        year of hours 155 MB.
+        not evaluated. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and
+        a year of hours 155 MB.
     transitions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_onsets, n_window)
         Such decisions of detectors with windows, such as `~skthermo.detection.WindowedAlarm`, after onsets of damage
-        with two windows from one to the next, while a window still holds healthy records; for `time_to_find`.
+        with two windows from one to the next, while a window still holds healthy records; for `time_to_detection`.
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is judged by them. Measured records have none.
@@ -122,9 +123,9 @@ class DetectabilityStudy(BaseEstimator):
         Indexed by detector and scenario: standard deviation of the rate due to each part of ``uncertainty`` ("noise",
         "weather", "baseline", "model") and to all ("together"), and the share of each in the variance ("model share").
         None where the bands hold the noise alone.
-    worlds_ : WorldRates or None
-        Rates of alarms in every world, ``worlds_.rates[detector, scenario]`` of shape (n_worlds, n_parts, n_draws),
-        where each of ``worlds_.parts`` is added to those before it.
+    replicates_ : ReplicateRates or None
+        Rates of alarms in every replicate, ``replicates_.rates[detector, scenario]`` of shape (n_replicates, n_parts,
+        n_draws), where each of ``replicates_.parts`` is added to those before it.
     scenarios_ : list of scenarios
         With those that were given as mappings.
     errors_ : dict of str to str
@@ -137,7 +138,7 @@ class DetectabilityStudy(BaseEstimator):
     See Also
     --------
     pod_curve : The curve over severity.
-    what_to_add : What would make smaller damage detectable.
+    compare_extensions : What would make smaller damage detectable.
 
     Notes
     -----
@@ -145,7 +146,7 @@ class DetectabilityStudy(BaseEstimator):
     (common random numbers), and all detectors judge the same records, so that differences between scenarios or
     detectors are more certain than each rate. A detector's rates do not depend on which others are in the study.
 
-    The bounds ``lowest`` and ``highest`` are those of a rate over noise, for this weather, this baseline and this
+    The bounds ``ci_low`` and ``ci_high`` are those of a rate over noise, for this weather, this baseline and this
     model: another year, another baseline or an error of the model is not in them, but in the bands, as far as
     ``uncertainty`` says so. Records are serially dependent: the effective number of records is their number over the
     design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten correlation times in
@@ -153,10 +154,10 @@ class DetectabilityStudy(BaseEstimator):
     rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between blocks of time holds that of
     the weather, too.
 
-    A world is a structure that could have given the training records. The detectors have learned measured records, and
-    stay: what a chain does not know of the structure moves records away from what they have learned. Bands are those of
-    Student's law on the scale of the logit, with the variances between and within worlds (three draws of the noise in
-    each), about the study's own rate, moved by the mean effect of other weather and models.
+    A replicate is a structure that could have given the training records. The detectors have learned measured records,
+    and stay: what a chain does not know of the structure moves records away from what they have learned. Bands are
+    those of Student's law on the scale of the logit, with the variances between and within replicates (three draws of
+    the noise in each), about the study's own rate, moved by the mean effect of other weather and models.
     ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
 
     References
@@ -184,7 +185,7 @@ class DetectabilityStudy(BaseEstimator):
     1  bottom 10 %     POD   0.2
     2  bottom 20 %     POD   0.9
     3  bottom 30 %     POD   1.0
-    >>> float(study.minimum_detectable_damage().loc[("bottom", "data-informed"), "mdd"])
+    >>> float(study.minimum_detectable_damage().loc[("bottom", "simulated"), "mdd"])
     0.2
     """
 
@@ -200,7 +201,7 @@ class DetectabilityStudy(BaseEstimator):
         outliers: ArrayLike | Literal["fitted"] | None = "fitted",
         uncertainty: Literal["all"] | Sequence[str] = "all",
         models: Sequence[Any] | None = None,
-        n_worlds: int = 20,
+        n_replicates: int = 20,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
         verbose: bool | int = 0,
@@ -214,7 +215,7 @@ class DetectabilityStudy(BaseEstimator):
         self.outliers = outliers
         self.uncertainty = uncertainty
         self.models = models
-        self.n_worlds = n_worlds
+        self.n_replicates = n_replicates
         self.n_jobs = n_jobs
         self.random_state = random_state
         self.verbose = verbose
@@ -228,7 +229,7 @@ class DetectabilityStudy(BaseEstimator):
     calibration_ = _found_attribute("calibration")
     arrangements_ = _found_attribute("arrangements")
     uncertainty_ = _found_attribute("uncertainty")
-    worlds_ = _found_attribute("worlds")
+    replicates_ = _found_attribute("replicates")
     scenarios_ = _found_attribute("scenarios")
     errors_ = _found_attribute("errors")
     confidence_ = _found_attribute("confidence")
@@ -248,8 +249,8 @@ class DetectabilityStudy(BaseEstimator):
         ----------
         T : array-like or DataFrame of shape (n_records, n_sensors), or sequence of them
             Temperatures in degrees Celsius under which the structure is simulated, in order of time. Of several years,
-            the first is simulated in all repeats, and worlds take one after the other, on the stamps of the first. Of
-            one, worlds resample days: give a year or more, without stamps a whole number of years.
+            the first is simulated in all repeats, and replicates take one after the other, on the stamps of the first.
+            Of one, replicates resample days: give a year or more, without stamps a whole number of years.
         baseline : array-like or DataFrame, optional
             Measured frequencies of the healthy structure, or temperatures and frequencies side by side, which the
             detectors learn. They see the same columns of simulated records; detectors of which no part has ``targets``,
@@ -270,18 +271,18 @@ class DetectabilityStudy(BaseEstimator):
 
             - ``detector``;
             - ``scenario``, ``family``, ``severity``;
-            - ``source``: "data-informed" (simulated) or "reference";
+            - ``source``: "simulated" (simulated) or "reference";
             - ``measure``: "PFA", the probability of false alarm, of a healthy structure, else "POD", the probability of
               detection, from the onset of the damage on;
-            - ``rate``, ``lowest``, ``highest``: share of records in alarm, and its bounds;
-            - ``band_lowest``, ``band_highest``: band of single campaigns, in which the rate of a measured one of this
+            - ``rate``, ``ci_low``, ``ci_high``: share of records in alarm, and its bounds;
+            - ``pi_low``, ``pi_high``: band of single campaigns, in which the rate of a measured one of this
               length and state should lie with the probability ``confidence``, with all that ``uncertainty`` names. With
               the noise alone, it is the range of the rates of single repeats: fewer than 39 are too few for 95 %, as
               the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN). That of reference
               records holds their noise alone;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can judge;
-            - ``n_not_judged``: number of records that it cannot judge, which count neither as healthy nor as alarms;
+            - ``n_not_evaluated``: number of records that it cannot judge, which count neither as healthy nor as alarms;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
               a ``DatetimeIndex``, in time; the mean over those repeats that have an alarm;
             - ``error``: "" where all is well. A detector that fails has one row with its error, and NaN elsewhere.
@@ -290,15 +291,15 @@ class DetectabilityStudy(BaseEstimator):
         ------
         ValueError
             If names of scenarios repeat, a damage group is unknown, columns do not fit, or no record can be judged; if
-            most worlds fail, or "model" is asked for and no models can be drawn. An error of a detector is raised if it
-            is the only one, or if all fail.
+            most replicates fail, or "model" is asked for and no models can be drawn. An error of a detector is raised
+            if it is the only one, or if all fail.
 
         Warns
         -----
         UserWarning
             Once for each kind of doubt about the simulations, such as weather outside the training range; if most
-            records of the healthy structure raise an alarm; if some worlds fail, or no models can be drawn. Detectors
-            are named where there are several.
+            records of the healthy structure raise an alarm; if some replicates fail, or no models can be drawn.
+            Detectors are named where there are several.
         """
         check_chain(self.fem)
         detectors = self._checked_detectors()
@@ -308,9 +309,9 @@ class DetectabilityStudy(BaseEstimator):
         scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        worlds = Worlds.of(self.fem, self.uncertainty, T, self.models, self.n_worlds, seeds[0])
-        T = worlds.years[0]
-        judgement, stages = Judgement(), Stages(self, 4 + bool(worlds.parts))
+        replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
+        T = replicates.years[0]
+        judgement, stages = Judgement(), Stages(self, 4 + bool(replicates.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
             candidates = judgement.ask(
@@ -326,10 +327,10 @@ class DetectabilityStudy(BaseEstimator):
         with stages.stage(f"other {n_repeats - 1} repeats"):
             simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
         rates = None
-        if worlds.parts:
-            with stages.stage(f"{len(worlds.seeds)} worlds"):
+        if replicates.parts:
+            with stages.stage(f"{len(replicates.seeds)} replicates"):
                 left = simulation.without(judgement.errors)
-                rates = WorldRates.of(left, judgement, worlds, self.n_jobs, max(self.verbose - 1, 0))
+                rates = ReplicateRates.of(left, judgement, replicates, self.n_jobs, max(self.verbose - 1, 0))
         self.findings_ = StudyFindings.of(judgement, candidates, scenarios, list(detectors), rates, confidence, texts)
         doubt = self.findings_.many_false_alarms()
         if doubt:
@@ -338,7 +339,7 @@ class DetectabilityStudy(BaseEstimator):
         return self.findings_.table
 
     def pod_curve(
-        self, family: str, source: str = "data-informed", *, log: bool = False, detector: str | None = None
+        self, family: str, source: str = "simulated", *, log: bool = False, detector: str | None = None
     ) -> PODCurve:
         """Probability of detection over severity for one family of scenarios.
 
@@ -346,8 +347,8 @@ class DetectabilityStudy(BaseEstimator):
         ----------
         family : str
             Of the scenarios.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         log : bool, default=False
             Whether the logit is linear in the logarithm of the severity.
         detector : str, optional
@@ -389,11 +390,11 @@ class DetectabilityStudy(BaseEstimator):
         Returns
         -------
         DataFrame
-            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``lowest`` and
-            ``highest``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
+            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``ci_low`` and
+            ``ci_high``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
             not increase, or a family has one severity only, ``mdd`` is NaN and the bounds are the two tested severities
-            between which it lies. Detectors that failed are left out. With worlds, also ``band_lowest`` and
-            ``band_highest``, between which that of a measured campaign should lie: quantiles over the worlds, infinite
+            between which it lies. Detectors that failed are left out. With replicates, also ``pi_low`` and
+            ``pi_high``, between which that of a measured campaign should lie: quantiles over the replicates, infinite
             if the level may not be reached.
 
         Raises
@@ -410,12 +411,12 @@ class DetectabilityStudy(BaseEstimator):
         """
         return self._found().minimum_detectable_damage(level, method, detector)
 
-    def time_to_find(
+    def time_to_detection(
         self,
         within: Sequence[str | int] | None = None,
         level: float = 0.95,
         *,
-        source: str = "data-informed",
+        source: str = "simulated",
         confidence: float | None = None,
         detector: str | None = None,
         smallest: bool = False,
@@ -433,8 +434,8 @@ class DetectabilityStudy(BaseEstimator):
             week and 30 days, or 1, 7 and 30 records.
         level : float, default=0.95
             Share of the cases in which damage is found reliably.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         confidence : float, optional
             Of the bounds, two-sided; by default that of the study.
         detector : str, optional
@@ -449,8 +450,8 @@ class DetectabilityStudy(BaseEstimator):
             One row for each detector and scenario:
 
             - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
-            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D lowest`` and
-              ``7D highest``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
+            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D ci_low`` and
+              ``7D ci_high``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
               within the same time, which would have come without damage, too (NaN without a healthy scenario). NaN
               where the time is shorter than that between two records, or longer than all of them;
             - ``median``: time within which half of the cases are found;
@@ -492,9 +493,9 @@ class DetectabilityStudy(BaseEstimator):
         >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
         >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
         >>> results = study.run(weather)
-        >>> waits = study.time_to_find(["1D", "7D"]).set_index("scenario")
-        >>> waits[["1D", "7D", "7D lowest", "7D highest", "7D healthy"]].round(2)
-                       1D    7D  7D lowest  7D highest  7D healthy
+        >>> waits = study.time_to_detection(["1D", "7D"]).set_index("scenario")
+        >>> waits[["1D", "7D", "7D ci_low", "7D ci_high", "7D healthy"]].round(2)
+                       1D    7D  7D ci_low  7D ci_high  7D healthy
         scenario
         healthy      0.02  0.10       0.07        0.16         0.1
         bottom 10 %  0.22  0.83       0.79        0.86         0.1
@@ -506,19 +507,19 @@ class DetectabilityStudy(BaseEstimator):
         bottom 10 %  3 days  13 days
         bottom 20 %  1 days   2 days
         """
-        return self._found().time_to_find(
+        return self._found().time_to_detection(
             within, level, source=source, confidence=confidence, detector=detector, smallest=smallest
         )
 
-    def is_undetected(self, family: str, source: str = "data-informed", detector: str | None = None) -> bool:
+    def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.
 
         Parameters
         ----------
         family : str
             Of the scenarios.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         detector : str, optional
             Name of the detector, where there are several.
 
@@ -539,10 +540,10 @@ class DetectabilityStudy(BaseEstimator):
     def ranking(
         self,
         max_false_alarms: float = 0.02,
-        source: str = "data-informed",
+        source: str = "simulated",
         confidence: float | None = None,
         *,
-        by: Literal["pod", "pod_equal"] = "pod",
+        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
     ) -> pd.DataFrame:
         """Detectors in the order of what they find, with what is not significant.
 
@@ -553,11 +554,11 @@ class DetectabilityStudy(BaseEstimator):
         ----------
         max_false_alarms : float, default=0.02
             Limit of the share of healthy records in alarm.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         confidence : float, optional
             Of the bounds, two-sided; by default that of the study.
-        by : {"pod", "pod_equal"}, default="pod"
+        by : {"pod", "pod_at_equal_pfa"}, default="pod"
             What is compared: detectors as they are, or with thresholds moved to equal false alarms.
 
         Returns
@@ -565,19 +566,22 @@ class DetectabilityStudy(BaseEstimator):
         DataFrame
             One row for each detector, indexed by ``detector``, best first, those that failed last:
 
-            - ``false_alarms``, ``false_alarms_lowest``, ``false_alarms_highest``: rate and bounds, means over the
+            - ``false_alarms``, ``false_alarms_ci_low``, ``false_alarms_ci_high``: rate and bounds, means over the
               healthy scenarios;
-            - ``keeps_limit``: False only where the lower bound is above the limit;
-            - ``pod``, ``pod_lowest``, ``pod_highest``: the same of the damaged scenarios;
-            - ``pod_equal``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the limit
+            - ``within_limit``: False only where the lower bound is above the limit;
+            - ``pod``, ``pod_ci_low``, ``pod_ci_high``: the same of the damaged scenarios;
+            - ``pod_at_equal_pfa``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the
+              limit
               (less where indices are tied); NaN for measured records, which have no calibration;
-            - ``behind``, ``behind_lowest``, ``behind_highest``: POD of the first row less that of this one, by the
+            - ``pod_deficit``, ``pod_deficit_ci_low``, ``pod_deficit_ci_high``: POD of the first row less that of this
+              one, by the
               measure of the order; the bounds hold for all rows together, and are NaN where there is one repeat;
-            - ``clearly_behind``: whether the lower bound is above 0. The choice among the others is not significant;
+            - ``significantly_worse``: whether the lower bound is above 0. The choice among the others is not
+              significant;
             - ``auc``: area under the ROC curve, the mean over the damaged scenarios; 0.5 is chance;
             - ``time_to_detection``: mean over the damaged scenarios; NaN where one of them raises no alarm;
             - ``not_judged``: share of the records that the detector cannot judge, which count nowhere else;
-            - for each family ``pod FAMILY``, ``pod FAMILY lowest``, ``pod FAMILY highest`` and ``mdd FAMILY``, the
+            - for each family ``pod FAMILY``, ``pod FAMILY ci_low``, ``pod FAMILY ci_high`` and ``mdd FAMILY``, the
               minimum detectable damage at a POD of 0.9 (NaN: not reached, or the severities have no order);
             - ``error``: "", or the error of a detector that failed.
 
@@ -586,8 +590,8 @@ class DetectabilityStudy(BaseEstimator):
         NotFittedError
             If the study has no results.
         ValueError
-            If no scenario of this source is healthy, or none is damaged, or ``by="pod_equal"`` and there are no healthy
-            records to move thresholds by.
+            If no scenario of this source is healthy, or none is damaged, or ``by="pod_at_equal_pfa"`` and there are no
+            healthy records to move thresholds by.
 
         Notes
         -----
@@ -614,11 +618,11 @@ class DetectabilityStudy(BaseEstimator):
         >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
         >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
         >>> results = study.run(weather)
-        >>> study.ranking()[["false_alarms", "pod", "pod_equal", "behind_lowest", "clearly_behind"]].round(2)
-                     false_alarms   pod  pod_equal  behind_lowest  clearly_behind
+        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
         detector
-        Mahalanobis          0.02  0.22       0.21            0.0           False
-        forest               0.02  0.18       0.17           -0.0           False
+        Mahalanobis          0.02  0.22              0.21                False
+        forest               0.02  0.18              0.17                False
         >>> print(study.summary())
         'Mahalanobis' finds 21.9% of the damaged records at 1.6% false alarms.
         Not clearly worse: 'forest' (17.8% at 1.6%).
@@ -629,7 +633,7 @@ class DetectabilityStudy(BaseEstimator):
         return self._found().ranking(max_false_alarms, source, confidence, by=by)
 
     def labelled_scores(
-        self, detector: str | None = None, source: str = "data-informed", scenarios: Sequence[str] | None = None
+        self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
     ) -> tuple[NDArray[np.bool_], Array]:
         """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
 
@@ -637,15 +641,15 @@ class DetectabilityStudy(BaseEstimator):
         ----------
         detector : str, optional
             Name of the detector, where there are several.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
         scenarios : sequence of str, optional
             Damaged states whose records are put together, from the onset of damage on; by default all.
 
         Returns
         -------
         is_damaged : ndarray of shape (n_records,)
-            Records of all repeats; those that are not judged are left out.
+            Records of all repeats; those that are not evaluated are left out.
         scores : ndarray of shape (n_records,)
             Minus the decision function: positive is an alarm.
 
@@ -663,21 +667,21 @@ class DetectabilityStudy(BaseEstimator):
         """
         return self._found().labelled_scores(detector, source, scenarios)
 
-    def summary(self, max_false_alarms: float = 0.02, source: str = "data-informed") -> str:
+    def summary(self, max_false_alarms: float = 0.02, source: str = "simulated") -> str:
         """Which detector finds most, and which are not clearly worse, in plain sentences.
 
         Parameters
         ----------
         max_false_alarms : float, default=0.02
             Limit of the share of healthy records in alarm.
-        source : str, default="data-informed"
-            "data-informed" or "reference".
+        source : str, default="simulated"
+            "simulated" or "reference".
 
         Returns
         -------
         str
-            What `ranking` says, a line for each group of detectors, and what `time_to_find` says of the first one: of
-            the healthy structure, and of each family the smallest severity that is found reliably.
+            What `ranking` says, a line for each group of detectors, and what `time_to_detection` says of the first
+            one: of the healthy structure, and of each family the smallest severity that is found reliably.
 
         Raises
         ------

@@ -155,13 +155,13 @@ class DetectionTask(Bunch):
             One row for each detector:
 
             - ``tuned``: score in the task, mean over its splits;
-            - ``fresh``, ``fresh_lowest``, ``fresh_highest``: the same score in the fresh records, and its bounds;
+            - ``fresh``, ``fresh_ci_low``, ``fresh_ci_high``: the same score in the fresh records, and its bounds;
             - ``optimism``: ``tuned`` less ``fresh``;
-            - ``false_alarms``, ``false_alarms_lowest``, ``false_alarms_highest``: share of the healthy fresh records
+            - ``false_alarms``, ``false_alarms_ci_low``, ``false_alarms_ci_high``: share of the healthy fresh records
               beyond the detector's own threshold, and its bounds;
-            - ``keeps_limit``: False where both of these bounds exceed the limit of the task: give the detector a
+            - ``within_limit``: False where both of these bounds exceed the limit of the task: give the detector a
               smaller ``contamination``;
-            - ``not_judged``: share of the fresh records that are not judged.
+            - ``not_judged``: share of the fresh records that are not evaluated.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class DetectionTask(Bunch):
         limit = self.scoring.max_false_alarms
         found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
         drawn = [scenario.n_draws > 1 for scenario in self.scenarios]
-        missed = np.where(np.isnan(found.values), 0.0, found.values - found.raised(limit))  # not judged is not found
+        missed = np.where(np.isnan(found.values), 0.0, found.values - found.raised(limit))  # not evaluated is not found
         pods = [
             rate_of(found.by_repeat(missed, rows), confidence, drawn[found.scenario[rows[0]]])
             for rows in found.damaged()
@@ -209,12 +209,12 @@ class DetectionTask(Bunch):
         alarms, worth = found.false_alarms(confidence), found.worth(limit)
         return {
             "fresh": found.score(limit),
-            "fresh_lowest": worth * float(np.mean([pod.lowest for pod in pods])),
-            "fresh_highest": worth * float(np.mean([pod.highest for pod in pods])),
+            "fresh_ci_low": worth * float(np.mean([pod.lowest for pod in pods])),
+            "fresh_ci_high": worth * float(np.mean([pod.highest for pod in pods])),
             "false_alarms": alarms.rate,
-            "false_alarms_lowest": alarms.lowest,
-            "false_alarms_highest": alarms.highest,
-            "keeps_limit": alarms.lowest <= limit,
+            "false_alarms_ci_low": alarms.lowest,
+            "false_alarms_ci_high": alarms.highest,
+            "within_limit": alarms.lowest <= limit,
             "not_judged": float(np.isnan(found.values).mean()),
         }
 
@@ -298,7 +298,7 @@ def detection_task(
     The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
     until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
-    scenarios, which count alike. A damaged record that is not judged is not found. Where false alarms by the own
+    scenarios, which count alike. A damaged record that is not evaluated is not found. Where false alarms by the own
     threshold exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound.
 
     All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
@@ -336,8 +336,8 @@ def detection_task(
     {'rule': 'mean', 'window': 7}
     >>> later = make_truss_campaign(random_state=2).temperatures
     >>> detectors = {"tuned": search, "single records": WindowedAlarm(1)}
-    >>> task.confirm(detectors, later, random_state=0)[["tuned", "fresh", "fresh_lowest", "fresh_highest"]].round(2)
-                    tuned  fresh  fresh_lowest  fresh_highest
+    >>> task.confirm(detectors, later, random_state=0)[["tuned", "fresh", "fresh_ci_low", "fresh_ci_high"]].round(2)
+                    tuned  fresh  fresh_ci_low  fresh_ci_high
     detector
     tuned            0.67   0.67          0.62           0.71
     single records   0.15   0.15          0.13           0.17

@@ -26,7 +26,7 @@ class Decisions:
     """A detector's decisions on simulated records in order of time, with the label of each and the numbers of its
     scenario and its repeat.
 
-    Negative decisions are alarms, NaN where a record is not judged; labels are +1 (healthy) and -1 (damaged).
+    Negative decisions are alarms, NaN where a record is not evaluated; labels are +1 (healthy) and -1 (damaged).
     """
 
     values: Array

@@ -70,11 +70,11 @@ class Clock:
 @dataclass(frozen=True, eq=False)
 class Waits:
     """Number of steps from each onset of damage to the first alarm, (n_repeats, n_onsets), 1 for an alarm of the first
-    record; infinite where there is none. ``share_not_judged`` is of the steps, also those without any record."""
+    record; infinite where there is none. ``share_not_evaluated`` is of the steps, also those without any record."""
 
     clock: Clock
     steps: Array
-    share_not_judged: float
+    share_not_evaluated: float
     whole_repeats: bool
 
     @classmethod
@@ -195,12 +195,12 @@ def waits_table(
         numbers = [waits.clock.count(time) for time in times.values()]
         for name, number in zip(times, numbers, strict=True):
             found = waits.found(number, confidence)
-            row |= dict(zip([name, f"{name} lowest", f"{name} highest"], found, strict=True))
+            row |= dict(zip([name, f"{name} ci_low", f"{name} ci_high"], found, strict=True))
             row[f"{name} healthy"] = np.nan if false is None else false.found(number, confidence)[0]
         row["median"] = waits.clock.time(waits.within(0.5))
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
-        row["not_judged"] = waits.share_not_judged
+        row["not_judged"] = waits.share_not_evaluated
         text = false_alarms_told(waits, numbers) if scenario.is_healthy else waits_told(waits, false, level)
         rows.append(row | {"text": text})
     table = pd.DataFrame(rows)

@@ -1,5 +1,5 @@
 """Which further measurement would make smaller damage detectable."""
 
-from skthermo.studies.extension._what_to_add import what_to_add
+from skthermo.studies.extension._compare_extensions import compare_extensions
 
-__all__ = ["what_to_add"]
+__all__ = ["compare_extensions"]

@@ -85,7 +85,7 @@ class DamagePrior:
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that may have changed, by one unknown amount between ``lowest`` and ``highest``, one of them 0.
+    """Something that may have changed, by one unknown amount between ``ci_low`` and ``ci_high``, one of them 0.
 
     Amounts are severities of damage (below 0 for stiffening), relative changes of a parameter, or how many times a
     mass pattern was added. ``scale`` is the standard deviation of the half-normal law of amounts, relative to the

@@ -195,7 +195,7 @@ def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
 def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
     """How much of a cause there is within an explanation."""
     row = found.estimates.loc[(" + ".join(causes), cause)]
-    values = (float(row[name]) for name in ("severity", "lowest", "highest"))
+    values = (float(row[name]) for name in ("severity", "ci_low", "ci_high"))
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
 
 
@@ -255,7 +255,7 @@ def _averages(found: IdentifiedDamage, first: Told) -> Iterator[str]:
         return
     named = []
     for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
-        amount = Amount(str(cause), row["kind"], row["severity"], row["lowest"], row["highest"])
+        amount = Amount(str(cause), row["kind"], row["severity"], row["ci_low"], row["ci_high"])
         word = "damaged" if row["kind"] == "damage" else "changed"
         probability = f"{word} with probability {chance_text(row['probability'])}"
         named.append(f"{cause} {amount.size} ({amount.band}; {probability})")
@@ -306,7 +306,7 @@ def warnings(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
         yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
-            f"probability of something else {chance_text(found.probability_of_else)}"
+            f"probability of something else {chance_text(found.probability_other)}"
             if best.has_else
             else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
         )
@@ -385,10 +385,10 @@ class IdentifiedDamage:
         most probable severities; ``text``, such as "side span 12 %, main stays 4 %".
     estimates : DataFrame
         Amount of each cause in each explanation, by explanation and cause, if that explanation is right: mean
-        ``severity``, ``standard_error``, and ``lowest`` and ``highest``, which hold it with a probability of 90 %.
+        ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which hold it with a probability of 90 %.
     table : DataFrame
         One row a cause: ``probability`` that it is among the causes; ``severity``, its mean over all explanations,
-        where those without it count as 0, with ``standard_error``; ``lowest`` and ``highest``, which hold it with a
+        where those without it count as 0, with ``standard_error``; ``ci_low`` and ``ci_high``, which hold it with a
         probability of 90 %; ``if_damaged``, its mean where it is among the causes, and ``highest_if_damaged``, which it
         then does not exceed with a probability of 95 %; ``error_alone``, the standard error
         if nothing else could have changed and the amount could have either sign; ``kind``: "damage", "stiffening",
@@ -403,7 +403,7 @@ class IdentifiedDamage:
         Causes of the most probable explanation, "something else" among them; empty for "no damage".
     probability_of_damage : float
         Probability that anything changed.
-    probability_of_else : float
+    probability_other : float
         Probability that something else than the named causes shifted the frequencies, beside them or alone.
     similarity : DataFrame
         Cosines between the effects of the causes, in standard errors of the shifts.
@@ -454,7 +454,7 @@ class IdentifiedDamage:
     rest: float
     most_probable: tuple[str, ...]
     probability_of_damage: float
-    probability_of_else: float
+    probability_other: float
     similarity: pd.DataFrame
     confused: list[tuple[str, ...]]
     unseen: list[str]

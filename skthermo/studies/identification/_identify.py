@@ -28,8 +28,8 @@ from skthermo.studies.identification._posterior import Posterior
 from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
 from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
 from skthermo.studies.identification._shift import FrequencyShift
+from skthermo.studies.replicates import checked_models
 from skthermo.studies.scenarios import check_chain
-from skthermo.studies.worlds import checked_models
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
@@ -272,7 +272,7 @@ def findings(
         rest=max(1 - sum(one.probability for one in listed), 0.0),
         most_probable=best.causes,
         probability_of_damage=1 - posterior.no_damage,
-        probability_of_else=posterior.probability_of("something else"),
+        probability_other=posterior.probability_of("something else"),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
         confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
         unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],

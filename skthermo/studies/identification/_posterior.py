@@ -102,7 +102,7 @@ class Posterior:
         }
         index = pd.MultiIndex.from_tuples(list(rows), names=["explanation", "cause"])
         return pd.DataFrame(
-            list(rows.values()), index=index, columns=["severity", "standard_error", "lowest", "highest"]
+            list(rows.values()), index=index, columns=["severity", "standard_error", "ci_low", "ci_high"]
         )
 
     def drawn(self, causes: Sequence[str], number: int, random: np.random.RandomState) -> Array:
@@ -131,11 +131,11 @@ class Posterior:
         everything = sum(one.probability for one in self.explanations)
         probability = weight.sum() / everything
         present = (
-            _summary(inside, weight) if weight.sum() > 0 else dict.fromkeys(("severity", "lowest", "highest"), np.nan)
+            _summary(inside, weight) if weight.sum() > 0 else dict.fromkeys(("severity", "ci_low", "ci_high"), np.nan)
         )
         all_values, all_weights = np.append(inside, 0.0), np.append(weight, max(everything - weight.sum(), 0.0))
         averages = _summary(all_values, all_weights)
-        farthest = present["lowest" if present["severity"] < 0 else "highest"]
+        farthest = present["ci_low" if present["severity"] < 0 else "ci_high"]
         extremes = {"if_damaged": present["severity"], "highest_if_damaged": farthest}
         return {"probability": probability, **averages, **extremes}
 
@@ -148,7 +148,7 @@ def _summary(values: Array, weights: Array) -> dict[str, float]:
     shares = np.cumsum(weights[order])
     ends = [float(values[order][min(np.searchsorted(shares, share - 1e-12), len(values) - 1)]) for share in BAND]
     error = float(np.sqrt(max(weights @ (values - mean) ** 2, 0.0)))
-    return {"severity": mean, "standard_error": error, "lowest": ends[0], "highest": ends[1]}
+    return {"severity": mean, "standard_error": error, "ci_low": ends[0], "ci_high": ends[1]}
 
 
 def _explanation(

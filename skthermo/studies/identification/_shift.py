@@ -83,9 +83,9 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     parts = new + scatter.of_sums(shares, np.arange(len(shares)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        n_judged, of_correlations = judged.sum(), freedom + scatter.n_pseudo
-        factor = of_correlations / max(of_correlations - n_judged + 1, 1.0)
-        freedom = max(freedom - n_judged + 1, 1.0)
+        n_evaluated, of_correlations = judged.sum(), freedom + scatter.n_pseudo
+        factor = of_correlations / max(of_correlations - n_evaluated + 1, 1.0)
+        freedom = max(freedom - n_evaluated + 1, 1.0)
     covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
     return FrequencyShift(
         mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_

@@ -151,10 +151,10 @@ def locate_damage(
             break
         divisions = finer  # groups that have become improbable stay whole
     located = located_damage(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
-    if located.probability_of_else >= MOSTLY_ELSE:
+    if located.probability_other >= MOSTLY_ELSE:
         warn_user(
             "no damage of neighbouring members explains the shifts (something else has a probability of "
-            f"{located.probability_of_else:.0%})",
+            f"{located.probability_other:.0%})",
             "unexplained shifts",
         )
     return located
@@ -170,7 +170,7 @@ def plausible_together(found: IdentifiedDamage) -> list[tuple[str, ...]]:
 
 def asked(found: IdentifiedDamage, places: Mapping[str, Places]) -> list[str]:
     """Groups of several members that are divided: probable ones, or all if whole groups do not explain the shifts."""
-    is_open = found.is_unexplained or found.probability_of_else > SOME_ELSE
+    is_open = found.is_unexplained or found.probability_other > SOME_ELSE
     probable = found.table["probability"]
     several = [group for group, where in places.items() if len(where.members) > 1]
     return [group for group in several if is_open or probable[group] >= WORTH_ASKING]

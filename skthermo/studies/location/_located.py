@@ -100,7 +100,7 @@ class LocatedDamage:
         Whose members these are.
     probability_of_damage : float
         Probability that a member is damaged.
-    probability_of_else : float
+    probability_other : float
         Probability that something else shifted the frequencies, beside damage or alone.
     alike : list of str
         Two probable places, in words, that these modes cannot tell apart; empty if there are none.
@@ -135,7 +135,7 @@ class LocatedDamage:
     found: IdentifiedDamage
     structure: Structure = field(repr=False)
     probability_of_damage: float
-    probability_of_else: float
+    probability_other: float
     alike: list[str]
     explained: Sequence[Explained] = field(repr=False)
     places: Mapping[str, Places] = field(repr=False)
@@ -206,8 +206,8 @@ class LocatedDamage:
             yield from self._of_group(str(group), row)
         if self.alike:
             yield f"These modes cannot tell {' from '.join(self.alike)}."
-        if self.probability_of_else >= WORTH_TELLING:
-            yield f"Something else may have shifted the frequencies ({_share(self.probability_of_else)})."
+        if self.probability_other >= WORTH_TELLING:
+            yield f"Something else may have shifted the frequencies ({_share(self.probability_other)})."
         if self.found.unseen:
             yield f"Damage in {listed(self.found.unseen)} would hardly show in these modes."
 
@@ -294,7 +294,7 @@ def located_damage(
         found=found,
         structure=next(iter(places.values())).structure,
         probability_of_damage=sum(one.probability for one in explained if one.members) / total,
-        probability_of_else=sum(one.probability for one in explained if one.has_else) / total,
+        probability_other=sum(one.probability for one in explained if one.has_else) / total,
         alike=alike,
         explained=explained,
         places=places,

@@ -611,9 +611,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         multiple of the spread of these residuals in similar weather; the multiple is the order statistic that the folds
         themselves needed. If new records are exchangeable with the training records, the interval holds a mode with
         about the probability asked; the share of a short period varies more, because records of one structure are
-        serially correlated. Beyond the training range, the interval is widened by the distance (see `applicability`).
-        Where a temperature was filled, it is widened by the change of the prediction when that temperature is wrong by
-        its standard deviation, sensor by sensor in quadrature.
+        serially correlated. Beyond the training range, the interval is widened by the distance (see
+        `extrapolation_distance`). Where a temperature was filled, it is widened by the change of the prediction when
+        that temperature is wrong by its standard deviation, sensor by sensor in quadrature.
 
         A mapper that knows how uncertain it is (`predict_covariance`) says so in place of that distance: its standard
         deviation is added in quadrature, and the residuals count without what it explains of them. Only beyond the
@@ -912,7 +912,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         return self.recorder_.residuals
 
-    def applicability(self, X: ArrayLike) -> pd.DataFrame:
+    def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far inputs and parameters are outside the training range, row by row.
 
         Parameters

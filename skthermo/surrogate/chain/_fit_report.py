@@ -383,7 +383,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
         ),
         findings=findings,
         fleet=weather_of_fleet(chain),
-        follows=getattr(last_step(chain.mapper_), "follows_", None),
+        follows=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         solved=chain.simulator_.described,
     )
 

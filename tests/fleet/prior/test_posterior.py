@@ -153,9 +153,9 @@ def test_other_bridges_of_the_family_are_within_its_bands(n_bridges):
 def test_a_fleet_of_aliens_by_weight_is_left_out():
     random = np.random.default_rng(5)
     members = simulated(random, 40, np.zeros(FUNCTIONS), 0.1 * np.eye(FUNCTIONS))
-    aliens = simulated(random, 5, np.full(FUNCTIONS, 50.0), np.eye(FUNCTIONS))
+    atypical = simulated(random, 5, np.full(FUNCTIONS, 50.0), np.eye(FUNCTIONS))
     follows = {(i, "g"): 0.0 for i in range(40, 45)}
-    family = learn_families([*members, *aliens], ["g"], follows)["g"]
+    family = learn_families([*members, *atypical], ["g"], follows)["g"]
     assert_allclose(family.M, learn_families(members, ["g"], {})["g"].M, atol=0.01)
 
 

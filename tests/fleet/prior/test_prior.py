@@ -74,7 +74,7 @@ def test_much_data_decide_and_no_data_leave_the_mean(prior):
     for i, family in enumerate(["f1", "f2"]):
         fleet = change @ known.families[family].M[0]
         logs = np.log(one.predict(T).to_numpy()[:, i])
-        follows = one.follows_[family]
+        follows = one.pooling_probability_[family]
         assert follows > 0.85
         assert_allclose(logs - logs.mean(), follows * fleet, atol=1e-3)
 
@@ -99,16 +99,16 @@ def test_an_alien_is_told_from_the_fleet_and_loses_little(prior):
     for seed in range(80, 86):
         T, F, _ = records(seed, 60, law=ALIEN)
         mapper = prior.mapper().fit(T, F)
-        assert max(mapper.follows_.values()) < 0.5
+        assert max(mapper.pooling_probability_.values()) < 0.5
         ratios.append(error(mapper, seed, law=ALIEN) / error(FleetMapper().fit(T, F), seed, law=ALIEN))
     assert np.mean(ratios) < 1.05
 
 
 def test_aliens_in_a_fleet_are_found_and_do_not_widen_it(prior):
-    aliens = {f"alien {seed}": records(seed, law=ALIEN)[:2] for seed in (90, 91)}
-    found = FleetPrior().fit(FLEET | aliens)
+    atypical = {f"alien {seed}": records(seed, law=ALIEN)[:2] for seed in (90, 91)}
+    found = FleetPrior().fit(FLEET | atypical)
     follows = found.bridges_["follows"].unstack()
-    assert (follows.loc[list(aliens)] < 0.1).all(axis=None)
+    assert (follows.loc[list(atypical)] < 0.1).all(axis=None)
     assert (follows.loc[list(FLEET)] > 0.5).all(axis=None)
     T, F, _ = records(50, 30)
     assert error(found.mapper().fit(T, F), 50) < 1.3 * error(prior.mapper().fit(T, F), 50)
@@ -121,7 +121,7 @@ def test_unrelated_bridges_are_not_pooled():
     assert not found.comparison_["is_pooled"].any()
     assert "learns it alone" in found.summary()
     mapper = found.mapper().fit(*records(50, 40)[:2])
-    assert set(mapper.follows_.values()) == {0.0}
+    assert set(mapper.pooling_probability_.values()) == {0.0}
 
 
 def test_two_bridges_are_never_enough():
@@ -136,7 +136,7 @@ def test_families_join_names_and_none_is_never_pooled():
     assert found.comparison_["n_bridges"].to_dict() == {"a": 6, "b": 5}
     mapper = found.mapper(families={"f1": "a", "f2": None}).fit(*records(50, 40)[:2])
     assert mapper.families_ == {"f1": "a", "f2": None}
-    assert mapper.follows_[None] == 0.0
+    assert mapper.pooling_probability_[None] == 0.0
 
 
 def test_a_covariate_foretells_what_it_moves():

@@ -1,6 +1,7 @@
-"""Does the mode that `what_to_add` recommends lower the minimum detectable damage of the true truss as much as it says?
+"""Does the mode that `compare_extensions` recommends lower the minimum detectable damage of the true truss as much as
+it says?
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/detectability_what_to_add.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/detectability_compare_extensions.py
 
 For every seed, a study of the chain predicts what one more mode, or a baseline twice as long, would gain. Fresh
 records of the thermo-mechanical law with one more mode give the gain of one baseline and one year: in the weather of
@@ -17,7 +18,7 @@ import pandas as pd
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import add_noise
-from skthermo.studies import DetectabilityStudy, pod_curve, sweep, what_to_add
+from skthermo.studies import DetectabilityStudy, compare_extensions, pod_curve, sweep
 from skthermo.surrogate import DataInformedFEM
 
 NOISE = 0.01
@@ -27,7 +28,7 @@ DOUBTFUL = "mode 8"  # as a warning says: it depends on the verticals, which the
 
 
 def predicted(seed, noise):
-    """The table of `what_to_add` for a chain that has learned one year."""
+    """The table of `compare_extensions` for a chain that has learned one year."""
     year, later = (make_truss_campaign(noise=NOISE, random_state=1000 * seed + i) for i in range(2))
     fem = DataInformedFEM(make_truss(), random_state=seed).fit(year.temperatures, year.frequencies)
     scenarios = [s for g, severities in SEVERITIES.items() for s in sweep(fem, severities, [g])[1:]]
@@ -38,7 +39,7 @@ def predicted(seed, noise):
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=f"{DOUBTFUL} depends on parameters")
-        return what_to_add(study, later.temperatures), time.perf_counter() - start
+        return compare_extensions(study, later.temperatures), time.perf_counter() - start
 
 
 def smallest(records, modes, n_years):

@@ -1,4 +1,4 @@
-"""Worlds: structures that could have given the training records of a chain, each in weather of its own."""
+"""Replicates: structures that could have given the training records of a chain, each in weather of its own."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ import numpy as np
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import positive_integer
-from skthermo.studies.worlds._models import checked_models, drawn_models
-from skthermo.studies.worlds._weather import other_years, resampled_days
+from skthermo.studies.replicates._models import checked_models, drawn_models
+from skthermo.studies.replicates._weather import other_years, resampled_days
 
 PARTS = ("noise", "weather", "baseline", "model")
-"""What a world draws, in the order in which one is added to the others."""
+"""What a replicate draws, in the order in which one is added to the others."""
 
 ALL = "all"
 LEAST_WORLDS = 2
@@ -20,10 +20,10 @@ LARGEST_SEED = np.iinfo(np.int32).max
 
 
 @dataclass(frozen=True, eq=False)
-class Worlds:
+class Replicates:
     """What may vary beside the noise, ``parts``; years of weather, of which the first is that of the study; models.
 
-    Every world is drawn from its own seed alone. Without "noise" among what varies, all worlds have the same.
+    Every replicate is drawn from its own seed alone. Without "noise" among what varies, all replicates have the same.
     """
 
     fem: Any
@@ -34,12 +34,15 @@ class Worlds:
     seeds: Sequence[int]
 
     @classmethod
-    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: Any) -> "Worlds":
-        """So many worlds in which the named parts vary; without models, these are drawn from the training records."""
+    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: Any) -> "Replicates":
+        """So many replicates in which the named parts vary; without models, these are drawn from the training
+        records."""
         asked = checked_parts(uncertainty)
         years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
-        if positive_integer(number, "n_worlds") < LEAST_WORLDS:
-            raise ValueError(f"n_worlds is {number}; expected at least {LEAST_WORLDS}, 20 or more for bands of 90 %")
+        if positive_integer(number, "n_replicates") < LEAST_WORLDS:
+            raise ValueError(
+                f"n_replicates is {number}; expected at least {LEAST_WORLDS}, 20 or more for bands of 90 %"
+            )
         random = np.random.RandomState(seed)
         seeds = random.randint(LARGEST_SEED, size=number + 1)
         if models is not None:
@@ -53,7 +56,7 @@ class Worlds:
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
-    def world(self, number: int) -> Iterator[tuple[str, Any, Any]]:
+    def replicate(self, number: int) -> Iterator[tuple[str, Any, Any]]:
         """One part after the other, with a chain and temperatures in which it and those before vary.
 
         Other training records are those that the chain's structure could have given as well in the same weather.

@@ -1,4 +1,4 @@
-"""Rates of alarms in many worlds, and the bands that a measured campaign should lie in."""
+"""Rates of alarms in many replicates, and the bands that a measured campaign should lie in."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -20,19 +20,19 @@ from skthermo.studies.detectability._families import FamilyRates
 from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement, Key
 from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
-from skthermo.studies.worlds import Worlds
+from skthermo.studies.replicates import Replicates
 
-N_DRAWS = 3  # draws of the noise in each world, which tell its share from that of what else varies
-MOST_FAILURES = 0.5  # share of worlds that may fail
+N_DRAWS = 3  # draws of the noise in each replicate, which tell its share from that of what else varies
+MOST_FAILURES = 0.5  # share of replicates that may fail
 SMALL = 0.1  # share of a variance that is not worth a word
 NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}
 
 
 @dataclass(frozen=True, eq=False)
-class WorldRates:
-    """Rates of alarms in worlds, (n_worlds, n_parts, n_draws), by detector and scenario, as parts are added one after
-    the other, and ``own`` rates of the study's repeats; ``n_records`` are judged in each draw, and ``with_noise`` tells
-    whether bands hold the noise, too."""
+class ReplicateRates:
+    """Rates of alarms in replicates, (n_replicates, n_parts, n_draws), by detector and scenario, as parts are added
+    one after the other, and ``own`` rates of the study's repeats; ``n_records`` are judged in each draw, and
+    ``with_noise`` tells whether bands hold the noise, too."""
 
     rates: Mapping[Key, Array]
     own: Mapping[Key, Array]
@@ -43,36 +43,39 @@ class WorldRates:
 
     @classmethod
     def of(
-        cls, simulation: Simulation, judgement: Judgement, worlds: Worlds, n_jobs: int | None, verbose: int = 0
-    ) -> "WorldRates":
-        """Judge the records of every world; those that fail are counted in a warning, unless most fail.
+        cls, simulation: Simulation, judgement: Judgement, replicates: Replicates, n_jobs: int | None, verbose: int = 0
+    ) -> "ReplicateRates":
+        """Judge the records of every replicate; those that fail are counted in a warning, unless most fail.
 
         Given are the simulation of the study and how its detectors have judged the records of the repeats.
         """
         simulation = replace(simulation, clean={}, reference=None)
-        jobs = (delayed(_rates_of_world)(simulation, worlds, number) for number in range(len(worlds.seeds)))
+        jobs = (delayed(_rates_of_replicate)(simulation, replicates, number) for number in range(len(replicates.seeds)))
         with without_warnings():
-            outcomes = run_jobs(jobs, len(worlds.seeds), unit="replicates", n_jobs=n_jobs, verbose=verbose)
+            outcomes = run_jobs(jobs, len(replicates.seeds), unit="replicates", n_jobs=n_jobs, verbose=verbose)
         errors = [one for one in outcomes if isinstance(one, str)]
         found = [one for one in outcomes if not isinstance(one, str)]
         if len(errors) > MOST_FAILURES * len(outcomes):
             raise ValueError(
-                f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}; expected chains that can "
-                "be refitted, or uncertainty='noise'"
+                f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}; expected chains that "
+                "can be refitted, or uncertainty='noise'"
             )
         if errors:
             warn_user(
-                f"{len(errors)} of {len(outcomes)} worlds failed, the first with {errors[0]}: bands are of the others",
-                "failed worlds",
+                f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
+                "others",
+                "failed replicates",
             )
         own = _counted(judgement, simulation.scenarios, simulation.T)
         keys = [key for key in found[0] if all(key in one for one in (own, *found))]
         rates = {key: np.array([one[key][0] for one in found]) for key in keys}
         n_records = {key: float(np.mean([one[key][1] for one in found])) for key in keys}
-        return cls(rates, {key: own[key][0] for key in keys}, n_records, worlds.parts, worlds.with_noise, errors)
+        return cls(
+            rates, {key: own[key][0] for key in keys}, n_records, replicates.parts, replicates.with_noise, errors
+        )
 
     def logits(self, key: Key) -> Array:
-        """Logits of the rates of single campaigns with all that varies, (n_worlds, n_draws).
+        """Logits of the rates of single campaigns with all that varies, (n_replicates, n_draws).
 
         Chains of other training records differ from what detectors have learned to either side, and each of them adds
         its own error out of fold to the noise, so that alarms rise in the mean. The rates of the study hold one such
@@ -84,14 +87,14 @@ class WorldRates:
         return steps[:, -1] - sum(rise for part, rise in zip(self.parts, rises, strict=True) if part == "baseline")
 
     def single(self, key: Key) -> Array:
-        """Rates of single campaigns with all that varies, (n_worlds, n_draws), or without noise their mean."""
+        """Rates of single campaigns with all that varies, (n_replicates, n_draws), or without noise their mean."""
         rates = self._rates(self.logits(key), key)
         return rates if self.with_noise else rates.mean(axis=1, keepdims=True)
 
     def band(self, key: Key, confidence: float) -> tuple[float, float]:
         """Rates between which that of a measured campaign should lie with this probability.
 
-        Student's law on the scale of the logit: of few worlds, quantiles are hardly known.
+        Student's law on the scale of the logit: of few replicates, quantiles are hardly known.
         """
         spread, number = WorldSpread.of(self.logits(key)), len(self.rates[key])
         variance = spread.between + self.with_noise * spread.within
@@ -109,12 +112,12 @@ class WorldRates:
         return np.clip(((n + 1) * expit(logits) - 0.5) / n, 0, 1)
 
     def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
-        """The table of a study, whose simulated rows have the bands of the worlds."""
+        """The table of a study, whose simulated rows have the bands of the replicates."""
         results = results.copy()
         for row in results.index[results["source"] == SIMULATED]:
             key = results.at[row, "detector"], results.at[row, "scenario"]
             if key in self.rates:
-                results.loc[row, ["band_lowest", "band_highest"]] = self.band(key, confidence)
+                results.loc[row, ["pi_low", "pi_high"]] = self.band(key, confidence)
         return results
 
     def smallest(self, family: FamilyRates, level: float, method: str, confidence: float) -> tuple[float, float]:
@@ -133,7 +136,7 @@ class WorldRates:
         return float(sign * lowest), float(sign * highest)
 
     def curves(self, family: FamilyRates, log: bool = False) -> list[PODCurve]:
-        """Fitted curves of all campaigns of all worlds that have one."""
+        """Fitted curves of all campaigns of all replicates that have one."""
         tested, curves = family.tested, []
         n = tested["n_effective"] / tested["n_repeats"]
         for row in self._campaigns(family):
@@ -170,7 +173,7 @@ class WorldRates:
 
 @dataclass(frozen=True)
 class WorldSpread:
-    """Mean of values, (n_worlds, n_draws), and their variances between worlds and within them."""
+    """Mean of values, (n_replicates, n_draws), and their variances between replicates and within them."""
 
     mean: float
     between: float
@@ -178,19 +181,21 @@ class WorldSpread:
 
     @classmethod
     def of(cls, values: Array) -> "WorldSpread":
-        """Analysis of variance of values, (n_worlds, n_draws)."""
+        """Analysis of variance of values, (n_replicates, n_draws)."""
         means, within = values.mean(axis=1), float(values.var(axis=1, ddof=1).mean())
         between = max(float(means.var(ddof=1)) - within / values.shape[1], 0.0)
         return cls(float(means.mean()), between, within)
 
 
-def _rates_of_world(simulation: Simulation, worlds: Worlds, number: int) -> Any:
+def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: int) -> Any:
     """Rates, (n_parts, n_draws), and numbers of judged records by detector and scenario; or the text of an error."""
     with without_warnings(), single_blas_thread():
-        random = np.random.RandomState([worlds.seeds[number] if worlds.with_noise else 0, N_DRAWS])
+        random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
         seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
         try:
-            steps = [_rates(simulation, chain, T, seeds, number * N_DRAWS) for _, chain, T in worlds.world(number)]
+            steps = [
+                _rates(simulation, chain, T, seeds, number * N_DRAWS) for _, chain, T in replicates.replicate(number)
+            ]
         except Exception as error:
             return f"{type(error).__name__}: {error}"
     keys = [key for key in steps[0] if all(key in step for step in steps)]
@@ -235,22 +240,22 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
     names = [column for column in parts.columns if column in NAMES]
     lines = [f"Bands of {confidence:.0%} hold {_listed([NAMES[name] for name in names])}."]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
-    width = (rows["band_highest"] - rows["band_lowest"])[rows["measure"] == "POD"].dropna()
+    width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()
     if len(width) and (detector, width.idxmax()) in parts.index:
         widest = rows.loc[width.idxmax()]
         shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
         told = shares[shares >= SMALL].sort_values(ascending=False)
         causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
-        band = f"{widest['band_lowest']:.1%} to {widest['band_highest']:.1%}"
+        band = f"{widest['pi_low']:.1%} to {widest['pi_high']:.1%}"
         lines.append(
             f"A measured campaign of {widest.name!r} should show {band} of its records in alarm, the widest band."
         )
         if causes:
             lines.append(f"Of its variance come {causes}.")
-    outside = rows[(rows["rate"] < rows["band_lowest"]) | (rows["rate"] > rows["band_highest"])]
+    outside = rows[(rows["rate"] < rows["pi_low"]) | (rows["rate"] > rows["pi_high"])]
     if len(outside):
         shares = [
-            f"{name!r} ({row['rate']:.1%}, band {row['band_lowest']:.1%} to {row['band_highest']:.1%})"
+            f"{name!r} ({row['rate']:.1%}, band {row['pi_low']:.1%} to {row['pi_high']:.1%})"
             for name, row in outside.iterrows()
         ]
         cause = "the training records contradict the chain's model: calibrate it (ModelUpdater)"

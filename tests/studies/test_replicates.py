@@ -12,9 +12,9 @@ from sklearn.base import clone
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
-from skthermo.studies.detectability._world_rates import WorldRates, WorldSpread
-from skthermo.studies.worlds import PARTS, Worlds
-from skthermo.studies.worlds._weather import other_years, resampled_days
+from skthermo.studies.detectability._replicate_rates import ReplicateRates, WorldSpread
+from skthermo.studies.replicates import PARTS, Replicates
+from skthermo.studies.replicates._weather import other_years, resampled_days
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -23,7 +23,7 @@ MODELS = [make_truss().damaged({"bottom": loss}) for loss in (-0.03, 0.04, 0.0)]
 
 def study_of(fem, uncertainty, **options):
     scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
-    settings = {"n_repeats": 2, "n_worlds": 2, "random_state": 0} | options
+    settings = {"n_repeats": 2, "n_replicates": 2, "random_state": 0} | options
     return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, uncertainty=uncertainty, **settings)
 
 
@@ -90,15 +90,15 @@ def test_years_are_matched_by_season():
 def test_repeats_do_not_depend_on_the_worlds(fem, study):
     alone = study_of(fem, "noise")
     results = alone.run(WEATHER)
-    left = study.results_.drop(columns=["band_lowest", "band_highest"])
-    pd.testing.assert_frame_equal(results.drop(columns=["band_lowest", "band_highest"]), left)
+    left = study.results_.drop(columns=["pi_low", "pi_high"])
+    pd.testing.assert_frame_equal(results.drop(columns=["pi_low", "pi_high"]), left)
     for key, decisions in alone.decisions_.items():
         np.testing.assert_array_equal(decisions, study.decisions_[key])
-    assert alone.worlds_ is None
+    assert alone.replicates_ is None
     assert alone.uncertainty_ is None
-    rates = (alone.decisions_["MahalanobisDetector", "bottom 10 %", "data-informed"] < 0).mean(axis=1)
+    rates = (alone.decisions_["MahalanobisDetector", "bottom 10 %", "simulated"] < 0).mean(axis=1)
     row = results.set_index("scenario").loc["bottom 10 %"]
-    assert (row["band_lowest"], row["band_highest"]) == (rates.min(), rates.max())
+    assert (row["pi_low"], row["pi_high"]) == (rates.min(), rates.max())
 
 
 @pytest.mark.nightly
@@ -112,9 +112,11 @@ def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
 
 
 def test_a_world_is_drawn_from_its_seed_alone(fem):
-    few, many = (Worlds.of(fem, ("baseline", "weather"), WEATHER, None, number, [1, 2]) for number in (2, 4))
+    few, many = (Replicates.of(fem, ("baseline", "weather"), WEATHER, None, number, [1, 2]) for number in (2, 4))
     for number in (0, 1):
-        for (part, chain, T), (again, other, T_again) in zip(few.world(number), many.world(number), strict=True):
+        for (part, chain, T), (again, other, T_again) in zip(
+            few.replicate(number), many.replicate(number), strict=True
+        ):
             assert part == again
             pd.testing.assert_frame_equal(T, T_again)
             pd.testing.assert_frame_equal(chain.predict(T), other.predict(T))
@@ -122,10 +124,10 @@ def test_a_world_is_drawn_from_its_seed_alone(fem):
 
 @pytest.mark.filterwarnings("ignore:the aligner hides offsets")
 def test_parts_come_one_after_the_other(fem):
-    worlds = Worlds.of(fem, ("model", "noise", "baseline", "weather"), WEATHER, MODELS, 3, [1, 2])
-    (weather, chain, T), (baseline, other, _), (model, third, _) = worlds.world(1)
+    replicates = Replicates.of(fem, ("model", "noise", "baseline", "weather"), WEATHER, MODELS, 3, [1, 2])
+    (weather, chain, T), (baseline, other, _), (model, third, _) = replicates.replicate(1)
     assert (weather, baseline, model) == ("weather", "baseline", "model")
-    assert worlds.with_noise
+    assert replicates.with_noise
     assert chain is fem
     assert not T.equals(WEATHER)
     assert other.model is fem.model
@@ -135,31 +137,33 @@ def test_parts_come_one_after_the_other(fem):
 
 def test_several_years_take_turns(fem):
     years = [make_truss_campaign(random_state=seed).temperatures for seed in (1, 2, 3)]
-    worlds = Worlds.of(fem, "weather", years, None, 4, [1, 2])
+    replicates = Replicates.of(fem, "weather", years, None, 4, [1, 2])
     for number, expected in enumerate([0, 1, 2, 0]):
-        ((_, _, T),) = worlds.world(number)
+        ((_, _, T),) = replicates.replicate(number)
         pd.testing.assert_frame_equal(T, years[expected])
 
 
 def rates_of(steps, with_noise=True, parts=("weather", "baseline"), own=0.5):
     key = "detector", "scenario"
-    return WorldRates({key: steps}, {key: np.array([own, own])}, {key: 1e9}, parts, with_noise, []), key
+    return ReplicateRates({key: steps}, {key: np.array([own, own])}, {key: 1e9}, parts, with_noise, []), key
 
 
 def test_variances_of_the_parts_add_up():
     random = np.random.RandomState(0)
     deviations = {"noise": 0.02, "weather": 0.01, "baseline": 0.03}
-    n_worlds, n_draws = 4000, 3
-    weather, baseline = (deviations[part] * random.standard_normal((n_worlds, 1)) for part in ("weather", "baseline"))
-    noise = deviations["noise"] * random.standard_normal((2, n_worlds, n_draws))
+    n_replicates, n_draws = 4000, 3
+    weather, baseline = (
+        deviations[part] * random.standard_normal((n_replicates, 1)) for part in ("weather", "baseline")
+    )
+    noise = deviations["noise"] * random.standard_normal((2, n_replicates, n_draws))
     steps = 0.5 + np.stack([weather + noise[0], weather + baseline + noise[1]], axis=1)
-    worlds, key = rates_of(steps)
-    found = worlds.by_part(key)
+    replicates, key = rates_of(steps)
+    found = replicates.by_part(key)
     np.testing.assert_allclose([found[part] for part in deviations], list(deviations.values()), rtol=0.08)
-    table = worlds.table().loc[key]
+    table = replicates.table().loc[key]
     assert table["together"] == pytest.approx(np.sqrt(14) / 100, rel=0.05)
     assert table[[f"{part} share" for part in deviations]].sum() == pytest.approx(1)
-    lowest, highest = worlds.band(key, 0.9)
+    lowest, highest = replicates.band(key, 0.9)
     assert (highest - lowest) / 2 == pytest.approx(1.645 * np.sqrt(14) / 100, rel=0.05)
 
 
@@ -169,8 +173,8 @@ def test_a_band_holds_the_rate_of_one_more_campaign():
     for _ in range(1500):
         centres = logit(0.8) + 0.3 * random.standard_normal((9, 1))
         rates = 1 / (1 + np.exp(-centres[:8] - 0.2 * random.standard_normal((8, 3))))
-        worlds, key = rates_of(rates[:, np.newaxis], parts=("model",))
-        lowest, highest = worlds.band(key, 0.9)
+        replicates, key = rates_of(rates[:, np.newaxis], parts=("model",))
+        lowest, highest = replicates.band(key, 0.9)
         truth = 1 / (1 + np.exp(-centres[8, 0] - 0.2 * random.standard_normal()))
         held.append(lowest <= truth <= highest)
     assert 0.87 < np.mean(held) < 0.94
@@ -181,8 +185,8 @@ def test_more_parts_do_not_narrow_a_band():
     noise, other = 0.02 * random.standard_normal((300, 3)), 0.03 * random.standard_normal((300, 1))
     widths = []
     for steps, with_noise in ((noise, False), (noise, True), (noise + other, True)):
-        worlds, key = rates_of(0.5 + steps[:, np.newaxis], with_noise, parts=("baseline",))
-        lowest, highest = worlds.band(key, 0.9)
+        replicates, key = rates_of(0.5 + steps[:, np.newaxis], with_noise, parts=("baseline",))
+        lowest, highest = replicates.band(key, 0.9)
         widths.append(highest - lowest)
     assert widths[0] < widths[1] < widths[2]
 
@@ -191,9 +195,9 @@ def test_more_parts_do_not_narrow_a_band():
 def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(parts, centre):
     scatter = 0.01 * np.random.RandomState(3).standard_normal((50, 1, 3))
     steps = np.concatenate([0.5 + scatter, 0.6 + scatter], axis=1)[:, : len(parts)]
-    worlds, key = rates_of(steps, parts=parts, own=0.3)
-    assert np.mean(worlds.band(key, 0.9)) == pytest.approx(centre, abs=0.005)
-    assert np.mean(worlds.single(key)) == pytest.approx(centre, abs=0.005)
+    replicates, key = rates_of(steps, parts=parts, own=0.3)
+    assert np.mean(replicates.band(key, 0.9)) == pytest.approx(centre, abs=0.005)
+    assert np.mean(replicates.single(key)) == pytest.approx(centre, abs=0.005)
 
 
 def test_all_worlds_alike_have_no_spread():
@@ -207,10 +211,10 @@ def test_bands_of_a_study(study):
     np.testing.assert_allclose((table[list(PARTS)] ** 2).sum(axis=1), table["together"] ** 2)
     assert (table["together"] > 0).all()
     smallest = study.minimum_detectable_damage(method="curve")
-    assert (smallest["band_lowest"] < smallest["band_highest"]).all()
+    assert (smallest["pi_low"] < smallest["pi_high"]).all()
     curve = study.pod_curve("bottom")
     low, high = curve.band([0.1, 0.2])
-    curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.worlds])
+    curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.replicates])
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
     assert curve.a90_band[0] < curve.a90_band[1]
     told = study.summary()
@@ -222,12 +226,12 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
     def fails(*args, **options):
         raise ValueError("no derivative")
 
-    monkeypatch.setattr("skthermo.studies.worlds._models.ModelUpdater.fit", fails)
+    monkeypatch.setattr("skthermo.studies.replicates._models.ModelUpdater.fit", fails)
     with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
-        Worlds.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
+        Replicates.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
     with pytest.warns(UserWarning, match="bands hold no error of the model: other models like"):
-        worlds = Worlds.of(fem, "all", WEATHER, None, 3, [1, 2])
-    assert worlds.parts == ["weather", "baseline"]
+        replicates = Replicates.of(fem, "all", WEATHER, None, 3, [1, 2])
+    assert replicates.parts == ["weather", "baseline"]
 
 
 @pytest.mark.parametrize(
@@ -238,7 +242,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
         ({"uncertainty": []}, "uncertainty is .*; expected 'all', or some of"),
         ({"uncertainty": {"noise": False}}, "uncertainty is {'noise': False}; expected 'all', or some of"),
         ({"uncertainty": 3}, "uncertainty is 3; expected 'all', or some of"),
-        ({"n_worlds": 1}, "n_worlds is 1; expected at least 2"),
+        ({"n_replicates": 1}, "n_replicates is 1; expected at least 2"),
         ({"models": []}, "models is .*; expected a list of FE models"),
         ({"models": [make_truss(n_modes=4)]}, "model 0 of models is .* and 4 modes; expected the chain's"),
         ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, or 'all'"),
@@ -264,23 +268,28 @@ def test_worlds_that_fail_are_counted(fem, monkeypatch):
     years = [WEATHER] * 4
     years = [WEATHER, WEATHER + 0.1, WEATHER + 0.2, WEATHER + 0.3]
     study = DetectabilityStudy(
-        fem, MahalanobisDetector(), [Failing("damage", {"bottom": 0.2})], n_repeats=2, uncertainty="weather", n_worlds=4
+        fem,
+        MahalanobisDetector(),
+        [Failing("damage", {"bottom": 0.2})],
+        n_repeats=2,
+        uncertainty="weather",
+        n_replicates=4,
     )
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.25)
-    with pytest.warns(UserWarning, match="1 of 4 worlds failed, the first with ValueError: too warm"):
+    with pytest.warns(UserWarning, match="1 of 4 replicates failed, the first with ValueError: too warm"):
         study.run(years)
-    assert len(study.worlds_.rates["MahalanobisDetector", "damage"]) == 3
+    assert len(study.replicates_.rates["MahalanobisDetector", "damage"]) == 3
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.05)
-    with pytest.raises(ValueError, match="3 of 4 worlds failed"):
+    with pytest.raises(ValueError, match="3 of 4 replicates failed"):
         study.run(years)
 
 
 def test_uncertain_damage_differs_from_world_to_world(fem):
     uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
-    options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_worlds": 2, "random_state": 0}
+    options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_replicates": 2, "random_state": 0}
     study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], **options)
     study.run(WEATHER)
-    rates = study.worlds_.rates["MahalanobisDetector", "some"][:, -1]
+    rates = study.replicates_.rates["MahalanobisDetector", "some"][:, -1]
     assert len(np.unique(rates.round(2))) > 3
 
 

@@ -23,7 +23,7 @@ WEATHER = make_truss_campaign(random_state=1).temperatures
 def judged(decisions, index=None, scenario=None):
     index = pd.date_range("2030-01-01", periods=decisions.shape[1], freq="D") if index is None else index
     scenario = scenario or Scenario("a tenth", {"bottom": 0.1})
-    return JudgedRecords("detector", scenario, "data-informed", pd.Series(0.0, index), decisions)
+    return JudgedRecords("detector", scenario, "simulated", pd.Series(0.0, index), decisions)
 
 
 def decisions_with(rate, memory=0.0, shape=(20, 400), seed=0):
@@ -95,7 +95,7 @@ def test_records_that_are_not_judged_delay():
     every = Waits.of(judged(decisions))
     decisions[:, ::2] = np.nan
     second = Waits.of(judged(decisions))
-    assert second.share_not_judged == 0.5
+    assert second.share_not_evaluated == 0.5
     assert second.found(10, 0.95)[0] == pytest.approx(every.found(5, 0.95)[0], abs=0.02)
     assert np.isinf(Waits.of(judged(np.full((2, 50), np.nan))).steps).all()
 
@@ -120,10 +120,10 @@ def test_clocks_that_are_not_exact_and_records_out_of_order_change_nothing():
 
 
 def test_a_table_has_a_row_for_each_detector_and_scenario(study):
-    table = study.time_to_find().set_index(["detector", "scenario"])
+    table = study.time_to_detection().set_index(["detector", "scenario"])
     assert len(table) == 12
     for name in ("1D", "7D", "30D"):
-        between = table[f"{name} lowest"].le(table[name]) & table[name].le(table[f"{name} highest"])
+        between = table[f"{name} ci_low"].le(table[name]) & table[name].le(table[f"{name} ci_high"])
         assert between.all()
     single = table.loc["single"]
     assert single.loc["bottom 6 %", "1D"] == study.results_.loc[1, "rate"]
@@ -135,17 +135,17 @@ def test_a_table_has_a_row_for_each_detector_and_scenario(study):
 
 
 def test_damage_with_an_onset_begins_there(study):
-    table = study.time_to_find(["10D"], detector="single").set_index("scenario")
-    decisions = study.decisions_["single", "crack", "data-informed"]
+    table = study.time_to_detection(["10D"], detector="single").set_index("scenario")
+    decisions = study.decisions_["single", "crack", "simulated"]
     assert table.loc["crack", "10D"] == (decisions[:, 100:110] < 0).any(axis=1).mean()
-    healthy = study.decisions_["single", "healthy", "data-informed"]
+    healthy = study.decisions_["single", "healthy", "simulated"]
     assert table.loc["crack", "10D healthy"] == (healthy[:, 100:110] < 0).any(axis=1).mean()
 
 
 def test_windows_need_as_many_damaged_records_as_their_rule(study):
-    table = study.time_to_find(["2D", "3D"], detector="three of three").set_index("scenario")
+    table = study.time_to_detection(["2D", "3D"], detector="three of three").set_index("scenario")
     certain = table.loc["bottom 60 %"]
-    assert (study.decisions_["single", "bottom 60 %", "data-informed"] < 0).all()
+    assert (study.decisions_["single", "bottom 60 %", "simulated"] < 0).all()
     assert certain["2D"] < 0.5
     assert [certain["3D"], certain["reliable"]] == [1, pd.Timedelta("3D")]
 
@@ -155,7 +155,7 @@ def test_windows_after_an_onset_are_those_of_records_that_change_there(study, fe
     healthy, damaged = (
         fem.simulate(WEATHER, damage=damage, noise="fitted", random_state=seed) for damage in ({}, {"bottom": 0.06})
     )
-    found = study.transitions_["week", "bottom 6 %", "data-informed"][0]
+    found = study.transitions_["week", "bottom 6 %", "simulated"][0]
     for number, onset in ((0, 7), (3, 49)):
         changed = pd.concat([healthy[:onset], damaged[onset:]])
         expected = study.detectors_["week"].decision_function(changed)[onset : onset + 7]
@@ -169,27 +169,27 @@ def test_rows_without_stamps_are_counted():
         arrays, MahalanobisDetector(), [{"bottom": 0.3}], n_repeats=2, random_state=0, uncertainty="noise"
     )
     study.run(WEATHER.to_numpy()[:100])
-    row = study.time_to_find().iloc[0]
+    row = study.time_to_detection().iloc[0]
     assert row["7"] == 1
     assert row["median"] == 1.0
     assert np.isnan(row["7 healthy"])
-    assert np.isnan(study.time_to_find([101]).iloc[0]["101"])
+    assert np.isnan(study.time_to_detection([101]).iloc[0]["101"])
     with pytest.raises(ValueError, match="within has '7D'; expected numbers of records"):
-        study.time_to_find(["7D"])
+        study.time_to_detection(["7D"])
 
 
 def test_the_smallest_damage_that_is_soon_found_is_told_in_words(study):
-    every = study.time_to_find(detector="single").set_index("scenario")
+    every = study.time_to_detection(detector="single").set_index("scenario")
     healthy, certain = every.loc["healthy"], every.loc["bottom 60 %"]
     assert f"within 7 days in {round(100 * healthy['7D'])}" in healthy["text"]
     in_text = (
         f"is found within 1 day in 95 of 100 cases; a healthy structure alarms by then in {100 * healthy['1D']:.0f}"
     )
     assert certain["text"] == f"{in_text} of 100"
-    soon = study.time_to_find(detector="single", smallest=True).set_index("scenario")
+    soon = study.time_to_detection(detector="single", smallest=True).set_index("scenario")
     assert list(soon.index) == ["healthy", "crack"]
     assert every.loc["bottom 6 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
-    told = study.time_to_find(detector=study.ranking().index[0], smallest=True)
+    told = study.time_to_detection(detector=study.ranking().index[0], smallest=True)
     sentences = [f"{row['scenario']!r} {row['text']}." for _, row in told.iterrows()]
     assert "\n".join(sentences) in study.summary()
 
@@ -203,7 +203,7 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of thresholds learned from too few windows
             study.run(WEATHER)
-        words.append(study.time_to_find().set_index("scenario").loc["bottom 0.1 %", "text"])
+        words.append(study.time_to_detection().set_index("scenario").loc["bottom 0.1 %", "text"])
     assert words[0].endswith("so that such an alarm tells little")
     assert words[1] == "is not found in 95 of 100 cases within the 365 days of the records"
 
@@ -217,10 +217,10 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
         ({"within": []}, r"within is \[\]; expected one or more times, each once"),
         ({"within": ["7D", "7D"]}, r"within is \['7D', '7D'\]; expected one or more times, each once"),
         ({"level": 95}, "level"),
-        ({"source": "measured"}, r"source is 'measured'; expected one of \['data-informed'\]"),
+        ({"source": "measured"}, r"source is 'measured'; expected one of \['simulated'\]"),
         ({"detector": "none"}, "detector is 'none'"),
     ],
 )
 def test_what_is_no_time_is_refused(study, options, message):
     with pytest.raises(ValueError, match=message):
-        study.time_to_find(**options)
+        study.time_to_detection(**options)

@@ -56,7 +56,7 @@ class Trials:
         return {candidate: {family: (now[family], mdd[family]) for family in now} for candidate, mdd in then.items()}
 
 
-def what_to_add(
+def compare_extensions(
     study: DetectabilityStudy,
     T: ArrayLike,
     *,
@@ -96,7 +96,7 @@ def what_to_add(
         - ``mdd_now``, ``mdd_then``: minimum detectable damage, the magnitude of the severity with a probability of
           detection of 0.9 on the curve, without and with the candidate: means over the repeats, infinite where
           damage is not found;
-        - ``gain``: their difference; ``lowest``, ``highest``: bounds that hold, with a probability of 95 %, the gain
+        - ``gain``: their difference; ``ci_low``, ``ci_high``: bounds that hold, with a probability of 95 %, the gain
           of one baseline and one new period.
 
     Raises
@@ -128,7 +128,7 @@ def what_to_add(
     --------
     >>> from skthermo.datasets import make_truss, make_truss_campaign
     >>> from skthermo.detection import MahalanobisDetector
-    >>> from skthermo.studies import DetectabilityStudy, sweep, what_to_add
+    >>> from skthermo.studies import DetectabilityStudy, sweep, compare_extensions
     >>> from skthermo.surrogate import DataInformedFEM
     >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
@@ -136,10 +136,10 @@ def what_to_add(
     >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
     >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
     >>> results = study.run(weather)
-    >>> table = what_to_add(study, weather, modes=[6, 8])
+    >>> table = compare_extensions(study, weather, modes=[6, 8])
     >>> table["candidate"][0]
     'mode 9'
-    >>> bool(table["lowest"][0] < table["gain"][0] < table["mdd_now"][0])
+    >>> bool(table["ci_low"][0] < table["gain"][0] < table["mdd_now"][0])
     True
     """
     if not isinstance(study, DetectabilityStudy):
@@ -201,8 +201,8 @@ def changes_by_severity(study: DetectabilityStudy, detector: str | None = None) 
         groups = {group for member in members for group in member.damage or {}}
         if len(groups) == 1 and all(list(member.changes(None)) == ["damage"] for member in members):
             (group,) = groups
-            centre = minimum.loc[(family, "data-informed")]
-            found = centre["mdd"] if np.isfinite(centre["mdd"]) else np.abs(centre[["lowest", "highest"]]).mean()
+            centre = minimum.loc[(family, "simulated")]
+            found = centre["mdd"] if np.isfinite(centre["mdd"]) else np.abs(centre[["ci_low", "ci_high"]]).mean()
             found = found if np.isfinite(found) else np.abs(tested).max()
             severities = np.sign(tested[0]) * np.minimum(np.abs(found) * SEVERITY_FACTORS, HIGHEST_SEVERITY)
             changes |= {(family, float(s)): {"damage": {group: float(s)}} for s in severities}
@@ -306,6 +306,6 @@ def _row(name: str, kind: str, family: str, mdd: Array) -> dict[str, Any]:
         "mdd_now": now,
         "mdd_then": then,
         "gain": gains.mean(),
-        "lowest": gains.mean() - margin,
-        "highest": gains.mean() + margin,
+        "ci_low": gains.mean() - margin,
+        "ci_high": gains.mean() + margin,
     }

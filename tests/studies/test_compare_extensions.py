@@ -10,7 +10,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
-from skthermo.studies import DetectabilityStudy, Scenario, pod_curve, sweep, what_to_add
+from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, pod_curve, sweep
 from skthermo.studies.detectability import Arrangement, Measurement
 from skthermo.studies.extension._campaign import CampaignSimulator
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
@@ -33,7 +33,7 @@ def study(fem):
 @pytest.fixture(scope="module")
 def table(study):
     with pytest.warns(UserWarning, match="mode 8 depends on parameters that the measured modes hardly determine"):
-        return what_to_add(study, WEATHER, baseline_factors=(2.0, 2.5))
+        return compare_extensions(study, WEATHER, baseline_factors=(2.0, 2.5))
 
 
 def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(table):
@@ -41,14 +41,14 @@ def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(tab
     assert table["mdd_now"].nunique() == 1
     np.testing.assert_allclose(table["gain"], table["mdd_now"] - table["mdd_then"])
     assert table["gain"].is_monotonic_decreasing
-    assert (table["lowest"] < table["gain"]).all()
-    assert (table["gain"] < table["highest"]).all()
+    assert (table["ci_low"] < table["gain"]).all()
+    assert (table["gain"] < table["ci_high"]).all()
 
 
 def test_the_recommended_mode_gains_as_much_in_true_records(table):
     best = table.iloc[0]
     assert (best["candidate"], best["family"]) == ("mode 9", "top")
-    assert best["lowest"] > 0
+    assert best["ci_low"] > 0
     gains = []
     for seed in (10, 20, 30):
         healthy, later = (make_truss_campaign(random_state=seed + i) for i in range(2))
@@ -65,7 +65,7 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
             alarms = [(detector.predict(records[:, :n_modes]) == -1).sum() for records in changed]
             smallest.append(pod_curve(severities, alarms, np.full(10, 365)).a90)
         gains.append(smallest[0] - smallest[1])
-    assert best["lowest"] < np.mean(gains) < best["highest"]
+    assert best["ci_low"] < np.mean(gains) < best["ci_high"]
 
 
 @pytest.mark.nightly
@@ -73,20 +73,20 @@ def test_the_noisier_the_mode_the_less_it_gains(study):
     few = clone(study).set_params(n_repeats=2)
     few.run(WEATHER)
     gains = [
-        what_to_add(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
+        compare_extensions(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
         for noise in (0.001, 0.01, 0.2)
     ]
     assert gains[0] > 1.5 * gains[1] > 0
     assert gains[1] > gains[2]
-    each = what_to_add(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
+    each = compare_extensions(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
     assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
 
 
 def test_same_bits_whatever_the_jobs(study):
     few = clone(study).set_params(n_repeats=2)
     few.run(WEATHER)
-    expected = what_to_add(few, WEATHER, modes=[8])
-    pd.testing.assert_frame_equal(what_to_add(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
+    expected = compare_extensions(few, WEATHER, modes=[8])
+    pd.testing.assert_frame_equal(compare_extensions(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
 
 
 @pytest.mark.nightly
@@ -102,7 +102,9 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
             chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
         )
         study.run(weather)
-        tables.append(what_to_add(study, weather, modes=[8], baseline_factors=()))  # only times tell two years from one
+        tables.append(
+            compare_extensions(study, weather, modes=[8], baseline_factors=())
+        )  # only times tell two years from one
     pd.testing.assert_frame_equal(*tables)
     assert tables[0]["gain"][0] > 0
 
@@ -120,7 +122,7 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
     study.run(known)
     unrelated = np.random.RandomState(0).standard_normal(365)
     sensors = pd.DataFrame({"unrelated": unrelated, "T3": YEAR.temperatures["T3"]})
-    table = what_to_add(study, known, modes=(), baseline_factors=(), sensors=sensors)
+    table = compare_extensions(study, known, modes=(), baseline_factors=(), sensors=sensors)
     assert table["candidate"].tolist() == ["T3", "unrelated"]
     assert table["kind"].tolist() == ["sensor", "sensor"]
     assert table["gain"][0] > 0.01
@@ -133,7 +135,7 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
     ]
     study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
     study.run(WEATHER)
-    table = what_to_add(study, WEATHER, modes=[8], baseline_factors=())
+    table = compare_extensions(study, WEATHER, modes=[8], baseline_factors=())
     assert table["family"].tolist() == ["mass"]
     curve = study.pod_curve("mass")
     assert table["mdd_now"][0] == pytest.approx(curve.a90, rel=0.15)
@@ -177,7 +179,7 @@ def test_damage_that_is_always_or_never_found_has_an_end():
 )
 def test_impossible_candidates_are_errors(study, arguments, message):
     with pytest.raises(ValueError, match=message):
-        what_to_add(study, WEATHER, **arguments)
+        compare_extensions(study, WEATHER, **arguments)
 
 
 def test_sensors_must_have_the_training_rows_and_new_names(fem):
@@ -186,12 +188,12 @@ def test_sensors_must_have_the_training_rows_and_new_names(fem):
         fem, detector, sweep(fem, (0.1, 0.3), ["top"]), n_repeats=2, random_state=0, uncertainty="noise"
     )
     with pytest.raises(ValueError, match="expected a call of run before"):
-        what_to_add(study, WEATHER)
+        compare_extensions(study, WEATHER)
     study.run(WEATHER)
     with pytest.raises(ValueError, match="has the name of a measured temperature"):
-        what_to_add(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]])
+        compare_extensions(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]])
     with pytest.raises(ValueError, match="the temperatures of the training has 365 rows and sensors 99"):
-        what_to_add(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]][:99])
+        compare_extensions(study, WEATHER, modes=(), sensors=YEAR.temperatures[["T1"]][:99])
 
 
 @pytest.mark.nightly
@@ -204,6 +206,6 @@ def test_a_model_without_other_modes_has_only_longer_baselines(fem):
         chain, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
     )
     study.run(WEATHER)
-    assert what_to_add(study, WEATHER)["kind"].tolist() == ["baseline"]
+    assert compare_extensions(study, WEATHER)["kind"].tolist() == ["baseline"]
     with pytest.raises(ValueError, match="has no method 'with_modes'"):
-        what_to_add(study, WEATHER, modes=[6])
+        compare_extensions(study, WEATHER, modes=[6])
