@@ -129,7 +129,7 @@ def test_an_alarm_stays_one_without_records_and_says_so():
 
 
 @pytest.mark.parametrize("n_unjudged", [3, None], ids=["some", "all"])
-def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
+def test_what_is_not_evaluated_says_since_when_and_why(n_unjudged):
     reason = f"all of {QUOTED} are missing"
     monitor = FakeMonitor(n_unjudged=n_unjudged, reason=reason)
     page = today_of(monitor)

@@ -196,7 +196,7 @@ def test_more_false_alarms_do_not_pay(task):
     assert not loud["within_limit"].item()
 
 
-def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
+def test_scenarios_count_alike_and_what_is_not_evaluated_is_not_found(fem):
     late = ProgressiveDamage("late", {"bottom": 0.1}, onset=WEATHER.index[100])
     task = task_of(fem, [Scenario("healthy"), Scenario("early", {"top": 0.1}), late], columns=MODES)
     assert (task.y[task.states["scenario"] == "late"] == 1).sum() == 200
@@ -298,7 +298,7 @@ def test_confirmation_judges_fresh_noise_and_weather(fem):
     limit = min(known[int(0.02 * len(known))], 0)
     assert tuned["fresh"] == pytest.approx(np.mean([np.mean(np.array(each) < limit) for each in decisions.values()]))
     assert tuned["false_alarms"] == pytest.approx((known < 0).mean())
-    assert tuned["not_judged"] == pytest.approx(np.isnan(healthy).mean())
+    assert tuned["not_evaluated"] == pytest.approx(np.isnan(healthy).mean())
     assert tuned["fresh_ci_low"] < tuned["fresh"] < tuned["fresh_ci_high"]
     assert tuned["within_limit"] == (tuned["false_alarms_ci_low"] <= 0.02)
     single = task.confirm(WindowedAlarm(1), OTHER, random_state=3)
