@@ -207,7 +207,7 @@ def test_scenarios_count_alike_and_what_is_not_evaluated_is_not_found(fem):
     values[rows_of(task, "early", 0)] = np.nan
     assert task.scoring(noted(task, values), task.X[365:], task.y[365:]) == 0.75
     values[task.y == 1] = np.nan
-    with pytest.raises(ValueError, match="none of 240 healthy records is judged"):
+    with pytest.raises(ValueError, match="none of 240 healthy records is evaluated"):
         task.scoring(noted(task, values), task.X[365:], task.y[365:])
 
 
@@ -349,7 +349,7 @@ def test_a_scorer_refuses_other_rows_and_what_it_cannot_judge(fem, task):
         task.scoring(detector, SIDE_BY_SIDE, np.ones(365))
     with pytest.raises(ValueError, match="expected a frame"):
         task.scoring(detector, task.X.to_numpy(), task.y)
-    with pytest.raises(ValueError, match="would judge them"):
+    with pytest.raises(ValueError, match="temperatures"):
         task.scoring(MahalanobisDetector().fit(task.baseline), task.X[365:], task.y[365:])
     with pytest.raises(ValueError, match="rows is damaged"):
         task.scoring(detector, task.X.iloc[rows_of(task, "healthy", 0)], np.ones(120))

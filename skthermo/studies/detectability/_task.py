@@ -307,8 +307,8 @@ def detection_task(
     Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
     into another. Its first records, for which lags and windows lack records before, may not be evaluated: T should be
     long beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days,
-    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
-    single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart
+    in a single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
 
     The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
     regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
