@@ -1439,10 +1439,10 @@ fitted(
         count(1, 10**6)
         | {"several": [1, 2], "text": "5", "a class": preprocessing.BlockedKFold, "ragged": [([0], [1]), ([1],)]},
     ),
-    scale=("global", choice("None")),
+    whiten=("global", choice("None")),
 )
 method("detection.TemperatureCompensator.transform", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
-WHITENER = detection.TemperatureCompensator(Ridge(), targets=MODES, scale="local").fit(BOTH)
+WHITENER = detection.TemperatureCompensator(Ridge(), targets=MODES, whiten="local").fit(BOTH)
 method("detection.TemperatureCompensator.extrapolation_distance", WHITENER, X=(BOTH, table(BOTH, rows=False)))
 
 # metrics

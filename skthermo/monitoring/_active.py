@@ -62,7 +62,7 @@ class Branch:
         for step in self.before:
             table = step.transform(table)
         residuals = as_floats(self.compensator.transform(table))
-        if self.compensator.scale is not None:
+        if self.compensator.whiten is not None:
             return residuals
         overall = self.compensator.spread_.overall
         deviation = np.sqrt(np.diag(overall.covariance))

@@ -202,7 +202,9 @@ def without_outliers(F):
 
 METHODS = {
     "broken lines": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES),
-    "broken lines, whitened": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES, scale="local"),
+    "broken lines, whitened": lambda: TemperatureCompensator(
+        lagged(TemperatureMapper()), targets=MODES, whiten="local"
+    ),
     "chain": lambda: TemperatureCompensator(chain(), targets=MODES),
 }
 

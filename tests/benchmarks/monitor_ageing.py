@@ -38,7 +38,7 @@ def detector(bridge, modes):
     lines = TemperatureMapper()
     regressor = lines if bridge.name == "truss" else make_pipeline(LagFeatures([0, 6, 24], freq="1h"), lines)
     window = "7D" if bridge.name == "truss" else "1D"
-    return make_pipeline(TemperatureCompensator(regressor, targets=modes, scale="global"), WindowedAlarm(window))
+    return make_pipeline(TemperatureCompensator(regressor, targets=modes, whiten="global"), WindowedAlarm(window))
 
 
 def followed(follower, T, F, n_first):

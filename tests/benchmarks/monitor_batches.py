@@ -75,7 +75,7 @@ def detectors(targets):
             by_name[f"{regressor}, {last}"] = make_pipeline(
                 TemperatureCompensator(estimator, targets=targets), detector
             )
-    local = TemperatureCompensator(lags, targets=targets, scale="local")
+    local = TemperatureCompensator(lags, targets=targets, whiten="local")
     by_name["lags whitened, mean 24h"] = make_pipeline(local, WindowedAlarm("24h"))
     pair = [("one", by_name["lags, records"]), ("two", by_name["neighbours, mean 24h"])]
     by_name["fused"] = FusedDetector(pair)

@@ -94,7 +94,7 @@ STRUCTURES = {"truss": (truss, 1), "kw51": (kw51, 24 // KW51_HOURS)}
 def compensator(per_day):
     lines = TemperatureMapper()
     regressor = lines if per_day == 1 else make_pipeline(LagFeatures([0, 1, 6], freq="4h"), lines)
-    return TemperatureCompensator(regressor, targets=MODES, scale="global")
+    return TemperatureCompensator(regressor, targets=MODES, whiten="global")
 
 
 def detectors(per_day):

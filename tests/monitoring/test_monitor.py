@@ -82,7 +82,7 @@ FOREST = OutlierDetector(IsolationForest(n_estimators=20, random_state=0), block
 DETECTORS = {
     "raw": (MahalanobisDetector(), "nothing"),
     "lags": (make_pipeline(compensator(lagged()), MahalanobisDetector()), "30 h"),
-    "whitened, mean by time": (make_pipeline(compensator(lagged(), scale="local"), WindowedAlarm("36h")), "66 h"),
+    "whitened, mean by time": (make_pipeline(compensator(lagged(), whiten="local"), WindowedAlarm("36h")), "66 h"),
     "mean by number": (make_pipeline(compensator(lagged()), WindowedAlarm(5)), "4 records and 30 h"),
     "m of n": (make_pipeline(compensator(KNeighborsRegressor(20)), WindowedAlarm(6, rule="m-of-n")), "5 records"),
     "m of n by time": (make_pipeline(compensator(HINGES), WindowedAlarm("2D", rule="m-of-n")), "48 h"),
