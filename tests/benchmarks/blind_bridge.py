@@ -9,8 +9,8 @@ gaps, with outliers, with a dead girder thermometer, with one that drifts, and w
 
 Prints the share of records and days in alarm among those that are evaluated, how many are not, the warnings, and
 whether days that are evaluated one by one, alone or with the 30 hours before them, get the decisions of one pass. Two
-simple competitors follow: nearest neighbours of raw frequencies, and least squares on lagged temperatures. The exit code is 1
-if a target is missed.
+simple competitors follow: nearest neighbours of raw frequencies, and least squares on lagged temperatures. The exit
+code is 1 if a target is missed.
 """
 
 import argparse
