@@ -1,7 +1,7 @@
-"""Any division of service into batches gives the judgements of one pass: detectors, window rules, sensors and drift.
+"""Any division of service into batches gives the evaluations of one pass: detectors, window rules, sensors and drift.
 
 A truss in service, with gaps, missing values, markers, a sensor that dies and damage. Batches are days, weeks, months
-or random ones, in which records come late and are sent again. Judgements, events, daily summaries,
+or random ones, in which records come late and are sent again. Evaluations, events, daily summaries,
 faults and drift have to be those of one batch of all records, bit for bit. Exit code 1 if one differs.
 """
 
@@ -101,7 +101,7 @@ def differences(one, answers, other, parts):
     last = pd.concat(parts)
     last = last[~last.index.duplicated(keep="last")].sort_index()
     found = [] if last[ANSWER].equals(answers[ANSWER]) else ["answers"]
-    for name in ("events_", "days_", "judged_", "faults_", "drift_", "corrected_"):
+    for name in ("events_", "days_", "evaluations_", "faults_", "drift_", "corrected_"):
         left, right = getattr(one, name), getattr(other, name)
         if not (left is None if right is None else left.equals(right)):
             found.append(name)

@@ -5,7 +5,7 @@
 
 Years of daily records of the truss and of four-hourly ones of the bridge KW51 with its gaps, in weather that never
 comes again, under noise of each correlation of neighbouring records. Every second year is a baseline, and the five
-years that follow it (after the last one, the first ones) are judged. Rules:
+years that follow it (after the last one, the first ones) are evaluated. Rules:
 
 library     tail of the squared peaks of excursions, closed by a quiet day; "7 quiet days": by a quiet week
 one-sided   the same where only a loss of stiffness is an alarm

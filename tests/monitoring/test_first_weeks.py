@@ -46,7 +46,7 @@ def test_any_batches_give_the_decisions_of_one_pass(whiten):
     cuts = [WEEKS, *np.sort(np.random.default_rng(1).integers(WEEKS, WEEKS + 120, 4)), WEEKS + 120]
     for first, last in itertools.pairwise(cuts):
         parts.update(records[first:last])
-    pd.testing.assert_frame_equal(whole.judged_, parts.judged_)
+    pd.testing.assert_frame_equal(whole.evaluations_, parts.evaluations_)
     pd.testing.assert_frame_equal(whole.events_, parts.events_)
 
 
