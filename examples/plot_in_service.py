@@ -90,7 +90,7 @@ print(again.counts_)
 
 print(monitor.summary())
 print(monitor.events_[["kind", "start", "end", "peak", "modes"]].to_string())
-print(monitor.faults_[["column", "kind", "since", "told", "until"]].to_string())
+print(monitor.faults_[["column", "kind", "since", "detected", "until"]].to_string())
 MonitorDisplay.from_estimator(monitor)
 
 # %%

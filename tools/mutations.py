@@ -541,7 +541,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("commands/main.py", "commands/test_monitor_commands.py"): [
         ("an alarm that has ended within a batch", 'if "alarm" in states or monitor', "if monitor"),
-        ("a night without a new record", "if is_judged else NOT_JUDGED", "if True else NOT_JUDGED"),
+        ("a night without a new record", "if is_judged else NOT_EVALUATED", "if True else NOT_EVALUATED"),
     ],
     ("_io/_shared_files.py", "test_shared_files.py"): [
         ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),

@@ -125,7 +125,7 @@ class Fleet:
     share of their values that are missing; ``mape``, mean absolute error of the training frequencies in percent,
     in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor ("healthy",
     "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the
-    newest record of all bridges; ``n_evaluated`` records, and the share ``not_judged``; ``alarm_rate``, the share of
+    newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``; ``alarm_rate``, the share of
     judged records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest
     change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted
     objects.

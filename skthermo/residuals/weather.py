@@ -162,9 +162,9 @@ class SensorRegression:
         values, length = as_floats(temperatures)[order], max(lengths)
         beyond = np.nan_to_num(self.reach.excess(values))
         outside = beyond > 0
-        judged = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
-        departures = np.where(judged, self.departures(values), np.nan)
-        departures[:, judged.mean(axis=0) < 0.5] = np.nan
+        evaluated = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
+        departures = np.where(evaluated, self.departures(values), np.nan)
+        departures[:, evaluated.mean(axis=0) < 0.5] = np.nan
         means, usual = _running_means(departures, length), self.usual[length]
         least = np.maximum(MATTERS * (self.reach.highest - self.reach.lowest), A_DEGREE)
         limits = np.maximum(TIMES_USUAL * usual, least)

@@ -91,7 +91,7 @@ def quick_chain():
 
 def compensator(F):
     lags = LagFeatures([0, 1, 6], freq="1h")
-    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), scale="local")
+    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), whiten="local")
 
 
 def detection(T, F):

@@ -58,7 +58,7 @@ TABLE = {
     "kw51-not-updated": "8 s",
     "frame-chain": "10 s",
     "grid-search": "inversions once",
-    "local-scale": "13 times before",
+    "local-whitening": "13 times before",
     "lags": "half of pandas",
     "lags-one": "half of pandas",
     "import surrogate": "0.2 s",

@@ -249,10 +249,10 @@ def two_hourly(n_rows):
     return pd.DataFrame(T, stamps).add_prefix("T").join(pd.DataFrame(F, stamps).add_prefix("f"))
 
 
-def local_scale(clock, quick):
-    """TemperatureCompensator(scale="local") over 13,140 records."""
+def local_whitening(clock, quick):
+    """TemperatureCompensator(whiten="local") over 13,140 records."""
     records = two_hourly(2000 if quick else 13_140)
-    compensator = TemperatureCompensator(LinearRegression(), targets=[f"f{mode}" for mode in range(6)], scale="local")
+    compensator = TemperatureCompensator(LinearRegression(), targets=[f"f{mode}" for mode in range(6)], whiten="local")
     with clock.work():
         learned = compensator.fit_transform(records)
         judged = compensator.transform(records)
@@ -527,7 +527,7 @@ WORKS = {
     "kw51-not-updated": kw51_not_updated,
     "frame-chain": frame_chain,
     "grid-search": grid_search,
-    "local-scale": local_scale,
+    "local-whitening": local_whitening,
     "lags": lag_features,
     "lags-one": lag_features_of_one,
     "lags-many": lag_features_of_many,

@@ -284,7 +284,7 @@ def test_monitors_judge_new_records_each_alone(fleet):
     assert made.events.loc[made.events["bridge"] == "b", "event"].tolist() == [1]
     found = made.discoveries()
     assert found.called == ["b"]
-    assert {"c", "d", "odd"} == set(found.not_judged)
+    assert {"c", "d", "odd"} == set(found.not_evaluated)
     assert found.promised_false_per_year == 5.0
 
 

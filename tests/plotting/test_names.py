@@ -34,7 +34,7 @@ RATES = pd.DataFrame(
 )
 SHARES = ["false_alarms", "pod", "pod_deficit"]
 RANKED = pd.DataFrame(0.5, [HOSTILE, LONG], [*SHARES, *(f"{n}_{end}" for n in SHARES for end in ("ci_low", "ci_high"))])
-RANKED = RANKED.assign(pod_at_equal_pfa=0.5, within_limit=True, significantly_worse=False, not_judged=0.1, error="")
+RANKED = RANKED.assign(pod_at_equal_pfa=0.5, within_limit=True, significantly_worse=False, not_evaluated=0.1, error="")
 RANKED.loc[LONG, ["false_alarms", "error"]] = np.nan, HOSTILE
 
 

@@ -12,7 +12,7 @@ from sklearn.base import clone
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
-from skthermo.studies.detectability._replicate_rates import ReplicateRates, WorldSpread
+from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
 from skthermo.studies.replicates import PARTS, Replicates
 from skthermo.studies.replicates._weather import other_years, resampled_days
 
@@ -201,7 +201,7 @@ def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(p
 
 
 def test_all_worlds_alike_have_no_spread():
-    found = WorldSpread.of(np.full((5, 3), 0.25))
+    found = Spread.of(np.full((5, 3), 0.25))
     assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
 
 

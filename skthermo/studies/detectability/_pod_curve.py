@@ -210,7 +210,7 @@ def pod_curve(
     n_detected : array-like of shape (n_severities,)
         Records in alarm. Fractions are allowed, so that serially correlated records can count less.
     n_records : array-like of shape (n_severities,)
-        Records judged; severities without any are ignored.
+        Records evaluated; severities without any are ignored.
     log : bool, default=False
         Whether the logit of the POD is linear in the logarithm of the severity rather than in the severity.
     confidence : float, default=0.95

@@ -1,8 +1,11 @@
-"""Simulated and reference records of all scenarios, as the detectors of a study judge them."""
+"""Simulated and reference records of all scenarios, and how the detectors of a study evaluate them."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +20,7 @@ from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import column_names, frame_like
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
+from skthermo.studies.detectability._evaluation import REFERENCE, SIMULATED, Evaluation, ask_each
 from skthermo.studies.detectability._waits import damaged_rows, transitions_of
 from skthermo.studies.scenarios import BaseScenario
 
@@ -40,9 +43,10 @@ class Records:
     @property
     def has_onsets(self) -> bool:
         """Whether damage that is there from the beginning may be thought to begin at any record."""
-        return self.source == SIMULATED and not self.scenario.is_healthy and self.scenario.onset is None
+        is_known = self.source == SIMULATED and self.healthy is not None
+        return is_known and not self.scenario.is_healthy and self.scenario.onset is None
 
-    def beginning(self, memory: int) -> "Records":
+    def beginning(self, memory: int) -> Records:
         """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
         damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
         return replace(self, values=np.where(damaged, self.values, self.healthy))
@@ -63,7 +67,7 @@ class Measurement:
     outliers: Any
 
     @classmethod
-    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> "Measurement":
+    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.service_records(outliers) if np.ndim(outliers) else outliers)
 
@@ -89,43 +93,38 @@ class Simulation:
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
-    def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
-        """Judge the records of the first repeat and measured ones.
+    def first_repeat(
+        self, measured: Mapping[str, Any], seeds: Sequence[int], errors: Mapping[str, Exception]
+    ) -> Evaluation:
+        """Evaluate the records of the first repeat and measured ones.
 
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
-        for records in self.records(self.scenarios, 0, seeds):
-            self.judge(records, judgement, with_indices=True)
+        records = itertools.chain(self.records(self.scenarios, 0, seeds), self._measured(measured))
+        found = self.evaluate(records, errors, with_indices=True)
+        with without_warnings():
+            return self._calibrated(found, 0, seeds)
+
+    def without(self, failed: Collection[str]) -> Simulation:
+        """The same without the detectors that failed."""
+        return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
+
+    def other_repeats(self, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0) -> list[Evaluation]:
+        """Evaluate the records of later repeats; the warnings of the first are the only ones given."""
+        with without_warnings():
+            jobs = (delayed(self._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
+            return run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose)
+
+    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Evaluation:
+        with without_warnings(), single_blas_thread():
+            return self._calibrated(self.evaluate(self.records(self.scenarios, number, seeds), {}), number, seeds)
+
+    def _measured(self, measured: Mapping[str, Any]) -> Iterator[Records]:
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
-                records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
-                self.judge(records, judgement, with_indices=True)
-        with without_warnings():
-            self._calibrate(judgement, 0, seeds)
-
-    def without(self, failed: Collection[str]) -> "Simulation":
-        """The same without the detectors that failed."""
-        return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
-
-    def other_repeats(
-        self, judgement: Judgement, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
-    ) -> None:
-        """Judge the records of later repeats, too; the warnings of the first are the only ones given."""
-        left = self.without(judgement.errors)
-        with without_warnings():
-            jobs = (delayed(left._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            for later in run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose):
-                judgement.extend(later)
-
-    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Judgement:
-        judgement = Judgement()
-        with without_warnings(), single_blas_thread():
-            for records in self.records(self.scenarios, number, seeds):
-                self.judge(records, judgement)
-            self._calibrate(judgement, number, seeds)
-        return judgement
+                yield Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
 
     def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
         """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
@@ -151,34 +150,41 @@ class Simulation:
         with without_warnings():
             return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
 
-    def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
-        """Add the decisions of every detector and, if asked, its damage indices."""
+    def evaluate(
+        self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
+    ) -> Evaluation:
+        """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another."""
+        decisions, transitions, indices = {}, {}, {}
+        for one in records:
+            answers, errors = ask_each(self.candidates, partial(self._answer, one, with_indices), errors)
+            for name, (index, decided, during) in answers.items():
+                key = name, one.scenario.name, one.source
+                decisions[key] = decided[np.newaxis]
+                if during is not None:
+                    transitions[key] = during[np.newaxis]
+                if with_indices:
+                    indices[key] = index
+        return Evaluation(decisions, errors, transitions, indices=indices)
 
-        def judged(name: str) -> tuple[Any, Array, Array | None]:
-            candidate = self.candidates[name]
-            seen, memory, during = records.seen_by(candidate), candidate.memory, None
-            if memory > 1 and records.has_onsets:
-                with without_warnings():
-                    during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
-            index = candidate.damage_index(seen, records.rows) if with_indices else None
-            return index, candidate.decisions(seen), during
+    def _answer(self, records: Records, with_index: bool, name: str) -> tuple[Any, Array, Array | None]:
+        """Damage index, decisions and those of transitions of one detector."""
+        candidate = self.candidates[name]
+        seen, memory, during = records.seen_by(candidate), candidate.memory, None
+        if memory > 1 and records.has_onsets:
+            with without_warnings():
+                during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
+        index = candidate.damage_index(seen, records.rows) if with_index else None
+        return index, candidate.decisions(seen), during
 
-        for name, (index, decisions, during) in judgement.ask(self.candidates, judged).items():
-            key = name, records.scenario.name, records.source
-            judgement.decisions[key] = [decisions]
-            if during is not None:
-                judgement.transitions[key] = [during]
-            if with_indices:
-                judgement.indices[key] = index
-
-    def _calibrate(self, judgement: Judgement, repeat: int, seeds: Sequence[int]) -> None:
-        """Add decisions on healthy records with noise of other seeds."""
+    def _calibrated(self, found: Evaluation, repeat: int, seeds: Sequence[int]) -> Evaluation:
+        """The evaluation with decisions on healthy records with noise of other seeds."""
         healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
+        if not healthy:
+            return found
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
-        for records in self.records(healthy, repeat, others) if healthy else ():
-            found = Judgement(errors=judgement.errors)
-            self.judge(records, found)
-            judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
+        again = self.evaluate(self.records(healthy, repeat, others), found.errors)
+        calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
+        return replace(found, errors=again.errors, calibration=calibration)
 
 
 def clean_frequencies(

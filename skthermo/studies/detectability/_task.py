@@ -47,7 +47,7 @@ class DetectionTask(Bunch):
         +1 for healthy records, -1 for damaged ones.
     cv : list of (ndarray, ndarray)
         Positions of the baseline, on which a detector is fitted, and of the simulated records of some repeats, by which
-        it is judged.
+        it is evaluated.
     scoring : callable
         ``scoring(detector, X, y)``: share of the damaged records found within the limit of false alarms.
     baseline : DataFrame
@@ -133,7 +133,7 @@ class DetectionTask(Bunch):
         confidence: float = 0.95,
         random_state: int | np.random.RandomState | None = None,
     ) -> pd.DataFrame:
-        """Judge tuned detectors in fresh weather and with fresh noise.
+        """Evaluate tuned detectors in fresh weather and with fresh noise.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class DetectionTask(Bunch):
               beyond the detector's own threshold, and its bounds;
             - ``within_limit``: False where both of these bounds exceed the limit of the task: give the detector a
               smaller ``contamination``;
-            - ``not_judged``: share of the fresh records that are not evaluated.
+            - ``not_evaluated``: share of the fresh records that are not evaluated.
 
         Raises
         ------
@@ -215,7 +215,7 @@ class DetectionTask(Bunch):
             "false_alarms_ci_low": alarms.lowest,
             "false_alarms_ci_high": alarms.highest,
             "within_limit": alarms.lowest <= limit,
-            "not_judged": float(np.isnan(found.values).mean()),
+            "not_evaluated": float(np.isnan(found.values).mean()),
         }
 
 
@@ -236,7 +236,7 @@ def detection_task(
 ) -> DetectionTask:
     """Labelled records on which scikit-learn's searches tune a detector for this structure and its weather.
 
-    Every detector learns the measured baseline, and is judged by simulated records of the healthy and of the damaged
+    Every detector learns the measured baseline, and is evaluated by simulated records of the healthy and of the damaged
     structure: a search over its settings, its compensator, lags, windows and covariance needs no damaged record.
 
     Parameters
@@ -266,7 +266,7 @@ def detection_task(
         Limit of the share of healthy records in alarm.
     n_splits : int, default=2
         Into how many groups the repeats are divided. In each split, the detector is fitted anew to the same baseline
-        and judged by one of the groups.
+        and evaluated by one of the groups.
     random_state : int, RandomState or None, default=None
         Seed of the noise.
 
@@ -304,18 +304,18 @@ def detection_task(
     All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
     settings are compared more certainly than each is known.
 
-    Each state (a scenario in one repeat) is judged by a call of its own: no lag and no window reaches from one state
-    into another. Its first records, for which lags and windows lack records before, may not be judged: T should be long
-    beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
-    so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart in a
-    single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+    Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
+    into another. Its first records, for which lags and windows lack records before, may not be evaluated: T should be
+    long beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days,
+    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart
+    in a single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
 
     The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
     regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
     records.
 
-    The best of many settings is partly the luckiest: its score is too good. ``confirm`` judges it in weather and with
-    noise that took no part.
+    The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
+    with noise that took no part.
 
     Examples
     --------

@@ -51,13 +51,15 @@ class Decisions:
     def raised(self, limit: float) -> float:
         """Decision below which there is an alarm: 0, or less where more healthy records than the limit lie below."""
         healthy = self.values[self.healthy()]
-        judged = np.sort(healthy[~np.isnan(healthy)])
-        if not judged.size:
-            raise ValueError(f"none of {len(healthy)} healthy records is judged; expected a detector that judges some")
-        return float(min(judged[int(limit * len(judged) + 1e-9)], 0.0))
+        evaluated = np.sort(healthy[~np.isnan(healthy)])
+        if not evaluated.size:
+            raise ValueError(
+                f"none of {len(healthy)} healthy records is evaluated; expected a detector that evaluates some"
+            )
+        return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
 
     def false_alarms(self, confidence: float = 0.95) -> Rate:
-        """Share of the judged healthy records beyond the detector's own threshold, with bounds."""
+        """Share of the evaluated healthy records beyond the detector's own threshold, with bounds."""
         return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
 
     def healthy(self) -> NDArray[np.intp]:
@@ -130,6 +132,6 @@ class TaskScorer:
         seen = [name for name in self.sensors if name in getattr(X, "columns", ())]
         if seen and not (has_targets(estimator) or isinstance(estimator, Pipeline)):
             raise ValueError(
-                f"X has the temperatures {seen}, and the detector {estimator!r:.200} would judge them; expected a task "
-                "with columns=modes, or a pipeline with a TemperatureCompensator"
+                f"X has the temperatures {seen}, and the detector {estimator!r:.200} would take them for "
+                "frequencies; expected a task with columns=modes, or a pipeline with a TemperatureCompensator"
             )

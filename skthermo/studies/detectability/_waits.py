@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array, is_real
 from skthermo._tables.text import counted, duration_text
 from skthermo._tables.times import has_stamps, row_times, time_of
+from skthermo.studies.detectability._evaluation import EvaluatedRecords
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
-from skthermo.studies.detectability._judged import JudgedRecords
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
@@ -78,7 +78,7 @@ class Waits:
     whole_repeats: bool
 
     @classmethod
-    def of(cls, records: JudgedRecords, onset: Any = None, transitions: Array | None = None) -> "Waits":
+    def of(cls, records: EvaluatedRecords, onset: Any = None, transitions: Array | None = None) -> "Waits":
         """Waits from onsets in every step, or from the onset of the scenario or another one alone.
 
         After the last record comes the first one again, so that each season has as many onsets as it has steps.
@@ -87,18 +87,18 @@ class Waits:
         """
         clock = Clock.of(records.damage_index)
         alarms = clock.any_in_step(records.decisions < 0)
-        judged = clock.any_in_step(~np.isnan(records.decisions))
+        evaluated = clock.any_in_step(~np.isnan(records.decisions))
         onset = records.scenario.onset if onset is None else onset
         whole = records.scenario.n_draws > 1
         if onset is not None:
             times, start = row_times(records.damage_index), time_of(records.damage_index, onset, "onset")
             first = int(clock.steps[times >= start].min())
             steps = np.where(alarms[:, first:].any(axis=1), alarms[:, first:].argmax(axis=1) + 1.0, np.inf)
-            return cls(clock, steps[:, np.newaxis], float(1 - judged[:, first:].mean()), True)
+            return cls(clock, steps[:, np.newaxis], float(1 - evaluated[:, first:].mean()), True)
         steps = _until_next(alarms)
         if transitions is not None:
             steps = _after_transitions(clock, steps, transitions < 0)
-        return cls(clock, steps, float(1 - judged.mean()), whole)
+        return cls(clock, steps, float(1 - evaluated.mean()), whole)
 
     def found(self, number: int, confidence: float) -> tuple[float, float, float]:
         """Share of the onsets after which there is an alarm within a number of steps, and its bounds.
@@ -170,7 +170,7 @@ def _time(one: Any, is_stamped: bool) -> Any:
 
 
 def waits_table(
-    records: Mapping[tuple[str, str, str], JudgedRecords],
+    records: Mapping[tuple[str, str, str], EvaluatedRecords],
     transitions: Mapping[tuple[str, str, str], Array],
     within: Any,
     level: float,
@@ -200,7 +200,7 @@ def waits_table(
         row["median"] = waits.clock.time(waits.within(0.5))
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
-        row["not_judged"] = waits.share_not_evaluated
+        row["not_evaluated"] = waits.share_not_evaluated
         text = false_alarms_told(waits, numbers) if scenario.is_healthy else waits_told(waits, false, level)
         rows.append(row | {"text": text})
     table = pd.DataFrame(rows)

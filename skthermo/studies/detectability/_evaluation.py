@@ -1,7 +1,9 @@
 """Decisions of the detectors of a study, and their rows in its table."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -21,9 +23,9 @@ Key: TypeAlias = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedRecords:
-    """Records of one scenario and source as a detector judges them: their damage index in the first repeat, with their
-    index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
+class EvaluatedRecords:
+    """What a detector makes of the records of one scenario and source: their damage index in the first repeat, with
+    their index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
 
     detector: str
     scenario: BaseScenario
@@ -46,7 +48,8 @@ class JudgedRecords:
         if not rate.n_records:
             raise ValueError(
                 f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
-                "be judged: they lack what the detector needs, or are before the onset; expected some that it can judge"
+                "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
+                "after the onset"
             )
         pi_low, pi_high = band_of(decisions, confidence)
         return {
@@ -72,48 +75,59 @@ class JudgedRecords:
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
-    """Decisions of each repeat by detector, scenario and source; those on records that are damaged after some onsets
-    only, of detectors with windows; those on healthy records with noise of other seeds by detector and source; damage
-    indices of the first repeat; errors of the detectors that failed."""
+class Evaluation:
+    """What detectors decided in the repeats of a study, by detector, scenario and source.
 
-    decisions: dict[Key, list[Array]] = field(default_factory=dict)
-    transitions: dict[Key, list[Array]] = field(default_factory=dict)
-    calibration: dict[Key, list[Array]] = field(default_factory=dict)
-    indices: dict[Key, pd.Series] = field(default_factory=dict)
-    errors: dict[str, Exception] = field(default_factory=dict)
+    ``decisions`` have shape (n_repeats, n_records); ``transitions``, (n_repeats, n_onsets, n_window), are those of
+    detectors with windows on records that are damaged after some onsets only. ``calibration`` holds decisions on
+    healthy records with noise of other seeds, by detector and source, ``indices`` the damage indices of the first
+    repeat, and ``errors`` those of the detectors that failed, by name.
+    """
 
-    def ask(self, detectors: Iterable[str], question: Callable[[str], Answer]) -> dict[str, Answer]:
-        """Answers of detectors that have not failed, nor fail at this question; an error if none is left."""
-        asked, found = [name for name in detectors if name not in self.errors], {}
-        for name in asked:
-            try:
-                with warnings_of_detector(name if len(asked) > 1 else None):
-                    found[name] = question(name)
-            except Exception as error:
-                self.errors[name] = error
-        if not found:
-            raise next(iter(self.errors.values()))
-        return found
+    decisions: Mapping[Key, Array]
+    errors: Mapping[str, Exception]
+    transitions: Mapping[Key, Array] = field(default_factory=dict)
+    calibration: Mapping[Key, Array] = field(default_factory=dict)
+    indices: Mapping[Key, pd.Series] = field(default_factory=dict)
 
-    def extend(self, later: "Judgement") -> None:
-        """Add the decisions of a later repeat, and the errors of detectors that failed there."""
+    def with_repeats(self, later: Sequence[Evaluation]) -> Evaluation:
+        """This evaluation and those of later repeats together."""
+        joined = {}
         for name in ("decisions", "transitions", "calibration"):
-            mine, added = getattr(self, name), getattr(later, name)
-            for key, decisions in added.items():
-                if key in mine:
-                    mine[key].extend(decisions)
-        self.errors.update(later.errors)
+            repeats = [getattr(one, name) for one in (self, *later)]
+            joined[name] = {key: np.concatenate([one[key] for one in repeats if key in one]) for key in repeats[0]}
+        errors = dict(self.errors)
+        for one in later:
+            errors |= one.errors
+        return replace(self, errors=errors, **joined)
 
-    def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[JudgedRecords]:
-        """What a detector that has not failed has judged, in the order of the scenarios."""
-        keys = [(detector, scenario.name, source) for scenario in scenarios for source in (SIMULATED, REFERENCE)]
-        by_name = {scenario.name: scenario for scenario in scenarios}
+    def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
+        """Those of a detector, in the order of the scenarios."""
         return [
-            JudgedRecords(detector, by_name[key[1]], key[2], self.indices[key], np.array(self.decisions[key]))
-            for key in keys
-            if key in self.decisions
+            EvaluatedRecords(detector, scenario, source, self.indices[key], self.decisions[key])
+            for scenario in scenarios
+            for source in (SIMULATED, REFERENCE)
+            if (key := (detector, scenario.name, source)) in self.decisions
         ]
+
+
+def ask_each(
+    detectors: Iterable[str], question: Callable[[str], Answer], errors: Mapping[str, Exception]
+) -> tuple[dict[str, Answer], dict[str, Exception]]:
+    """Answers of detectors that have not failed before, and all errors, new ones included.
+
+    The first error is raised if no detector is left.
+    """
+    asked, found, errors = [name for name in detectors if name not in errors], {}, dict(errors)
+    for name in asked:
+        try:
+            with warnings_of_detector(name if len(asked) > 1 else None):
+                found[name] = question(name)
+        except Exception as error:
+            errors[name] = error
+    if not found:
+        raise next(iter(errors.values()))
+    return found, errors
 
 
 def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
@@ -121,8 +135,8 @@ def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
 
     Of n rates, the k-th smallest exceeds that of one more repeat with probability k / (n + 1). One rate has no range.
     """
-    judged = (~np.isnan(decisions)).sum(axis=1)
-    rates = (decisions < 0).sum(axis=1)[judged > 0] / judged[judged > 0]
+    evaluated = (~np.isnan(decisions)).sum(axis=1)
+    rates = (decisions < 0).sum(axis=1)[evaluated > 0] / evaluated[evaluated > 0]
     if len(rates) < 2:
         return float("nan"), float("nan")
     lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2], method="weibull")
