@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, overload
 
@@ -40,6 +41,7 @@ from skthermo._validation import (
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.preprocessing import RecordFindings, check_records
+from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
 from skthermo.residuals.spread import Spread
@@ -184,7 +186,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
         "cv": ["cv_object", StrOptions({"contiguous"})],
-        "whiten": [StrOptions({"global", "local"}), None],
+        "whiten": [StrOptions({"auto", "global", "local"}), None],
     }
 
     def __init__(
@@ -193,7 +195,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         *,
         targets: Sequence[Hashable],
         cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
-        whiten: Literal["global", "local"] | None = None,
+        whiten: Literal["auto", "global", "local"] | None = "auto",
     ):
         self.estimator = estimator
         self.targets = targets
@@ -438,13 +440,30 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
-        size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        local, widens, near = self.whiten == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
-        self.spread_, white = Spread.of(weather, taught, size, told, local=local, widens=widens, near=near)
+        weather = as_floats(filled)
+        self.spread_ = Spread.of(taught, np.fmax.reduce(np.abs(measured)), told)
+        white = self.spread_.whiten(weather, taught, told)
+        if self.whiten != "global":
+            floor, near = self.whiten == "auto", rows_near_in_time(filled)
+            followed, white = self.spread_.followed(weather, taught, told, floor=floor, near=near)
+            self.spread_ = replace(followed, extrapolation=self._extrapolation(filled, frequencies))
         if not len(fills.rows):
             return white
         untaught = np.isnan(taught).all(axis=1)
         return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white)
+
+    def _extrapolation(self, temperatures: Any, frequencies: Any) -> Extrapolation | None:
+        """How predictions err beyond the baseline's weather; None where the estimator states it, or too few show it."""
+        measured = as_floats(frequencies)
+        if self.regression_.tells_errors or (~np.isnan(measured).all(axis=1)).sum() < FEWEST:
+            return None
+
+        def residuals_of(apart: NDArray[np.bool_]) -> Array:
+            if np.isnan(measured[~apart]).all(axis=0).any():
+                return np.full_like(measured[apart], np.nan)
+            return measured[apart] - self.regression_.predict_apart(temperatures, frequencies, apart)
+
+        return Extrapolation.of(as_floats(temperatures), self.spread_.overall, residuals_of)
 
     def _wanted_folds(self, temperatures: Any) -> Any:
         """The folds that are asked for; rows without stamps stay together where lags need them to."""
