@@ -1165,11 +1165,10 @@ use(
         },
     ),
 )
-for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "expected_residuals"):
+for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
     more = {
         "predict": {"return_std": (False, flag())},
         "predict_interval": {"confidence": (0.9, number(0, 1, 90, -0.1))},
-        "expected_residuals": {"return_number": (False, flag())},
     }.get(name, {})
     method(f"surrogate.DataInformedFEM.{name}", CHAIN, X=(T, PREDICTING), **more)
 method(
@@ -1209,16 +1208,6 @@ method(
     noise=(0.01, NOISE),
     random_state=(0, seed()),
 )
-method("surrogate.DataInformedFEM.simulate_modes", CHAIN, X=(T, PREDICTING), modes=([0, 6], integers(23)), **CHANGES)
-method(
-    "surrogate.DataInformedFEM.draw_noise",
-    CHAIN,
-    X=(T, PREDICTING),
-    noise=(0.01, NOISE),
-    **FAULTS,
-    random_state=(0, seed()),
-)
-method("surrogate.DataInformedFEM.draw_gaps", CHAIN, X=(T, PREDICTING), **FAULTS, random_state=(0, seed()))
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),

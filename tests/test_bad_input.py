@@ -476,7 +476,7 @@ REFUSED = [
     ("mapper a class", lambda: chain(mapper=TemperatureMapper).fit(T, F), "mapper|class"),
     ("before fit", lambda: DataInformedFEM(TRUSS).predict(T), "not fitted"),
     ("interval before fit", lambda: chain().predict_interval(T), "not fitted"),
-    ("residuals before fit", lambda: chain().residuals_, "not fitted"),
+    ("residuals before fit", lambda: chain().residuals(), "not fitted"),
     (
         "no damage there",
         lambda: chain(ONE_MODE).fit(T, F[["f1"]]).simulate(T, damage={"k": 0.1}),
