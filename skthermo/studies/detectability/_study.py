@@ -19,7 +19,6 @@ from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
 from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._evaluation import ask_each
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._pod_curve import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
@@ -27,6 +26,7 @@ from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
+    ask_each,
     clean_frequencies,
 )
 from skthermo.studies.replicates import Replicates
