@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._estimators.warnings import warn_user
+from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._pod_curve import PODCurve, bracket_of, pod_curve
 
@@ -62,7 +63,7 @@ class FamilyRates:
                 raise
             rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
             cause = f"{rare}baseline raise the threshold" if self.is_undetected else ""
-            warn_user(f"no curve of source {self.source!r} for {error}{cause}", "family without a curve")
+            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "family without a curve")
             return bracket
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)

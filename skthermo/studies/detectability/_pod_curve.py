@@ -13,6 +13,7 @@ from scipy.stats import norm
 from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, is_real, real_array
+from skthermo.exceptions import ResultWarning
 from skthermo.studies.detectability._intervals import clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
@@ -263,6 +264,7 @@ def pod_curve(
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
             f"unknown, and a90 lies {place}; expected {expected}",
+            ResultWarning,
             "separated severities",
         )
     else:
@@ -282,6 +284,7 @@ def pod_curve(
             f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
             f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
             "severities near a90 and fit those alone",
+            ResultWarning,
             "curve beside its points",
         )
     return curve

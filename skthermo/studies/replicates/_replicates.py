@@ -8,6 +8,7 @@ import numpy as np
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import positive_integer
+from skthermo.exceptions import ResultWarning
 from skthermo.studies.replicates._models import checked_models, drawn_models
 from skthermo.studies.replicates._weather import other_years, resampled_days
 
@@ -81,7 +82,7 @@ def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
     except ValueError as error:
         if is_needed:
             raise
-        warn_user(f"bands hold no error of the model: {error}", "bands without models")
+        warn_user(f"bands hold no error of the model: {error}", ResultWarning, "bands without models")
         return []
 
 

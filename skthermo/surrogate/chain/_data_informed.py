@@ -40,6 +40,7 @@ from skthermo._validation import (
     last_step,
     validate_data,
 )
+from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.residuals.baseline import BaselineResiduals
@@ -966,7 +967,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         predicted = self.predict(X)
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
-            warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
+            warn_user(
+                f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
+                UnevaluatedRowsWarning,
+                "rows scored",
+            )
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):

@@ -21,6 +21,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
 from skthermo._validation import check_array, last_step, seed_parts, seeded, validate_data
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import shape_components
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.surrogate._mapper import TemperatureMapper
@@ -147,6 +148,7 @@ def warn_of_inert(chain: Any, names: Iterable[str]) -> None:
                 f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
                 "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
                 "search over the InverseSurrogate itself, whose score is that of its regressor",
+                ResultWarning,
                 "inert settings searched",
             )
 
@@ -210,6 +212,7 @@ class Estimates:
                 f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
                 "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
                 "imputer=KNNGapImputer()",
+                FewRecordsWarning,
                 "scarce modes",
             )
         return cls(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
@@ -246,8 +249,8 @@ def with_shapes(inverse: Any, F: Any, shapes: ArrayLike | None) -> Any:
     return frame_like(F, np.hstack([as_floats(F), components]), names)
 
 
-def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
-    """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+def shape_warnings(inverse: Any, aligned: Any) -> Iterator[SkthermoWarning]:
+    """Warnings about measured shapes, which stand beside the frequencies."""
     inverse = refining_step(inverse)
     if inverse is None:
         return
@@ -258,10 +261,10 @@ def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
     n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
     names = column_names(aligned, "f")[:n_modes]
     if n_shapes < FEW_SHAPES * found.sum():
-        yield (
-            "few shapes",
+        yield RecordsWarning(
             f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the {n_sensors} "
             "sensors; the other shapes are not used: expected dofs without sensors that failed",
+            "few shapes",
         )
     if not n_shapes or "shapes" not in inverse.samples_:
         return
@@ -275,10 +278,10 @@ def shape_warnings(inverse: Any, aligned: Any) -> Iterator[tuple[str, str]]:
     excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
     mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
     if excess[mode, sensor] > UNLIKE:
-        yield (
-            "shapes unlike the model's",
+        yield ModelWarning(
             f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
             f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} to "
             f"{highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, with the "
             "signs and gains of the model's axes, or a shape_noise that covers the model's error",
+            "shapes unlike the model's",
         )

@@ -11,6 +11,7 @@ from sklearn.utils import Bunch
 from skthermo._estimators.arguments import is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import sample, share_reordered
 from skthermo.surrogate._memory import remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
@@ -45,6 +46,7 @@ class SimulatedTraining:
             warn_user(
                 f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
                 "expected more modes: the prior decides between them",
+                FewRecordsWarning,
                 "few modes",
             )
         box = Box.of(inverse.bounds, names)
@@ -55,6 +57,7 @@ class SimulatedTraining:
             warn_user(
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
                 "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
+                ModelWarning,
                 "order of modes",
             )
         if reduced is None:
