@@ -28,7 +28,7 @@ from skthermo._validation import (
     seeded,
 )
 from skthermo.detection import TemperatureCompensator
-from skthermo.exceptions import RecordsWarning, SkthermoWarning
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._course import Course, no_evaluations
@@ -691,7 +691,7 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     warn_user(
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
-        SkthermoWarning,
+        UnevaluatedRowsWarning,
         "records not evaluated",
     )
 

@@ -17,7 +17,7 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
-from skthermo.exceptions import SkthermoWarning
+from skthermo.exceptions import ModelWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._evaluation import SIMULATED, EvaluatedRecords, Evaluation, Key
 from skthermo.studies.detectability._families import FamilyRates
@@ -73,7 +73,7 @@ class ReplicateRates:
             warn_user(
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
-                SkthermoWarning,
+                ModelWarning,
                 "failed replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)
