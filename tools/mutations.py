@@ -65,9 +65,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes[:, :, np.newaxis] * jacobian",
             "slopes[:, :1, np.newaxis] ** 0 * jacobian",
         ),
-    ],
-    ("surrogate/chain/_intervals.py", "surrogate/test_predicted_covariance.py"): [
-        ("intervals of a certain mapper", "np.hypot(np.sqrt(fills), np.sqrt(stated))", "np.sqrt(fills)"),
+        (
+            "intervals of a certain mapper",
+            "self.covariances_of_fills(weather), self.covariances_of_mapper(weather)",
+            "self.covariances_of_fills(weather), 0 * self.covariances_of_fills(weather)",
+        ),
     ],
     ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
@@ -481,7 +483,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
         ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
     ],
-    ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
+    ("surrogate/chain/_record_simulator.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [

@@ -302,7 +302,7 @@ def test_other_training_records_change_a_chain_as_its_error(fem):
     refitted = (again.predict(year) / predicted - 1).to_numpy()
     ratio = np.sqrt((changes**2).mean() / (refitted**2).mean())
     assert 0.75 < ratio < 1.33
-    spread = [np.nanstd(chain.residuals_.values, axis=0).mean() for chain in (fem, *chains)]
+    spread = [np.nanstd(chain.residuals().values, axis=0).mean() for chain in (fem, *chains)]
     np.testing.assert_allclose(spread[1:], spread[0], rtol=0.06)
     pd.testing.assert_frame_equal(fem.resampled(3).predict(year), chains[3].predict(year))
     pd.testing.assert_frame_equal(fem.predict(year), predicted)

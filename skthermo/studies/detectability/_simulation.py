@@ -69,14 +69,15 @@ class Measurement:
     @classmethod
     def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
-        return cls(noise, gaps, fem.service_records(outliers) if np.ndim(outliers) else outliers)
+        return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
     def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
         """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
-        noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
+        weather = fem.weather(T)
+        noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
         if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
             return noise, T
-        missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
+        missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
         return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
 
 

@@ -58,7 +58,9 @@ class CampaignSimulator:
 
     def _clean(self, T: Any, changes: Mapping[str, Any]) -> Array:
         measured = as_floats(self.fem.simulate(T, **changes))
-        return np.hstack([measured, self.fem.simulate_modes(T, self.modes, **changes)]) if self.modes else measured
+        if not self.modes:
+            return measured
+        return np.hstack([measured, self.fem.thermal_.simulated(self.fem.weather(T), self.modes, **changes)])
 
     def _measured(self, T: Any, seeds: Any) -> tuple[Array, Any]:
         """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""

@@ -250,7 +250,7 @@ def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
 def _scatter(study: DetectabilityStudy) -> float:
     """Median relative scatter of the measured modes."""
     if isinstance(study.noise, str):
-        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals_.values**2, axis=0))))
+        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals().values ** 2, axis=0))))
     return float(np.median(check_noise(study.noise, len(study.fem.mode_names_), study.fem.mode_names_)))
 
 

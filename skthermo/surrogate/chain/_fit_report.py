@@ -23,8 +23,8 @@ from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.weather import SensorRegression
-from skthermo.surrogate._fitted_chain import FittedChain
-from skthermo.surrogate.chain._parts import Estimates
+from skthermo.surrogate.chain._fitted_chain import FittedChain
+from skthermo.surrogate.chain._inverse_of_chain import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao

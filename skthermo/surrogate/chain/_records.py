@@ -14,11 +14,12 @@ from sklearn.pipeline import Pipeline
 from skthermo._estimators.regressors import fit_weighted, offers, predicted_covariance, reach_of
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array, as_columns, as_floats, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import frame_like
+from skthermo._tables.frames import check_columns, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import row_times
 from skthermo._validation import last_step
-from skthermo.preprocessing import BlockedKFold
+from skthermo.fem import FEModel
+from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
 from skthermo.residuals.weather import SensorRegression, warn_of_unseen
@@ -159,6 +160,31 @@ class TrainingRecords(SavesFrames):
         errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances)))
         reach = (reach_of(learner, inputs) or (None,))[0]
         return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
+
+
+def check_frequencies(F: Any, model: FEModel) -> None:
+    """Raise an error unless there is a column for each mode of a model, and all values are positive or NaN."""
+    if F.shape[1] != model.n_modes:
+        raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
+    values = as_floats(F)
+    wrong = ~np.isnan(values) & ~(values > 0)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"frequency {column_names(F, 'f')[column]!r} in row {row} is {values[row, column]:g}; expected positive "
+            "numbers in Hz, and NaN where a mode is missing"
+        )
+    check_columns(F, "frequency")
+
+
+def without_outliers(findings: RecordFindings, F: Any) -> Any:
+    """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
+    far = findings.outliers
+    if isinstance(F, pd.DataFrame) and far.index.is_unique:
+        far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
+    if far.shape != F.shape or not far.to_numpy().any():
+        return F
+    return frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
 
 
 def measurement_noise(mapper: Any, T: Any, F: Any) -> Array:

@@ -11,13 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import as_mapping
-from skthermo._estimators.regressors import inputs_of_last_step, reach_of, told_by_fleet, warn_of_fleet
+from skthermo._estimators.regressors import (
+    inputs_of_last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+    warn_of_fleet,
+)
 from skthermo._estimators.warnings import warn_each, warn_user
 from skthermo._tables.arrays import HUGE, Array, MatrixLike, as_columns, as_floats, is_real, real_array
 from skthermo._tables.frames import check_same_rows, column_names
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.residuals.weather import SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._discrepancy import Discrepancy
 
@@ -146,6 +153,31 @@ class ThermalModel(SavesFrames):
         slopes = np.log(sides[1] / sides[0]) / (2 * ALIGNED * frequencies)
         effects = slopes[:, :, np.newaxis] * jacobian
         return effects @ covariances @ effects.swapaxes(1, 2)
+
+    def known_deviations(self, weather: Weather) -> Array:
+        """Relative standard deviations because temperatures were filled and the mapper states errors of its own."""
+        covariances = self.covariances_of_fills(weather), self.covariances_of_mapper(weather)
+        return np.hypot(*(np.sqrt(np.einsum("ijj->ij", part)) for part in covariances))
+
+    def covariances_of_fills(self, weather: Weather) -> Array:
+        """Covariances of ln f because temperatures were filled, (n_rows, n_modes, n_modes)."""
+        n_parameters = len(self.parameter_names)
+
+        def predict(filled: Any) -> Array:
+            return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
+
+        def log_frequencies(both: Array) -> Array:
+            return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
+
+        cost = PredictionError.of_fills(self.sensors, weather.given, weather.filled, predict, log_frequencies)
+        return cost.of_all(len(weather), len(self.mode_names))
+
+    def covariances_of_mapper(self, weather: Weather) -> Array:
+        """Covariances of ln f as the mapper states them; zero where it does not."""
+        if not offers(self.mapper, "predict_covariance"):
+            return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
+        theta = as_columns(self.mapper.predict(weather.filled))
+        return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
 
 
 def frequencies_of(simulator: Simulator, aligner: Any, theta: Array, n_jobs: int | None) -> Array:
