@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.text import duration_text
 from skthermo._validation import _fit_context, check_is_fitted
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
@@ -210,6 +211,7 @@ class ExponentialMeans(PastFeatures):
             f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before: their means are of the few "
             f"records since {X.index.min() if is_timed else 'the first row'}; give those of {REACH} times {reach} "
             "before, too",
+            FewRecordsWarning,
             "no records for means",
         )
         return lacking

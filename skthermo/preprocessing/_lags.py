@@ -18,6 +18,7 @@ from skthermo._validation import (
     StrOptions,
     _fit_context,
 )
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
@@ -192,6 +193,7 @@ class LagFeatures(PastFeatures):
             warn_user(
                 f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
                 f"{reach} rows before, too, or a frame on a DatetimeIndex",
+                FewRecordsWarning,
                 "padded lags",
             )
         return is_told & (np.arange(n_rows) < reach)
@@ -205,6 +207,7 @@ class LagFeatures(PastFeatures):
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
+                FewRecordsWarning,
                 "no records for lags",
             )
         return is_told & unknown

@@ -16,6 +16,7 @@ from scipy.stats import norm
 from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, is_real, real_array
+from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._intervals import clopper_pearson
 
@@ -267,6 +268,7 @@ def pod_curve(
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
             f"unknown, and a90 lies {place}; expected {expected}",
+            ResultWarning,
             "separated severities",
         )
     else:
@@ -286,6 +288,7 @@ def pod_curve(
             f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
             f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
             "severities near a90 and fit those alone",
+            ResultWarning,
             "curve beside its points",
         )
     return curve
@@ -404,7 +407,7 @@ class FamilyRates:
                 raise
             rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
             cause = f"{rare}baseline raise the threshold" if self.is_undetected else ""
-            warn_user(f"no curve of source {self.source!r} for {error}{cause}", "family without a curve")
+            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "family without a curve")
             return bracket
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)

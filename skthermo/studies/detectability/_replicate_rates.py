@@ -17,6 +17,7 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import ModelWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod_curve
 from skthermo.studies.detectability._simulation import (
@@ -78,6 +79,7 @@ class ReplicateRates:
             warn_user(
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
+                ModelWarning,
                 "failed replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)

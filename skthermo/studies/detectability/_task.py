@@ -21,6 +21,7 @@ from skthermo._tables.arrays import Array, as_columns, as_floats, as_random_stat
 from skthermo._tables.frames import column_names
 from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
+from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
 from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._pod_curve import check_probability
@@ -239,6 +240,7 @@ class DetectionTask(Bunch):
                 warn_user(
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
                     "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
+                    ResultWarning,
                     "search that refits",
                 )
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
@@ -305,6 +307,7 @@ class DetectionTask(Bunch):
             warn_user(
                 "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
                 "was tuned",
+                WeatherWarning,
                 "same weather",
             )
         rows = []

@@ -19,6 +19,7 @@ from skthermo._estimators.warnings import warn_user, warnings_once, without_warn
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_floats, as_random_state, positive_integer, real_array
 from skthermo._tables.frames import check_same_rows, column_names
+from skthermo.exceptions import ResultWarning
 from skthermo.fem import linearise
 from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
 from skthermo.studies.scenarios import Scenario
@@ -257,6 +258,7 @@ def compare_extensions(
         warn_user(
             f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
             "the study; expected a study with larger severities",
+            ResultWarning,
             "families that are not found",
         )
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
@@ -312,6 +314,7 @@ def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
             warn_user(
                 f"{mode_name(rank)} depends on parameters that the measured modes hardly determine: predicted from one "
                 f"record, its frequency scatters {ratio:.1f} times as much as theirs, and its gain is doubtful",
+                ResultWarning,
                 f"unknown {mode_name(rank)}",
             )
 

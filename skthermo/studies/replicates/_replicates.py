@@ -128,6 +128,10 @@ def _on_stamps_of(first: Any, other: Any, number: int) -> Any:
     return frame_like(first, as_floats(other)[order[near]])
 
 
+from skthermo.exceptions import ResultWarning
+from skthermo.studies.replicates._models import checked_models, drawn_models
+from skthermo.studies.replicates._weather import other_years, resampled_days
+
 PARTS = ("noise", "weather", "baseline", "model")
 """What a replicate draws, in the order in which one is added to the others."""
 
@@ -198,7 +202,7 @@ def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
     except ValueError as error:
         if is_needed:
             raise
-        warn_user(f"bands hold no error of the model: {error}", "bands without models")
+        warn_user(f"bands hold no error of the model: {error}", ResultWarning, "bands without models")
         return []
 
 

@@ -55,6 +55,7 @@ from skthermo._validation import (
     seeded,
     validate_data,
 )
+from skthermo.exceptions import ResultWarning, UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
@@ -827,7 +828,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         predicted = self.predict(X)
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
-            warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
+            warn_user(
+                f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
+                UnevaluatedRowsWarning,
+                "rows scored",
+            )
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
@@ -951,5 +956,6 @@ def warn_of_inert(inverse: Any, model: FEModel, names: Iterable[str]) -> None:
                 f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
                 "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
                 "search over the InverseSurrogate itself, whose score is that of its regressor",
+                ResultWarning,
                 "inert settings searched",
             )

@@ -13,6 +13,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import column_names, frame_like
 from skthermo._validation import last_step
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import shape_components
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
@@ -75,6 +76,7 @@ class ChainInverse:
                 f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
                 "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
                 "imputer=KNNGapImputer()",
+                FewRecordsWarning,
                 "scarce modes",
             )
         return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
@@ -99,7 +101,7 @@ class ChainInverse:
         names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
         return frame_like(F, np.hstack([as_floats(F), components]), names)
 
-    def shape_warnings(self, aligned: Any) -> Iterator[tuple[str, str]]:
+    def shape_warnings(self, aligned: Any) -> Iterator[SkthermoWarning]:
         """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
         inverse = self.refining
         if inverse is None:
@@ -111,10 +113,10 @@ class ChainInverse:
         n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
         names = column_names(aligned, "f")[:n_modes]
         if n_shapes < FEW_SHAPES * found.sum():
-            yield (
-                "few shapes",
+            yield RecordsWarning(
                 f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the "
                 f"{n_sensors} sensors; the other shapes are not used: expected dofs without sensors that failed",
+                "few shapes",
             )
         if not n_shapes or "shapes" not in inverse.samples_:
             return
@@ -128,10 +130,10 @@ class ChainInverse:
         excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
         mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[mode, sensor] > UNLIKE:
-            yield (
-                "shapes unlike the model's",
+            yield ModelWarning(
                 f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
                 f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} "
                 f"to {highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, "
                 "with the signs and gains of the model's axes, or a shape_noise that covers the model's error",
+                "shapes unlike the model's",
             )

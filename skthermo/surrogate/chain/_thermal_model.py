@@ -36,6 +36,7 @@ from skthermo._tables.arrays import (
 )
 from skthermo._tables.frames import check_same_rows, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
+from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
@@ -215,29 +216,30 @@ class ThermalModel(SavesFrames):
             warn_user(
                 f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
                 f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                ModelWarning,
                 "impossible parameters",
             )
         return theta
 
-    def _warnings(self, weather: Weather) -> Iterator[tuple[str, str]]:
-        """What is unusual about weather: kind and text of each warning."""
+    def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
+        """Warnings about what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
         consequence = "standard deviations and intervals of predictions are widened by what that costs"
         message = told_fills(weather.deviations, column_names(filled, "T"), consequence)
         if message:
-            yield "filled temperatures", message
+            yield RecordsWarning(message, "filled temperatures")
         message = told_unpredicted(unknown, as_floats(filled))
         if message:
-            yield "rows that cannot be predicted", message
+            yield UnevaluatedRowsWarning(message, "rows that cannot be predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
         message = learned.warning(inputs)
         if message:
-            yield "weather outside the training range", message
+            yield WeatherWarning(message, "weather outside the training range")
         consequence = "standard deviations and intervals say how uncertain that is"
         warn_of_fleet(told_by_fleet(self.mapper, filled), consequence)
         message = self.sensors.warning(weather.given)
         if message:
-            yield "sensor apart from others", message
+            yield RecordsWarning(message, "sensor apart from others")
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
@@ -336,6 +338,7 @@ def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> 
             warn_user(
                 f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
                 "and not percent",
+                ModelWarning,
                 "large factor",
             )
         factors[name] = float(factor)

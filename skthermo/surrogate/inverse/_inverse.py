@@ -27,6 +27,7 @@ from skthermo._validation import (
     _fit_context,
     check_is_fitted,
 )
+from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
@@ -407,6 +408,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             warn_user(
                 f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
                 "they keep what they reached, or the regressor's estimate",
+                ModelWarning,
                 "not converged",
             )
         rows = np.flatnonzero(found.full_solves)
@@ -415,6 +417,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"the parameters of {rows.size} of {len(theta)} rows, row {rows[0]} the first, are outside the box of "
                 f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "
                 "like those that fit saw, wider bounds, or the noise of the measurement",
+                ModelWarning,
                 "refined by the full model",
             )
         self._warn_of_box(theta, found.outside)
@@ -646,4 +649,4 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         if message and self.prior is not None:
             message += "; or a wider prior, which these rows contradict"
         if message:
-            warn_user(message, "outside the bounds")
+            warn_user(message, ModelWarning, "outside the bounds")

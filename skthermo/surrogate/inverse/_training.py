@@ -20,6 +20,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import column_names
 from skthermo._validation import validate_data
+from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import add_noise, evaluate, sample, share_reordered
 from skthermo.surrogate._memory import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
@@ -142,6 +143,7 @@ class SimulatedTraining:
             warn_user(
                 f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
                 "expected more modes: the prior decides between them",
+                FewRecordsWarning,
                 "few modes",
             )
         box = Box.of(inverse.bounds, names)
@@ -152,6 +154,7 @@ class SimulatedTraining:
             warn_user(
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
                 "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
+                ModelWarning,
                 "order of modes",
             )
         if reduced is None:
