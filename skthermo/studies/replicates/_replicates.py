@@ -13,6 +13,7 @@ from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, positive_integer
 from skthermo._tables.frames import column_names, frame_like
 from skthermo._tables.times import has_stamps, row_times
+from skthermo.exceptions import ResultWarning
 from skthermo.updating import ModelUpdater
 
 DEVIATION = 0.005  # relative, of measured mean frequencies from those of a perfect model
@@ -127,10 +128,6 @@ def _on_stamps_of(first: Any, other: Any, number: int) -> Any:
         )
     return frame_like(first, as_floats(other)[order[near]])
 
-
-from skthermo.exceptions import ResultWarning
-from skthermo.studies.replicates._models import checked_models, drawn_models
-from skthermo.studies.replicates._weather import other_years, resampled_days
 
 PARTS = ("noise", "weather", "baseline", "model")
 """What a replicate draws, in the order in which one is added to the others."""
