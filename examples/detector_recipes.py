@@ -103,8 +103,8 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
     def outlier(name):
         return OutlierDetector(make_pipeline(StandardScaler(), novelties[name]), contamination, block=block)
 
-    def compensated(regressor, scale=None, detector=None):
-        compensator = TemperatureCompensator(regressor, targets=targets, scale=scale)
+    def compensated(regressor, whiten=None, detector=None):
+        compensator = TemperatureCompensator(regressor, targets=targets, whiten=whiten)
         return make_pipeline(compensator, detector or MahalanobisDetector(contamination))
 
     detectors = {"raw, Mahalanobis": MahalanobisDetector(contamination)}

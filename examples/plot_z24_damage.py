@@ -25,7 +25,7 @@ import pandas as pd
 from page_recipes import save_figures
 from z24_bench_recipes import DAMAGED, agreement, bench, bench_of_a_warning, choose, detectors, side_by_side
 from z24_damage_recipes import FROST, changes, identify, in_parameters
-from z24_recipes import GREY, PAVEMENT, SCALES, Records, alarm_table, compensate, plot_kinds, read_arguments
+from z24_recipes import GREY, PAVEMENT, WHITENINGS, Records, alarm_table, compensate, plot_kinds, read_arguments
 
 from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
 from skthermo.surrogate import TemperatureMapper
@@ -45,8 +45,8 @@ records = Records.of(bridge)
 
 measured, names = in_parameters(records)
 residuals = {
-    ("broken lines", label): compensate(measured, TemperatureMapper(), scale, targets=names)[0]
-    for label, scale in SCALES.items()
+    ("broken lines", label): compensate(measured, TemperatureMapper(), whiten, targets=names)[0]
+    for label, whiten in WHITENINGS.items()
 }
 print("Alarms in percent")
 print(alarm_table(residuals).round(1).to_string())

@@ -34,8 +34,8 @@ from z24_recipes import (
     MODES,
     PAVEMENT,
     PLAIN,
-    SCALES,
     WHITENED,
+    WHITENINGS,
     Records,
     boosting,
     compensate,
@@ -120,14 +120,14 @@ print(measured_table(records, candidates).round(1).to_string())
 
 inputs = {("none", "raw frequencies"): records.each(lambda frame: frame[FREQUENCIES])}
 for name, estimator in (("broken lines", TemperatureMapper()), ("boosted trees", boosting())):
-    for label, scale in SCALES.items():
-        inputs[name, label] = compensate(records, estimator, scale)[0]
+    for label, whiten in WHITENINGS.items():
+        inputs[name, label] = compensate(records, estimator, whiten)[0]
 
 fig, ax = plt.subplots(figsize=(10, 4.6), layout="constrained")
 pavement = records.each(lambda frame: frame[PAVEMENT])
 plot_kinds(ax, pavement, inputs["broken lines", PLAIN].each(lambda frame: frame["f2"]), ms=3)
-for scale, style, label in (("global", "--", "2 deviations, all weather"), ("local", "-", "2 deviations, by weather")):
-    compensator = compensate(records, TemperatureMapper(), scale)[1]
+for whiten, style, label in (("global", "--", "2 deviations, all weather"), ("local", "-", "2 deviations, by weather")):
+    compensator = compensate(records, TemperatureMapper(), whiten)[1]
     weather = records.baseline.drop(columns=FREQUENCIES)
     deviation = pd.Series(compensator.spread_.deviations(weather)[:, 1], weather.index)
     deviation = deviation.groupby(pavement.baseline.round()).median()
@@ -218,7 +218,7 @@ pavement = records.baseline[PAVEMENT]
 edges = [-np.inf, *pavement.quantile([0.2, 0.4, 0.6, 0.8, 1.0]), np.inf]
 classes = records.each(lambda frame: pd.cut(frame[PAVEMENT].to_numpy(), edges, precision=1))
 columns = {("records", kind): pd.Series(getattr(classes, kind)).value_counts(sort=False) for kind in KINDS}
-for label in SCALES:
+for label in WHITENINGS:
     residuals = inputs["broken lines", label]
     detector = MahalanobisDetector().fit(residuals.baseline)
     for kind in KINDS:

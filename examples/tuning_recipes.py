@@ -44,7 +44,7 @@ def fitted_chain(T, F, seed=0):
 def detector(targets):
     """Before it is tuned: no lags, one covariance for all weather, single records."""
     regression = make_pipeline(LagFeatures(1), TemperatureMapper(LinearRegression()))
-    return make_pipeline(TemperatureCompensator(regression, targets=targets, scale="global"), WindowedAlarm("3h"))
+    return make_pipeline(TemperatureCompensator(regression, targets=targets, whiten="global"), WindowedAlarm("3h"))
 
 
 def true_score(fitted, T, tables):

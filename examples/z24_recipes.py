@@ -30,7 +30,7 @@ FREQUENCIES = ["f1", "f2", "f3", "f4"]
 PAVEMENT = "TP"
 KINDS = {"baseline": ("healthy, baseline", GREY), "later": ("healthy, hold-out", BLUE), "damaged": ("damaged", ORANGE)}
 PLAIN, WHITENED = "residuals", "residuals whitened by weather"
-SCALES = {PLAIN: None, WHITENED: "local"}
+WHITENINGS = {PLAIN: None, WHITENED: "local"}
 
 
 def boosting():
@@ -133,9 +133,9 @@ class Records(NamedTuple):
         return cls(T.join(F), T_test.join(F_test), bridge.T_damaged.join(bridge.F_damaged))
 
 
-def compensate(records, estimator, scale=None, cv=None, targets=FREQUENCIES):
+def compensate(records, estimator, whiten=None, cv=None, targets=FREQUENCIES):
     """Residuals, those of the baseline out of fold, and the compensator."""
-    compensator = TemperatureCompensator(estimator, targets=targets, scale=scale, cv=cv)
+    compensator = TemperatureCompensator(estimator, targets=targets, whiten=whiten, cv=cv)
     return records.each(compensator.transform, compensator.fit_transform(records.baseline)), compensator
 
 

@@ -123,8 +123,8 @@ ESTIMATORS = [
     OutlierDetector(OneClassSVM()),
     OutlierDetector(LocalOutlierFactor(5, novelty=True)),
     TemperatureCompensator(Ridge(), targets=[1]),
-    TemperatureCompensator(Ridge(), targets=[1], scale="global"),
-    TemperatureCompensator(Ridge(), targets=[1], scale="local"),
+    TemperatureCompensator(Ridge(), targets=[1], whiten="global"),
+    TemperatureCompensator(Ridge(), targets=[1], whiten="local"),
 ]
 
 
@@ -174,7 +174,7 @@ TRANSFORMERS_AND_DETECTORS = [
     WindowedAlarm(6, rule="m-of-n"),
     OutlierDetector(OneClassSVM()),
     TemperatureCompensator(Ridge(), targets=["f1", "f2"]),
-    TemperatureCompensator(Ridge(), targets=["f1", "f2"], scale="local"),
+    TemperatureCompensator(Ridge(), targets=["f1", "f2"], whiten="local"),
 ]
 
 

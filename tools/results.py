@@ -56,7 +56,7 @@ def chain_results(chain, T, damage):
         "prediction": np.asarray(chain.predict(T)),
         "damaged": np.asarray(chain.simulate(T, damage=damage, noise="fitted", random_state=3)),
         "interval": np.stack([np.asarray(lowest), np.asarray(highest)]),
-        "records": np.asarray(chain.service_records().missing),
+        "records": np.asarray(chain.recorder_.service.missing),
     }
 
 
@@ -148,10 +148,10 @@ def detectors():
     both, later = pd.concat([T, F], axis=1), pd.concat([later_T, later_F], axis=1)
     both.iloc[5:60, -1] = later.iloc[5:60, -2] = np.nan
     results = {}
-    for scale in (None, "global", "local"):
-        compensator = TemperatureCompensator(LinearRegression(), targets=list(F.columns), scale=scale)
-        results[f"residuals {scale}"] = np.asarray(compensator.fit_transform(both))
-        results[f"later {scale}"] = np.asarray(compensator.transform(later))
+    for whiten in (None, "global", "local"):
+        compensator = TemperatureCompensator(LinearRegression(), targets=list(F.columns), whiten=whiten)
+        results[f"residuals {whiten}"] = np.asarray(compensator.fit_transform(both))
+        results[f"later {whiten}"] = np.asarray(compensator.transform(later))
     single = {
         "conformal": MahalanobisDetector(),
         "quantile": MahalanobisDetector(threshold="quantile"),

@@ -25,8 +25,8 @@ from skthermo._io import alone_with
 from skthermo.commands._record_files import ISO, read_file
 from skthermo.monitoring import Monitor, load_monitor
 
-HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_JUDGED}
+HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
+CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
 
 
 class Parser(argparse.ArgumentParser):
@@ -88,7 +88,7 @@ def _add_records(parser: argparse.ArgumentParser) -> None:
 
 
 def _update(options: argparse.Namespace) -> int:
-    """Judge new records, and save the monitor."""
+    """Evaluate new records, and save the monitor."""
     with alone_with(options.monitor, options.wait):
         monitor = load_monitor(options.monitor)
         form = {name: getattr(options, name) for name in ("separator", "decimal", "stamps")}
@@ -96,10 +96,10 @@ def _update(options: argparse.Namespace) -> int:
         records.index.name = monitor.baseline_.index.name
         before = dict(monitor.counts_)
         with told_around({"records not evaluated"}):  # said below, with all reasons
-            judged = monitor.update(records) if len(records) else None
-        code = _code(monitor, judged)
-        print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, judged)]))
-        if judged is not None:
+            evaluated = monitor.update(records) if len(records) else None
+        code = _code(monitor, evaluated)
+        print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, evaluated)]))
+        if evaluated is not None:
             code = _also(code, lambda: monitor.save(options.monitor))
     print("\n".join(_standing(monitor)))
     return _reported(monitor, options, code)
@@ -148,13 +148,13 @@ def _complain(error: Exception) -> None:
     print(f"error: {error}", file=sys.stderr)
 
 
-def _code(monitor: Monitor, judged: pd.DataFrame | None) -> int:
-    """Exit code of an update: an alarm that has ended again counts, and without a new judgement nothing is healthy."""
-    states = set() if judged is None else set(judged["state"])
+def _code(monitor: Monitor, evaluated: pd.DataFrame | None) -> int:
+    """Exit code of an update: an alarm that has ended again counts, and without a new evaluation nothing is healthy."""
+    states = set() if evaluated is None else set(evaluated["state"])
     if "alarm" in states or monitor.state() == "alarm":
         return ALARM
-    is_judged = judged is not None and (~judged["revised"] & (judged["state"] == "healthy")).any()
-    return CODES[monitor.state()] if is_judged else NOT_JUDGED
+    is_evaluated = evaluated is not None and (~evaluated["revised"] & (evaluated["state"] == "healthy")).any()
+    return CODES[monitor.state()] if is_evaluated else NOT_EVALUATED
 
 
 def _read(file: Path, records: pd.DataFrame) -> str:
@@ -162,16 +162,16 @@ def _read(file: Path, records: pd.DataFrame) -> str:
     return f"read from {file}: {len(records)}{period}"
 
 
-def _taken_in(before: dict[str, int], after: dict[str, int], judged: pd.DataFrame | None) -> list[str]:
+def _taken_in(before: dict[str, int], after: dict[str, int], evaluated: pd.DataFrame | None) -> list[str]:
     """What became of the records."""
     names = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
     others = ", ".join(f"{after[name] - before[name]} {text}" for name, text in names.items())
-    if judged is None:
+    if evaluated is None:
         return [f"new: 0; {others}"]
-    new, revised = judged[~judged["revised"]], judged["revised"].sum()
+    new, revised = evaluated[~evaluated["revised"]], evaluated["revised"].sum()
     states = ", ".join(f"{(new['state'] == state).sum()} {state}" for state in CODES)
     lines = [f"new: {len(new)} ({states}); {others}"]
-    lines += [f"judged anew, as records came late: {revised}"] if revised else []
+    lines += [f"evaluated anew, as records came late: {revised}"] if revised else []
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts()
     return lines + [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
 

@@ -18,6 +18,7 @@ from skthermo._tables.frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._tables.times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
+from skthermo.exceptions import UnevaluatedRowsWarning
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -122,8 +123,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Warns
         -----
         UserWarning
-            If there are numbers that stand for a missing value, such as -999, values absurdly far from the others, or
-            too few records for the rate of false alarms that is asked for.
+            If there are numbers that stand for a missing value, such as -999, implausible values far from the others,
+            or too few records for the rate of false alarms that is asked for.
         """
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
@@ -151,12 +152,12 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Returns
         -------
         ndarray or Series of shape (n_samples,)
-            Dimensionless; NaN where nothing can be judged. A frame gives a series on its index.
+            Dimensionless; NaN where nothing can be evaluated. A frame gives a series on its index.
 
         Warns
         -----
         UserWarning
-            If no record at all can be judged.
+            If no record at all can be evaluated.
         """
         check_is_fitted(self)
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
@@ -217,7 +218,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Warns
         -----
         UserWarning
-            If some rows cannot be judged: how many, the first of them, and what they lack. Rows of which a
+            If some rows cannot be evaluated: how many, the first of them, and what they lack. Rows of which a
             `TemperatureCompensator` before has said so are not counted again.
         """
         decision = self.decision_function(X)
@@ -245,8 +246,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         -------
         float
             Natural logarithm of a density per unit of X, averaged over the values that are there: higher is better.
-            Behind a `TemperatureCompensator`, the density is per Hz of the measured frequencies, whatever ``scale`` is,
-            so that all its settings can be compared. NaN if no row has a value; a warning counts the rows scored if
+            Behind a `TemperatureCompensator`, the density is per Hz of the measured frequencies, whatever ``whiten``
+            is, so that all its settings can be compared. NaN if no row has a value; a warning counts the rows scored if
             they are fewer than half.
         """
         check_is_fitted(self)
@@ -260,5 +261,6 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         warn_user(
             f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
             f"{self._cause(X, rows)}",
+            UnevaluatedRowsWarning,
             "rows not evaluated",
         )

@@ -39,6 +39,7 @@ from skthermo._validation import (
 )
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -73,7 +74,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         - ``"contiguous"``: five periods of time, each predicted from the others. An int gives that many.
         - A splitter, or pairs of training and test rows: every row must be in exactly one test fold, or all but the
           first rows, as with ``TimeSeriesSplit``: the residuals of those are NaN.
-    scale : {None, "global", "local"}, default=None
+    whiten : {None, "global", "local"}, default=None
         What the residuals are divided by:
 
         - ``None``: nothing; they are in Hz.
@@ -93,7 +94,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and their
         standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
     spread_ : object
-        Covariance of the residuals, by weather if ``scale="local"``. ``spread_.smoothing`` says over how many records
+        Covariance of the residuals, by weather if ``whiten="local"``. ``spread_.smoothing`` says over how many records
         of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
@@ -153,7 +154,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
       estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
       also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
     - A row with a value that is still missing, such as a lag that finds no record, is used if the estimator accepts
-      NaN. Otherwise the row does not train, and its residuals are NaN. To judge the records of a day with lags of 24
+      NaN. Otherwise the row does not train, and its residuals are NaN. To evaluate the records of a day with lags of 24
       hours, give `transform` the records of the day before as well.
     - Lags elsewhere, such as in the mapper of a ``DataInformedFEM``, see the rows of their folds only. On a
       ``DatetimeIndex`` they go by time: a lag whose record is in another fold takes the last record before it, or NaN
@@ -184,7 +185,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
         "cv": ["cv_object", StrOptions({"contiguous"})],
-        "scale": [StrOptions({"global", "local"}), None],
+        "whiten": [StrOptions({"global", "local"}), None],
     }
 
     def __init__(
@@ -193,12 +194,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         *,
         targets: Sequence[Hashable],
         cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
-        scale: Literal["global", "local"] | None = None,
+        whiten: Literal["global", "local"] | None = None,
     ):
         self.estimator = estimator
         self.targets = targets
         self.cv = cv
-        self.scale = scale
+        self.whiten = whiten
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: ArrayLike, y: None = None) -> TemperatureCompensator:
@@ -288,7 +289,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             foretell, as one that drifts or is stuck does; if lags find no record in most rows.
         """
         frequencies, weather, residuals, errors, unknown = self._residuals(X)
-        if self.scale is None:
+        if self.whiten is None:
             scaled = self.spread_.shrunk(residuals, errors)
             volumes = partial(self._log_volumes_shrunk, weather, residuals, errors)
         else:
@@ -300,7 +301,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Mean log-likelihood of healthy records that `fit` has not seen, per value.
 
         The distribution is the normal one with the mean and the covariance of the baseline's out-of-fold residuals,
-        with ``scale="local"`` the covariance in similar weather. It is wider where predictions are uncertain.
+        with ``whiten="local"`` the covariance in similar weather. It is wider where predictions are uncertain.
 
         Parameters
         ----------
@@ -313,7 +314,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -------
         float
             Natural logarithm of a density per Hz, averaged over the targets that are there: higher is better, and a
-            residual twice as small gains 0.69. Settings of all parameters, ``scale`` included, can be compared. NaN if
+            residual twice as small gains 0.69. Settings of all parameters, ``whiten`` included, can be compared. NaN if
             no row has a residual; a warning counts the rows scored if they are fewer than half.
         """
         _, weather, residuals, errors, _ = self._residuals(X)
@@ -368,11 +369,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
         outside = reach.warning(inputs)
         if outside:
-            warn_user(outside, "weather outside the training range")
+            warn_user(outside, WeatherWarning, "weather outside the training range")
         warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
         apart = self.sensors_.warning(temperatures)
         if apart:
-            warn_user(apart, "sensor apart from others")
+            warn_user(apart, RecordsWarning, "sensor apart from others")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -431,7 +432,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         taught = residuals.copy()
         if len(fills.rows) < len(residuals) / 2:
             taught[fills.rows] = np.nan
-        if self.scale is None:
+        if self.whiten is None:
             self.spread_ = Spread.of_all(taught, told)
             return self.spread_.shrunk(residuals, errors)
         empty = np.isnan(taught).all(axis=0)
@@ -439,7 +440,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        local, widens, near = self.scale == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
+        local, widens, near = self.whiten == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
         self.spread_, white = Spread.of(weather, taught, size, told, local=local, widens=widens, near=near)
         if not len(fills.rows):
             return white
@@ -454,6 +455,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             f"rows have no stamps, and lags inside {type(last_step(self.estimator)).__name__} would take rows of other "
             "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
             "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
+            FewRecordsWarning,
             "lags without stamps",
         )
         return "contiguous"
@@ -465,7 +467,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     consequence = "the spread of residuals is widened by what that costs"
     message = told_fills(deviations, column_names(temperatures, "x"), consequence)
     if message:
-        warn_user(message, "filled temperatures")
+        warn_user(message, RecordsWarning, "filled temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -475,7 +477,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     others = "of which the estimator predicts nothing, as where lags reach to no record"
     message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
     if message:
-        warn_user(message, "rows that cannot be predicted")
+        warn_user(message, UnevaluatedRowsWarning, "rows that cannot be predicted")
     return unknown
 
 
@@ -488,5 +490,5 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     try:
         check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
     except ValueError as error:  # only a warning, as another column may be something else than a temperature
-        warn_user(str(error), "temperatures")
+        warn_user(str(error), RecordsWarning, "temperatures")
     return temperatures, frequencies

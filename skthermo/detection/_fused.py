@@ -47,8 +47,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
 
     Notes
     -----
-    A record that some of the detectors cannot judge gets the mean of the others; one that none can judge has the index
-    NaN, and ``predict`` gives 0.
+    A record that some of the detectors cannot evaluate gets the mean of the others; one that none can evaluate has the
+    index NaN, and ``predict`` gives 0.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         return explain_rows(index, np.logical_and.reduce(np.broadcast_arrays(np.isnan(index), *told)))
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
-        return f"none of the {len(self.detectors_)} detectors can judge them"
+        return f"none of the {len(self.detectors_)} detectors can evaluate them"
 
 
 def _mean(indices: list[Array]) -> Array:

@@ -16,6 +16,7 @@ from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, modes_text
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
@@ -88,8 +89,8 @@ class MahalanobisDetector(DamageDetector):
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty [WH31]_. Where the
     baseline shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than
     others, a factor corrects it, shrunk to 1 as far as chance may explain the difference. Rows without any mode cannot
-    be judged: their index is NaN, and ``predict`` gives 0. Rows with gaps under a ``covariance`` of your own keep the
-    distances of the fit.
+    be evaluated: their index is NaN, and ``predict`` gives 0. Rows with gaps under a ``covariance`` of your own keep
+    the distances of the fit.
 
     The promise of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
     this one is fixed, and keeps the rate nearly: 2 % asked and 6 modes give 1.9 % false alarms after 100 and after 365
@@ -196,6 +197,7 @@ def _most_likely(F: Array, names: Sequence[str] | None) -> EmpiricalCovariance:
         warn_user(
             f"{modes_text(pair, names)} are never there together ({(~together).sum() // 2} pairs): their correlation "
             "is a guess",
+            FewRecordsWarning,
             "modes never together",
         )
     learned = Gaussian.of(F)

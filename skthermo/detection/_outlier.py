@@ -19,7 +19,7 @@ from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
-N_FOLDS = 5  # of the baseline, each judged by a clone that was fitted on the others
+N_FOLDS = 5  # of the baseline, each evaluated by a clone that was fitted on the others
 
 
 class OutlierDetector(DamageDetector):
@@ -85,7 +85,7 @@ class OutlierDetector(DamageDetector):
     2.2, 1.6 and 1.1 % (by "quantile" 19.6, 7.3, 7.1 and 12.2 %). Clones are put on the scale of the estimator by their
     quartiles on the records that both were fitted on.
 
-    Rows with a missing mode are left out of the baseline and cannot be judged: their damage index is NaN, and
+    Rows with a missing mode are left out of the baseline and cannot be evaluated: their damage index is NaN, and
     ``predict`` gives 0.
 
     Examples

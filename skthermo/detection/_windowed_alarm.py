@@ -20,19 +20,19 @@ from skthermo.detection._windows import Windows
 from skthermo.residuals.gaussian import check_not_empty
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
-MOST_PERIODS = 50  # into which the baseline is divided; the windows of each are judged by the others
+MOST_PERIODS = 50  # into which the baseline is divided; the windows of each are evaluated by the others
 
 
 class WindowedAlarm(DamageDetector):
     """Alarm where the last records together are far from a healthy baseline.
 
     Records have to be in order of time, and are best whitened: residuals of ``TemperatureCompensator(...,
-    scale="local")``.
+    whiten="local")``.
 
     Parameters
     ----------
     window : int or str
-        Number of records, up to the one that is judged, or a time such as ``"24h"`` on the ``DatetimeIndex`` of a
+        Number of records, up to the one that is evaluated, or a time such as ``"24h"`` on the ``DatetimeIndex`` of a
         frame. With gaps in time, a number of records reaches back beyond them; a time does not.
     rule : {"mean", "m-of-n"}, default="mean"
         What the damage index of a window is:
@@ -40,7 +40,7 @@ class WindowedAlarm(DamageDetector):
         - ``"mean"``: length of the mean of the whitened records, in standard deviations of such a mean. Finds small
           lasting changes.
         - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that there
-          is an alarm where m of them exceed the threshold. Not misled by a few absurd records.
+          is an alarm where m of them exceed the threshold. Not misled by a few implausible records.
     m : int, optional
         Number of records of a full window that have to exceed the threshold; by default half of them. For
         ``rule="m-of-n"``.
@@ -50,9 +50,9 @@ class WindowedAlarm(DamageDetector):
     Attributes
     ----------
     law_ : object
-        Distribution of the records, learned from the baseline, by which windows are judged.
+        Distribution of the records, learned from the baseline, by which windows are evaluated.
     width_, fewest_ : int
-        Largest number of records in a window, and fewest with a value that a window is judged by: half as many as a
+        Largest number of records in a window, and fewest with a value that a window is evaluated by: half as many as a
         window of the baseline has (median).
     lookback_ : int or numpy.timedelta64
         How far back a window looks: a number of rows before its last one, or a time.
@@ -73,15 +73,15 @@ class WindowedAlarm(DamageDetector):
     -----
     Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a single
     one. The standard deviation of a mean therefore includes the mean correlation of two records in one window, mode by
-    mode. The threshold comes from the baseline's own windows, each judged by the other periods; the number of
+    mode. The threshold comes from the baseline's own windows, each evaluated by the other periods; the number of
     independent ones, by the correlation time of the highest (at least half a window), decides which index it is. If
     there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
     compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
 
-    Windows with gaps are judged by the records that are there. Under "m-of-n", their index is the one that would be as
-    unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value than
-    ``fewest_`` are not evaluated: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
-    series: a call does not remember the records of the last one.
+    Windows with gaps are evaluated by the records that are there. Under "m-of-n", their index is the one that would be
+    as unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value
+    than ``fewest_`` are not evaluated: their index is NaN, and ``predict`` gives 0. So it is with the first windows of
+    a series: a call does not remember the records of the last one.
 
     Examples
     --------

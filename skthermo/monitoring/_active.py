@@ -28,7 +28,7 @@ DECIMALS = 6  # of a damage index
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
-N_CHECKED = 5  # baseline records that are judged alone and among others
+N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
 
 
@@ -62,7 +62,7 @@ class Branch:
         for step in self.before:
             table = step.transform(table)
         residuals = as_floats(self.compensator.transform(table))
-        if self.compensator.scale is not None:
+        if self.compensator.whiten is not None:
             return residuals
         overall = self.compensator.spread_.overall
         deviation = np.sqrt(np.diag(overall.covariance))
@@ -82,7 +82,7 @@ def _steps(detector: Any) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class ActiveDetector(SavesFrames):
-    """A fitted detector, and all by which it judges. It does not change: another one takes its place.
+    """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
     the frequencies; records go through ``plausible`` and ``corrections`` before. Without a direction, all changes are
@@ -146,7 +146,7 @@ class ActiveDetector(SavesFrames):
 
     @property
     def baseline_index(self) -> pd.Series:
-        """Damage indices of what it was fitted on, each record judged by others."""
+        """Damage indices of what it was fitted on, each record evaluated by others."""
         return pd.Series(last_step(self.detector).baseline_index_, self.trained.index)
 
     def ratio(self, records: pd.DataFrame) -> Array:
@@ -154,7 +154,7 @@ class ActiveDetector(SavesFrames):
         return self._exact(records) / self.threshold
 
     def own_ratio(self, times: pd.DatetimeIndex) -> Array:
-        """The same of records that it was fitted on, each judged by the others."""
+        """The same of records that it was fitted on, each evaluated by the others."""
         return (self.baseline_index / self.threshold).reindex(times).to_numpy()
 
     def by_kind(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
@@ -195,7 +195,7 @@ class ActiveDetector(SavesFrames):
         return self._exact(records.iloc[self.memory.start(times, row) : row + 1])[-1]
 
     def check_memory(self) -> None:
-        """Refuse a detector that looks at later records, or farther back than its memory: it would judge batches
+        """Refuse a detector that looks at later records, or farther back than its memory: it would evaluate batches
         differently from all records at once."""
         baseline, times = self.trained, self.trained.index.asi8
         rows = np.linspace(len(times) // 2, min(len(times) // 2 + N_AROUND, len(times) - 1), N_CHECKED).astype(np.intp)
@@ -208,7 +208,7 @@ class ActiveDetector(SavesFrames):
             raise ValueError(
                 f"the damage index of {baseline.index[rows[row]]} is {whole[row]:.6g} among all records and "
                 f"{alone[row]:.6g} with the records of {self.memory} before it: the detector looks at later records, "
-                "or farther back; expected steps that look back only, and memory='48h' where that is how far"
+                "or farther back; expected steps that look back only, and lookback='48h' where that is how far"
             )
 
     def _exact(self, records: pd.DataFrame) -> Array:

@@ -1,4 +1,4 @@
-"""What happens to records before they are judged: sensors that fail are left out, followed drift is taken out."""
+"""What happens to records before they are evaluated: sensors that fail are left out, followed drift is taken out."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Corrections:
     def faults(self, state: CorrectionState) -> pd.DataFrame:
         """Sensors that have failed."""
         if self.sensors is None:
-            return pd.DataFrame({name: [] for name in ("column", "kind", "since", "told", "until", "detail")})
+            return pd.DataFrame({name: [] for name in ("column", "kind", "since", "detected", "until", "detail")})
         return self.sensors.faults(state.sensors)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:

@@ -1,4 +1,4 @@
-"""The course of a monitor: what it has judged, what it needs to go on, and how it goes back when records come late."""
+"""The course of a monitor: what it has evaluated, what it needs to go on, and how late records are taken in."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Checkpoint(SavesFrames):
 
 @dataclass(frozen=True)
 class Course(SavesFrames):
-    """Judgements so far, by record and by day, and the checkpoints of the last days.
+    """Evaluations so far, by record and by day, and the checkpoints of the last days.
 
     ``corrected`` are the records as the detector sees them, those kept and the memory before the first checkpoint.
     """
@@ -40,7 +40,7 @@ class Course(SavesFrames):
     corrected: pd.DataFrame
     checkpoints: tuple[Checkpoint, ...]
     log: EventLog
-    judged: pd.DataFrame
+    evaluations: pd.DataFrame
     days: pd.DataFrame
 
     @classmethod
@@ -48,7 +48,7 @@ class Course(SavesFrames):
         """The course that begins after a baseline, whose last records are the first memory."""
         times, end = baseline.index.asi8, baseline.index[-1]
         start = active.memory.start(times, len(times), int(times[-1]) + 1)
-        nothing = nothing_judged(baseline.index[:0])
+        nothing = no_evaluations(baseline.index[:0])
         checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
         return cls(
             active.plausible.cleaned(baseline)[0].iloc[start:],
@@ -66,7 +66,7 @@ class Course(SavesFrames):
     def advanced(self, active: ActiveDetector, fresh: pd.DataFrame, store: RecordStore) -> tuple[Course, pd.DataFrame]:
         """The course after new records, which are in the store already, and what it says of these and of later ones.
 
-        It goes on from the beginning of the day of the first new record, and judges all records from that one on.
+        It goes on from the beginning of the day of the first new record, and evaluates all records from that one on.
         """
         first, rules = fresh.index[0], active.rules
         place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
@@ -76,7 +76,7 @@ class Course(SavesFrames):
         days, states, corrected = _corrected_by_day(active.corrections, begin, cleaned)
         memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
         records, n_memory = pd.concat([memory, corrected]), len(memory)
-        told = self.judged.iloc[slice(*self.judged.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
+        told = self.evaluations.iloc[slice(*self.evaluations.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
         new = n_memory + len(told)
         index = np.append(told["index"].to_numpy(), active.index(records, new))
         series, times = active.by_kind(records, n_memory, index), raw.index.asi8
@@ -94,20 +94,20 @@ class Course(SavesFrames):
         reasons = active.reasons(records, new, index[len(told) :], marks[len(told) :])
         reasons = _with_stiffening(told["reason"].tolist() + reasons, numbers, len(told))
         answers = _answers(raw.index, index, active.threshold, modes, reasons, numbers)
-        points = _since([*self.checkpoints[:place], *points], store.last - store.late)
+        points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
-        judged = pd.concat([self.judged.iloc[: self.judged.index.searchsorted(begin.day)], answers])
+        evaluated = pd.concat([self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)], answers])
         course = Course(
-            records.iloc[min(needed, records.index.searchsorted(store.last - store.keep)) :],
+            records.iloc[min(needed, records.index.searchsorted(store.last - store.retention)) :],
             tuple(points),
             log,
-            judged.iloc[judged.index.searchsorted(store.last - store.keep) :],
+            evaluated.iloc[evaluated.index.searchsorted(store.last - store.retention) :],
             self._with_days(active.corrections, days, states, answers),
         )
         return course, self._news(answers.iloc[len(told) :], fresh.index)
 
     def handed_over(self, active: ActiveDetector, store: RecordStore, end: int | None = None) -> Course:
-        """The course with another detector, which judges the records of the newest day anew.
+        """The course with another detector, which evaluates the records of the newest day anew.
 
         With an ``end``, events that are open have ended then, and sensors are watched from new.
         """
@@ -116,7 +116,7 @@ class Course(SavesFrames):
             log, start = log.ended(end), active.corrections.start()
             points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
         day = points[-1].day
-        course = replace(self, checkpoints=points, log=log, judged=self.judged[self.judged.index < day])
+        course = replace(self, checkpoints=points, log=log, evaluations=self.evaluations[self.evaluations.index < day])
         today = store.kept[store.kept.index >= day]
         return course.advanced(active, today, store)[0] if len(today) else course
 
@@ -126,7 +126,7 @@ class Course(SavesFrames):
         changed = np.zeros(len(answers), dtype=bool)
         if not is_new.all():
             known = answers[~is_new]
-            before = self.judged.loc[known.index]
+            before = self.evaluations.loc[known.index]
             same = [(known[c] == before[c]) | (known[c].isna() & before[c].isna()) for c in ANSWER]
             changed[~is_new] = ~np.all(same, axis=0)
         return answers.assign(revised=changed)[is_new | changed]
@@ -175,7 +175,7 @@ def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], 
     return reasons
 
 
-def nothing_judged(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
+def no_evaluations(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
     """A row for each of some records that are not evaluated."""
     modes, number = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=np.int64)
     return _answers(stamps, np.full(len(stamps), np.nan), threshold, modes, list(reasons), {"damage": number})
@@ -190,24 +190,25 @@ def _answers(
     numbers: dict[str, NDArray[np.int64]],
 ) -> pd.DataFrame:
     """A row for each record."""
-    judged, is_alarm = ~np.isnan(index), numbers["damage"] > 0
-    state = np.where(judged, np.where(is_alarm, "alarm", "healthy"), "not evaluated")
+    evaluated, is_alarm = ~np.isnan(index), numbers["damage"] > 0
+    state = np.where(evaluated, np.where(is_alarm, "alarm", "healthy"), "not evaluated")
     event = np.where(is_alarm, numbers["damage"], numbers.get("stiffening", 0))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(np.where(judged & is_alarm, modes, "").tolist(), stamps, dtype=object),
+        "modes": pd.Series(np.where(evaluated & is_alarm, modes, "").tolist(), stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
-        "event": np.where(judged, event, 0),
+        "event": np.where(evaluated, event, 0),
     }
     return pd.DataFrame(table, stamps)
 
 
 def _days_of(answers: pd.DataFrame) -> pd.DataFrame:
-    """A row for each calendar day that has records, from the judgements of all of them in order of time.
+    """A row for each calendar day that has records, from the evaluations of all of them in order of time.
 
-    ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if none is judged.
+    ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``index_median`` and ``index_max``, NaN if
+    none is evaluated.
     """
     by_day = answers.assign(is_alarm=answers["state"] == "alarm").groupby(answers.index.normalize().rename("day"))
     index = by_day["index"]

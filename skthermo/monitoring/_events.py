@@ -87,13 +87,13 @@ def _grown(
     end: int | None,
 ) -> Event:
     """The event with the records in which it was open."""
-    judged = inside[~np.isnan(index[inside])]
-    if len(judged):
-        peak = judged[np.argmax(index[judged])]
+    evaluated = inside[~np.isnan(index[inside])]
+    if len(evaluated):
+        peak = evaluated[np.argmax(index[evaluated])]
         if index[peak] > event.peak:
             found = {"peak": float(index[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
             event = replace(event, **found)
-    return replace(event, end=end, n_alarms=event.n_alarms + len(judged))
+    return replace(event, end=end, n_alarms=event.n_alarms + len(evaluated))
 
 
 @dataclass(frozen=True)

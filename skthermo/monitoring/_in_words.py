@@ -26,7 +26,7 @@ def in_words(monitor: Any) -> str:
         *_sensors(monitor.faults_),
     ]
     if monitor.drift_ is not None:
-        lines += _drift(monitor.drift_, monitor.course_.corrections.drift.n_left_out)
+        lines += _drift(monitor.drift_, monitor._course.corrections.drift.n_left_out)
     return "\n".join(lines)
 
 

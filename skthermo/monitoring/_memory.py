@@ -22,7 +22,7 @@ Path = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True)
 class Memory:
-    """Which earlier records the judgement of a record needs, on all ways from its records to its damage index."""
+    """Which earlier records the evaluation of a record needs, on all ways from its records to its damage index."""
 
     paths: tuple[Path, ...]
 

@@ -28,9 +28,10 @@ from skthermo._validation import (
     seeded,
 )
 from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._course import Course, nothing_judged
+from skthermo.monitoring._course import Course, no_evaluations
 from skthermo.monitoring._events import Acknowledgement, event_table
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._in_words import in_words
@@ -45,7 +46,7 @@ MOST_CAUSES = 3  # in a warning
 
 
 class Monitor(SavesFrames, Estimator):
-    """A damage detector in service: it judges records as they come, day by day, for years.
+    """A damage detector in service: it evaluates records as they come, day by day, for years.
 
     Parameters
     ----------
@@ -61,13 +62,13 @@ class Monitor(SavesFrames, Estimator):
         Damage events that a healthy structure has in a year, on average.
     direction : {"both", "softening"}, default="both"
         Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
-    late : str or timedelta, default="7D"
-        How late records may come and still be judged as if they had come in time.
-    keep : str or timedelta, default="400D"
+    max_delay : str or timedelta, default="7D"
+        How late records may come and still be evaluated as if they had come in time.
+    retention : str or timedelta, default="400D"
         How long raw records are kept, for a new fit and to tell repeated records.
     sensors : bool, default=True
         Whether sensors are watched, and those that fail left out.
-    memory : str or timedelta, optional
+    lookback : str or timedelta, optional
         How long before a record the detector looks. By default the lags and windows of its parts tell.
     random_state : int, RandomState or None, default=None
         Seeds parts of the detector that are not seeded.
@@ -87,25 +88,26 @@ class Monitor(SavesFrames, Estimator):
         A damage event opens with an index above it.
     clear_threshold_ : float
         An event closes when the index has stayed at or below it.
-    memory_ : object
-        Which earlier records the judgement of a record needs.
+    lookback_ : object
+        Which earlier records the evaluation of a record needs.
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage" or "stiffening"), ``start``, ``end`` (first record
         after it, NaT while it is open), ``peak`` (highest index), ``peak_time``, ``modes``, ``n_alarms`` (records
-        judged while it was open), ``acknowledged``, ``harmless`` and ``note``.
+        evaluated while it was open), ``acknowledged``, ``harmless`` and ``note``.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``index_median``, ``index_max``
         and, where drift is followed, a column ``drift GROUP`` for each group.
-    judged_ : DataFrame
-        The latest judgement of each record that is kept, as `update` gives it.
+    evaluations_ : DataFrame
+        The latest evaluation of each record that is kept, as `update` gives it.
     faults_ : DataFrame
-        Sensors that have failed: ``column``, ``kind``, ``since``, ``told``, ``until``, ``detail``.
+        Sensors that have failed: ``column``, ``kind``, ``since``, ``detected``, ``until``, ``detail``.
     drift_ : DataFrame or None
         Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
         ``per_year_error``, ``significant``; None without ``fem``.
     counts_ : dict
-        ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (judged all the same)
-        and ``n_too_late`` (not evaluated); ``n_repeated``, and ``n_implausible``: values that were taken as missing.
+        ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (evaluated
+        all the same) and ``n_too_late`` (not evaluated); ``n_repeated``, and
+        ``n_implausible``: values that were taken as missing.
     baseline_, records_, corrected_ : DataFrame
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
@@ -116,9 +118,6 @@ class Monitor(SavesFrames, Estimator):
         After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
-    active_, store_, course_, said_ : object
-        The detector in charge and all by which it judges; the records; judgements so far, and the checkpoints from
-        which late records are judged; what the owner has said of events.
 
     See Also
     --------
@@ -126,11 +125,11 @@ class Monitor(SavesFrames, Estimator):
 
     Notes
     -----
-    Any division of records into batches gives the same judgements, events and daily summaries, bit for bit, as one
+    Any division of records into batches gives the same evaluations, events and daily summaries, bit for bit, as one
     batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
-    come late are judged with those around them, and later ones anew: what `update` says last of a stamp counts.
+    come late are evaluated with those around them, and later ones anew: what `update` says last of a stamp counts.
 
-    The damage index is rounded to six decimals. Where the last bits, which depend on how many records are judged at
+    The damage index is rounded to six decimals. Where the last bits, which depend on how many records are evaluated at
     once, would decide how, the index of the record alone with its memory counts.
 
     A value that no sensor measures is taken as missing: a number that loggers write for a missing one (-999), a
@@ -159,10 +158,10 @@ class Monitor(SavesFrames, Estimator):
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
         "direction": [StrOptions({"both", "softening"})],
-        "late": [str, timedelta, np.timedelta64],
-        "keep": [str, timedelta, np.timedelta64],
+        "max_delay": [str, timedelta, np.timedelta64],
+        "retention": [str, timedelta, np.timedelta64],
         "sensors": ["boolean"],
-        "memory": [str, timedelta, np.timedelta64, None],
+        "lookback": [str, timedelta, np.timedelta64, None],
         "random_state": ["random_state"],
     }
 
@@ -174,10 +173,10 @@ class Monitor(SavesFrames, Estimator):
         fem: Any = None,
         false_alarms_per_year: float = 1.0,
         direction: Literal["both", "softening"] = "both",
-        late: str | timedelta = "7D",
-        keep: str | timedelta = "400D",
+        max_delay: str | timedelta = "7D",
+        retention: str | timedelta = "400D",
         sensors: bool = True,
-        memory: str | timedelta | None = None,
+        lookback: str | timedelta | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.detector = detector
@@ -185,10 +184,10 @@ class Monitor(SavesFrames, Estimator):
         self.fem = fem
         self.false_alarms_per_year = false_alarms_per_year
         self.direction = direction
-        self.late = late
-        self.keep = keep
+        self.max_delay = max_delay
+        self.retention = retention
         self.sensors = sensors
-        self.memory = memory
+        self.lookback = lookback
         self.random_state = random_state
 
     def __sklearn_clone__(self) -> Monitor:
@@ -222,9 +221,12 @@ class Monitor(SavesFrames, Estimator):
         UserWarning
             As the detector does; if values are no measurements and are taken as missing.
         """
-        late, keep = (_duration(getattr(self, name), name) for name in ("late", "keep"))
-        if keep < late + 2 * DAY:
-            raise ValueError(f"keep is {self.keep!r} and late {self.late!r}; expected to keep records two days longer")
+        max_delay, retention = (_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
+        if retention < max_delay + 2 * DAY:
+            raise ValueError(
+                f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
+                "least two days longer than they may be late"
+            )
         baseline = read_records(X)
         if not len(baseline):
             raise ValueError(
@@ -247,22 +249,23 @@ class Monitor(SavesFrames, Estimator):
             warn_user(
                 f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
+                RecordsWarning,
                 "markers",
             )
         corrections = Corrections.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
         active = self._activated(detector.fit(cleaned[columns]), cleaned, columns, corrections)
         active.check_memory()
-        self.store_ = RecordStore(baseline, baseline.iloc[:0], late, keep)
-        self.active_, self.course_ = active, Course.of(active, baseline)
+        self._store = RecordStore(baseline, baseline.iloc[:0], max_delay, retention)
+        self._active, self._course = active, Course.of(active, baseline)
         self.promises_ = ((self.last_, self.false_alarm_estimate_),)
         self.counts_ = dict.fromkeys(COUNTS, 0)
-        self.said_: tuple[Acknowledgement, ...] = ()
+        self._acknowledgements: tuple[Acknowledgement, ...] = ()
         self.prior_, self.since_ = None, None
         self.versions_ = versions()
         return self
 
     def update(self, new: pd.DataFrame) -> pd.DataFrame:
-        """Judge records that came since.
+        """Evaluate records that came since.
 
         Parameters
         ----------
@@ -272,10 +275,10 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         DataFrame
-            On the stamps of new records, and of known ones that are judged anew because others came late: ``state``
+            On the stamps of new records, and of known ones that are evaluated anew because others came late: ``state``
             ("healthy", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names of the
             modes that drive an alarm, the worst first), ``reason`` (why a record is not evaluated, or what else is
-            worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was judged
+            worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was evaluated
             before).
 
         Raises
@@ -290,17 +293,17 @@ class Monitor(SavesFrames, Estimator):
             If new records are not evaluated: how many, and why.
         """
         check_is_fitted(self)
-        intake = self.store_.sort_in(read_records(new, self.baseline_.columns, self.baseline_.index.tz))
-        store, course = self.store_.with_records(intake.fresh), self.course_
-        answers = nothing_judged(self.baseline_.index[:0]).assign(revised=False)
+        intake = self._store.sort_in(read_records(new, self.baseline_.columns, self.baseline_.index.tz))
+        store, course = self._store.with_records(intake.fresh), self._course
+        answers = no_evaluations(self.baseline_.index[:0]).assign(revised=False)
         if len(intake.fresh):
-            course, answers = course.advanced(self.active_, intake.fresh, store)
+            course, answers = course.advanced(self._active, intake.fresh, store)
         if len(intake.too_late):
-            refused = nothing_judged(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
+            refused = no_evaluations(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
         counts = self._counted(intake, course)
         _warn_of_not_evaluated(answers)
-        self.store_, self.course_, self.counts_ = store.trimmed(), course, counts
+        self._store, self._course, self.counts_ = store.trimmed(), course, counts
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not evaluated"]:
@@ -312,12 +315,12 @@ class Monitor(SavesFrames, Estimator):
             "alarm" while a damage event is open, else "healthy" or "not evaluated", as the newest record was.
         """
         check_is_fitted(self)
-        if self.course_.log.is_open("damage"):
+        if self._course.log.is_open("damage"):
             return "alarm"
-        return self.judged_["state"].iloc[-1] if len(self.judged_) else "not evaluated"
+        return self.evaluations_["state"].iloc[-1] if len(self.evaluations_) else "not evaluated"
 
     def years_watched(self, since: Any = None) -> float:
-        """Time in which records were judged.
+        """Time in which records were evaluated.
 
         Parameters
         ----------
@@ -331,12 +334,12 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         days = self.days_
-        judged = days.index[days["n_evaluated"] > 0]
+        evaluated = days.index[days["n_evaluated"] > 0]
         if since is not None:
-            judged = judged[judged >= pd.Timestamp(since).floor("D")]
-        if not len(judged):
+            evaluated = evaluated[evaluated >= pd.Timestamp(since).floor("D")]
+        if not len(evaluated):
             return 0.0
-        steps = np.diff(judged.as_unit("ns").asi8) / DAY.value
+        steps = np.diff(evaluated.as_unit("ns").asi8) / DAY.value
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
@@ -394,7 +397,7 @@ class Monitor(SavesFrames, Estimator):
             If there is no such event.
         """
         check_is_fitted(self)
-        events = self.course_.log.events
+        events = self._course.log.events
         if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
@@ -402,7 +405,7 @@ class Monitor(SavesFrames, Estimator):
         said = Acknowledgement(
             events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
         )
-        self.said_ = (*self.said_, said)
+        self._acknowledgements = (*self._acknowledgements, said)
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
@@ -436,13 +439,13 @@ class Monitor(SavesFrames, Estimator):
         The new detector is refused if the new records differ from the baseline, weather apart, from some day on or
         steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
         record's standard deviation: a detector that learned them would not see that change any more. It is refused if
-        more of the new records are above its threshold, each judged by the others, than above the old one; if it finds
-        only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
+        more of the new records are above its threshold, each evaluated by the others, than above the old one; if it
+        finds only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
         """
         check_is_fitted(self)
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
-            records = self.active_.plausible.cleaned(records)[0]
+            records = self._active.plausible.cleaned(records)[0]
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -492,37 +495,37 @@ class Monitor(SavesFrames, Estimator):
         columns: list[Any] | None = None,
         corrections: Corrections | None = None,
     ) -> ActiveDetector:
-        """All by which a detector judges that was fitted on some records; by default as the one in charge."""
+        """All by which a detector evaluates that was fitted on some records; by default as the one in charge."""
         return ActiveDetector.of(
             detector,
             trained,
-            self.active_.columns if columns is None else columns,
+            self._active.columns if columns is None else columns,
             self.targets_,
-            self.active_.corrections if corrections is None else corrections,
-            Memory.of(detector) if self.memory is None else Memory.of_time(_duration(self.memory, "memory")),
+            self._active.corrections if corrections is None else corrections,
+            Memory.of(detector) if self.lookback is None else Memory.of_time(_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
         )
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, corrections, said = retraining.baseline, None, self.active_.corrections, self.said_
+        trained, end, corrections, said = retraining.baseline, None, self._active.corrections, self._acknowledgements
         if retraining.kind == "new baseline":
             end = (self.last_ + pd.Timedelta("1s")).as_unit("ns").value
             note = f"ended by the new baseline since {retraining.since}"
             known = self.events_["acknowledged"]
             said += tuple(
                 Acknowledgement(one.kind, one.peak_time, True, note)
-                for one, is_known in zip(self.course_.log.events, known, strict=True)
+                for one, is_known in zip(self._course.log.events, known, strict=True)
                 if one.end is None and not is_known
             )
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
             corrections = Corrections.of(trained, self.targets_, fem=fem, sensors=self.sensors)
         active = self._activated(retraining.detector, trained, corrections=corrections)
-        self.course_ = self.course_.handed_over(active, self.store_, end)
-        self.active_, self.promises_ = active, (*self.promises_, (self.last_, active.promises["damage"]))
-        self.prior_, self.since_, self.said_ = retraining.prior, retraining.since, said
+        self._course = self._course.handed_over(active, self._store, end)
+        self._active, self.promises_ = active, (*self.promises_, (self.last_, active.promises["damage"]))
+        self.prior_, self.since_, self._acknowledgements = retraining.prior, retraining.since, said
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
@@ -559,22 +562,22 @@ class Monitor(SavesFrames, Estimator):
     @property
     def detector_(self) -> Any:
         """The fitted detector."""
-        return self.active_.detector
+        return self._active.detector
 
     @property
     def trained_(self) -> pd.DataFrame:
         """What the detector in charge was fitted on."""
-        return self.active_.trained
+        return self._active.trained
 
     @property
-    def memory_(self) -> Memory:
-        """Which earlier records the judgement of a record needs."""
-        return self.active_.memory
+    def lookback_(self) -> Memory:
+        """Which earlier records the evaluation of a record needs."""
+        return self._active.memory
 
     @property
     def false_alarm_estimate_(self) -> Promise:
         """How the threshold was set, and how many false events to expect."""
-        return self.active_.promises["damage"]
+        return self._active.promises["damage"]
 
     @property
     def threshold_(self) -> float:
@@ -589,47 +592,47 @@ class Monitor(SavesFrames, Estimator):
     @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
-        return self.store_.baseline
+        return self._store.baseline
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
-        return self.store_.kept
+        return self._store.kept
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
-        return self.course_.corrected.loc[self.records_.index]
+        return self._course.corrected.loc[self.records_.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
-        return self.store_.last
+        return self._store.last
 
     @property
-    def judged_(self) -> pd.DataFrame:
-        """The latest judgement of each record that is kept."""
-        return self.course_.judged
+    def evaluations_(self) -> pd.DataFrame:
+        """The latest evaluation of each record that is kept."""
+        return self._course.evaluations
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
-        return self.course_.days
+        return self._course.days
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
-        return event_table(self.course_.log.events, self.said_, self.baseline_.index.tz)
+        return event_table(self._course.log.events, self._acknowledgements, self.baseline_.index.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
-        return self.active_.corrections.faults(self.course_.corrections)
+        return self._active.corrections.faults(self._course.corrections)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        return self.active_.corrections.drifts(self.course_.corrections)
+        return self._active.corrections.drifts(self._course.corrections)
 
     def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:
         """Names of the frequency columns: as given, those of the compensators, or those of the chain."""
@@ -657,7 +660,7 @@ class Monitor(SavesFrames, Estimator):
         return [
             f"before the end of the baseline ({end})"
             if stamp <= end
-            else f"came too late, more than {self.late} after newer records"
+            else f"came too late, more than {self.max_delay} after newer records"
             for stamp in records.index
         ]
 
@@ -673,7 +676,7 @@ class Monitor(SavesFrames, Estimator):
             "n_too_late": n_too_late,
             "n_not_evaluated": int(n_records - n_evaluated) + n_too_late,
             "n_implausible": counts["n_implausible"]
-            + int(self.active_.plausible.implausible(intake.fresh.to_numpy()).sum()),
+            + int(self._active.plausible.implausible(intake.fresh.to_numpy()).sum()),
         }
 
 
@@ -688,6 +691,7 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     warn_user(
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
+        UnevaluatedRowsWarning,
         "records not evaluated",
     )
 

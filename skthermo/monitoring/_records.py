@@ -57,7 +57,7 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
 
 @dataclass(frozen=True)
 class Intake:
-    """What a batch brings: records to judge, records that came too late, and the numbers of repeated and late ones."""
+    """What a batch brings: records to evaluate, records that came too late, and how many were repeated or late."""
 
     fresh: pd.DataFrame
     too_late: pd.DataFrame
@@ -67,12 +67,12 @@ class Intake:
 
 @dataclass(frozen=True)
 class RecordStore(SavesFrames):
-    """Raw records of the baseline, and those that came since for the time of ``keep``."""
+    """Raw records of the baseline, and those that came since for the time of ``retention``."""
 
     baseline: pd.DataFrame
     kept: pd.DataFrame
-    late: pd.Timedelta
-    keep: pd.Timedelta
+    max_delay: pd.Timedelta
+    retention: pd.Timedelta
 
     @property
     def last(self) -> pd.Timestamp:
@@ -90,7 +90,7 @@ class RecordStore(SavesFrames):
         for table in (self.kept, self.baseline):
             known |= self._check_same(batch, table)
         batch = batch[~known]
-        is_too_late = (batch.index <= self.baseline.index[-1]) | (batch.index < self.last - self.late)
+        is_too_late = (batch.index <= self.baseline.index[-1]) | (batch.index < self.last - self.max_delay)
         fresh = batch[~is_too_late]
         n_late = int((fresh.index < self.last).sum())
         return Intake(fresh, batch[is_too_late], n_given - len(batch), n_late)
@@ -104,7 +104,7 @@ class RecordStore(SavesFrames):
 
     def trimmed(self) -> RecordStore:
         """The store without records that are too old to be kept."""
-        first = self.kept.index.searchsorted(self.last - self.keep)
+        first = self.kept.index.searchsorted(self.last - self.retention)
         return replace(self, kept=self.kept.iloc[first:]) if first else self
 
     def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:

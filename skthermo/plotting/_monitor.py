@@ -147,7 +147,7 @@ class MonitorDisplay(Display):
         if by not in ("day", "record"):
             raise ValueError(f"by is {by!r}; expected 'day' or 'record'")
         days = _between(monitor.days_, start, end)
-        index = _by_day(days) if by == "day" else _by_record(_between(monitor.judged_, start, end))
+        index = _by_day(days) if by == "day" else _by_record(_between(monitor.evaluations_, start, end))
         if not len(index):
             raise ValueError(f"there is no {by} between {start} and {end}; expected a time with records")
         faults = getattr(monitor, "faults_", None)
@@ -297,7 +297,7 @@ def _by_record(judged: pd.DataFrame) -> pd.DataFrame:
 
 def _thresholds(monitor: Monitor, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:
     """Threshold at the end of records or days of this length; before what is kept, the earliest known."""
-    judged = getattr(monitor, "judged_", None)
+    judged = getattr(monitor, "evaluations_", None)
     if judged is None or not len(judged):
         return np.full(len(times), float(monitor.threshold_))
     known, stamps = judged["threshold"].to_numpy(dtype=float), judged.index.as_unit("ns").asi8

@@ -2,15 +2,15 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/blind_bridge.py
 
-One year of records every two hours trains, and the next year is judged: healthy, with the side span 12 % softer, and
+One year of records every two hours trains, and the next year is evaluated: healthy, with the side span 12 % softer, and
 with the main stays 6 % softer. The bridge is built from ``skthermo.fem``; no detector sees it, and the data-informed FE
 model gets one whose pylon is 10 % too stiff. The second year comes in several conditions: as good as the first, with
 gaps, with outliers, with a dead girder thermometer, with one that drifts, and with a structure that creeps.
 
-Prints the share of records and days in alarm among those that are judged, how many are not, the warnings, and whether
-days that are judged one by one, alone or with the 30 hours before them, get the decisions of one pass. Two simple
-competitors follow: nearest neighbours of raw frequencies, and least squares on lagged temperatures. The exit code is 1
-if a target is missed.
+Prints the share of records and days in alarm among those that are evaluated, how many are not, the warnings, and
+whether days that are evaluated one by one, alone or with the 30 hours before them, get the decisions of one pass. Two
+simple competitors follow: nearest neighbours of raw frequencies, and least squares on lagged temperatures. The exit
+code is 1 if a target is missed.
 """
 
 import argparse
@@ -60,7 +60,7 @@ ASKED = 0.02
 BEFORE = 15
 """Records before a day that its lags may need: 30 hours."""
 NEIGHBOURS, APART = 20, 24
-NOT_JUDGED = 0
+NOT_EVALUATED = 0
 
 
 def footbridge(pylon=1.0, stations=None, stiffness=None):
@@ -121,7 +121,7 @@ def properties(T, core):
 
 
 class Bridge:
-    """Two years of records: the first trains, the second is judged in one condition or another."""
+    """Two years of records: the first trains, the second is evaluated in one condition or another."""
 
     def __init__(self, seed):
         random = np.random.default_rng(seed)
@@ -156,7 +156,7 @@ class Bridge:
             T = T.mask(self.lost[rows])
         return T.join(F)
 
-    def judged(self, damage, condition):
+    def evaluated(self, damage, condition):
         rows = slice(self.n, 2 * self.n)
         theta, T = self.theta[rows].copy(), self.T[self.n :].copy()
         ramp = np.linspace(0, 1, self.n)
@@ -202,7 +202,9 @@ def without_outliers(F):
 
 METHODS = {
     "broken lines": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES),
-    "broken lines, whitened": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES, scale="local"),
+    "broken lines, whitened": lambda: TemperatureCompensator(
+        lagged(TemperatureMapper()), targets=MODES, whiten="local"
+    ),
     "chain": lambda: TemperatureCompensator(chain(), targets=MODES),
 }
 
@@ -227,7 +229,7 @@ class Decisions:
 
     @property
     def rate(self):
-        """Alarms as a share of what is judged, %."""
+        """Alarms as a share of what is evaluated, %."""
         return 100 * self.alarm[~self.unknown].mean() if (~self.unknown).any() else np.nan
 
 
@@ -240,11 +242,11 @@ class Detectors:
         self.day = make_pipeline(compensator, WindowedAlarm("1D", contamination=ASKED).fit(residuals))
 
     def rate_of_days(self, records):
-        """Alarms as a share of the days that are judged, %."""
+        """Alarms as a share of the days that are evaluated, %."""
         decisions = Decisions(self.day, records)
         ends = np.arange(PER_DAY - 1, len(records), PER_DAY)
-        judged = ends[~decisions.unknown[ends]]
-        return 100 * decisions.alarm[judged].mean() if len(judged) else np.nan
+        evaluated = ends[~decisions.unknown[ends]]
+        return 100 * decisions.alarm[evaluated].mean() if len(evaluated) else np.nan
 
 
 # Simple competitors
@@ -330,7 +332,7 @@ def by_day(detector, records, before):
 
     Returns
     -------
-    (differences, not evaluated only so, called healthy without being judged)
+    (differences, not evaluated only so, called healthy without being evaluated)
     """
     whole = Decisions(detector, records)
     parts = []
@@ -381,7 +383,7 @@ def print_method(name, bridge, years, dirty, n_days):
         n = sum(map(len, stream))
         print(
             f"  {n} records day by day{f', with the {before} before' if before else ''}: {counts[0]} decisions differ "
-            f"from one pass, {counts[1]} not evaluated only so, {counts[2]} called healthy without being judged"
+            f"from one pass, {counts[1]} not evaluated only so, {counts[2]} called healthy without being evaluated"
         )
         batches.print("of them", 160)
     print(f"  {time.perf_counter() - start:.0f} s")
@@ -412,11 +414,11 @@ def print_competitors(bridge, years, dirty):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--methods", nargs="*", default=[*METHODS], choices=[*METHODS], metavar="METHOD")
-    parser.add_argument("--days", type=int, default=20, help="judged day by day")
+    parser.add_argument("--days", type=int, default=20, help="evaluated day by day")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     bridge = Bridge(options.seed)
-    years = {(d, c): bridge.judged(damage, c) for d, damage in DAMAGES.items() for c in CONDITIONS}
+    years = {(d, c): bridge.evaluations(damage, c) for d, damage in DAMAGES.items() for c in CONDITIONS}
     nominal = footbridge().assemble(GROUPS, n_modes=len(MODES)).frequencies([[1.0] * len(GROUPS)])[0]
     print(f"Cable-stayed footbridge, modes at {nominal.round(2)} Hz; {bridge.n} records to train, {ASKED:.0%} asked")
     found = {}
@@ -439,7 +441,7 @@ def main():
 def targets(table, silent):
     """What a user may expect of each method."""
     same, dead = table.loc["as in training"], table.loc["dead girder"]
-    yield "called healthy without being judged", silent, "<=", 0
+    yield "called healthy without being evaluated", silent, "<=", 0
     yield "false alarms, %", same["healthy"], "<=", 4
     yield "days in false alarm, %", same["healthy, days"], "<=", 4
     yield "side span found by days, %", same["side span 12 %, days"], ">=", 95

@@ -108,11 +108,11 @@ def folds(seeds, regressors):
         baseline, states, names = campaign(seed)
         for regressor in regressors:
             for cv in ("contiguous", None):
-                for scale in (None, "local"):
-                    learner = compensator(names, regressor, cv=cv, scale=scale)
+                for whiten in (None, "local"):
+                    learner = compensator(names, regressor, cv=cv, whiten=whiten)
                     residuals = learner.fit_transform(baseline)
                     judged = {name: learner.transform(records) for name, records in states.items()}
-                    key = regressor, scale or "plain", f"{cv or 'default'}"
+                    key = regressor, whiten or "plain", f"{cv or 'default'}"
                     rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, judged)))
     found = mean_table(rows, "Alarms in year 2").xs("default", level=2)
     return int((found["record", "healthy"] > MOST_FALSE).sum())
@@ -124,15 +124,15 @@ def sensor(seeds, regressors):
     for seed in seeds:
         baseline, states, names = campaign(seed)
         for regressor in regressors:
-            for scale in (None, "local"):
-                learner = compensator(names, regressor, scale=scale)
+            for whiten in (None, "local"):
+                learner = compensator(names, regressor, whiten=whiten)
                 residuals = learner.fit_transform(baseline)
                 for what in ("alive", "dead"):
                     judged = {
                         name: learner.transform(records.assign(girder=np.nan) if what == "dead" else records)
                         for name, records in states.items()
                     }
-                    key = regressor, scale or "plain", what
+                    key = regressor, whiten or "plain", what
                     rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, judged)))
     found = mean_table(rows, "Alarms in year 2 by the girder's thermometer").xs("dead", level=2)
     return int((found["record", "healthy"] > MOST_FALSE).sum())
@@ -141,7 +141,7 @@ def sensor(seeds, regressors):
 def days(seeds, regressors):
     """Year 2 in batches of a day, alone and behind the 30 hours before; number of rows that are silently worse."""
     baseline, states, names = campaign(seeds[0])
-    learner = compensator(names, regressors[0], scale="local")
+    learner = compensator(names, regressors[0], whiten="local")
     detector = MahalanobisDetector(ASKED / 100).fit(learner.fit_transform(baseline))
     half = 180 * PER_DAY
     records = pd.concat([states["healthy"][:half], states["bottom 1 %"][half:]])

@@ -175,9 +175,9 @@ class Kind:
         return found
 
 
-def detectors(kind, bridge, modes, days, with_chains, scale):
+def detectors(kind, bridge, modes, days, with_chains, whiten):
     found = {
-        name: make_pipeline(TemperatureCompensator(regressor, targets=modes, scale=scale), MahalanobisDetector())
+        name: make_pipeline(TemperatureCompensator(regressor, targets=modes, whiten=whiten), MahalanobisDetector())
         for name, regressor in kind.regressors(bridge, days, with_chains).items()
     }
     return found | {"neighbours": make_pipeline(StandardScaler(), OutlierDetector(NeighbourDistance()))}
@@ -196,7 +196,7 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
     rule, before = monitor.false_alarm_estimate_.rule, baseline[-MEMORY:]
 
     def index_of(new):
-        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor.active_.columns])
+        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor._active.columns])
         return pd.Series(values[len(before) :], new.index).round(6)
 
     calm, found = index_of(healthy), {}
@@ -232,7 +232,7 @@ def rows_of(kind, bridge, number, options):
         damaged[severity] = hurt.temperatures.join(hurt.frequencies)[first:]
     for days in options.days:
         baseline = healthy[first - days * PER_DAY : first]
-        for name, detector in detectors(kind, bridge, modes, days, options.chains, options.scale).items():
+        for name, detector in detectors(kind, bridge, modes, days, options.chains, options.whiten).items():
             if options.detectors is not None and name not in options.detectors:
                 continue
             row = {
@@ -256,7 +256,7 @@ def main():
     parser.add_argument("--new", type=int, default=12, help="new bridges of each kind")
     parser.add_argument("--days", type=int, nargs="+", default=list(DAYS))
     parser.add_argument("--detectors", nargs="+", help="only these")
-    parser.add_argument("--scale", choices=["global", "local"], help="of the compensators; by default none")
+    parser.add_argument("--whiten", choices=["global", "local"], help="of the compensators; by default none")
     parser.add_argument("--severities", type=float, nargs="+", default=list(SEVERITIES), help="of the damage")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--chains", action="store_true", help="chains with FE models, too")

@@ -76,7 +76,7 @@ def preprocessing(T, F):
 def chain(T, F):
     fem = quick_chain()
     yield "fit", lambda: fem.fit(T, F)
-    yield "residuals_", lambda: fem.residuals_
+    yield "residuals()", lambda: fem.residuals()
     yield "predict", lambda: fem.predict(T)
     yield "predict_interval", lambda: fem.predict_interval(T)
     yield "simulate, fitted noise", lambda: fem.simulate(T, noise="fitted", random_state=0)
@@ -91,7 +91,7 @@ def quick_chain():
 
 def compensator(F):
     lags = LagFeatures([0, 1, 6], freq="1h")
-    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), scale="local")
+    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), whiten="local")
 
 
 def detection(T, F):

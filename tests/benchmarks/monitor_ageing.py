@@ -38,7 +38,7 @@ def detector(bridge, modes):
     lines = TemperatureMapper()
     regressor = lines if bridge.name == "truss" else make_pipeline(LagFeatures([0, 6, 24], freq="1h"), lines)
     window = "7D" if bridge.name == "truss" else "1D"
-    return make_pipeline(TemperatureCompensator(regressor, targets=modes, scale="global"), WindowedAlarm(window))
+    return make_pipeline(TemperatureCompensator(regressor, targets=modes, whiten="global"), WindowedAlarm(window))
 
 
 def followed(follower, T, F, n_first):
@@ -58,7 +58,7 @@ def followed(follower, T, F, n_first):
     return pd.concat(corrected), states
 
 
-def judged(monitor_of, T, F, n_first):
+def evaluated(monitor_of, T, F, n_first):
     """Answers to all records after the first, and events."""
     monitor = monitor_of(F[:n_first])
     answers = [monitor.update(T.loc[part.index].join(part)) for _, part in F[n_first:].groupby(F.index[n_first:].year)]
@@ -88,13 +88,13 @@ def run(bridge, seed, correlation):
 
         def monitor_of(first, T=T):
             alarm = detector(bridge, list(first))
-            return Monitor(alarm, sensors=False, keep="450D", random_state=0).fit(T[: len(first)].join(first))
+            return Monitor(alarm, sensors=False, retention="450D", random_state=0).fit(T[: len(first)].join(first))
 
         corrected, _ = followed(follower, T, F, n_first)
         of = {"bridge": bridge.name, "lost a year, %": 100 * rate, "seed": seed}
         for name, records in (("no", F), ("yes", pd.concat([F[:n_first], corrected]))):
             row = of | {"damage": "none", "followed": name}
-            rows.append(row | by_year(*judged(monitor_of, T, records, n_first), F.index[0]))
+            rows.append(row | by_year(*evaluated(monitor_of, T, records, n_first), F.index[0]))
         if not rate:
             continue
         onset = F.index[0] + pd.Timedelta(days=round(365.25 * (YEARS - 1 + AFTER)))
@@ -102,7 +102,7 @@ def run(bridge, seed, correlation):
             bridge.campaign(YEARS, seed, correlation, drift=drift, damage={group: DAMAGE}, damage_from=onset)
         )
         corrected, with_damage = followed(follower, T, damaged, n_first)
-        _, events = judged(monitor_of, T, pd.concat([F[:n_first], corrected]), n_first)
+        _, events = evaluated(monitor_of, T, pd.concat([F[:n_first], corrected]), n_first)
         waited = (events["start"] - onset)[events["start"] >= onset].min()
         row = of | {"damage": "12 %", "followed": "yes", "found": waited <= WEEK, "days": waited / pd.Timedelta(days=1)}
         at_onset, *later = (

@@ -5,7 +5,7 @@
 
 Years of daily records of the truss and of four-hourly ones of the bridge KW51 with its gaps, in weather that never
 comes again, under noise of each correlation of neighbouring records. Every second year is a baseline, and the five
-years that follow it (after the last one, the first ones) are judged. Rules:
+years that follow it (after the last one, the first ones) are evaluated. Rules:
 
 library     tail of the squared peaks of excursions, closed by a quiet day; "7 quiet days": by a quiet week
 one-sided   the same where only a loss of stiffness is an alarm
@@ -94,7 +94,7 @@ STRUCTURES = {"truss": (truss, 1), "kw51": (kw51, 24 // KW51_HOURS)}
 def compensator(per_day):
     lines = TemperatureMapper()
     regressor = lines if per_day == 1 else make_pipeline(LagFeatures([0, 1, 6], freq="4h"), lines)
-    return TemperatureCompensator(regressor, targets=MODES, scale="global")
+    return TemperatureCompensator(regressor, targets=MODES, whiten="global")
 
 
 def detectors(per_day):

@@ -1,4 +1,4 @@
-"""Retraining a monitor: what more records bring, what a change hides, and how soon after an intervention it judges.
+"""Retraining a monitor: what more records bring, what a change hides, and how soon after an intervention it evaluates.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/monitor_retraining.py
     OMP_NUM_THREADS=1 python tests/benchmarks/monitor_retraining.py --only refit --seeds 5
@@ -65,7 +65,7 @@ def in_service(detector, baseline, kept, targets):
     fitted = clone(detector).fit(baseline)
     active = ByRecords.of(fitted, baseline)
     return SimpleNamespace(
-        active_=active,
+        _active=active,
         detector=detector,
         detector_=fitted,
         trained_=baseline,
@@ -76,7 +76,7 @@ def in_service(detector, baseline, kept, targets):
         faults_=None,
         targets_=targets,
         threshold_=active.threshold,
-        memory_=Memory.of(fitted),
+        lookback_=Memory.of(fitted),
         random_state=0,
     )
 

@@ -116,7 +116,7 @@ def simply_told(service, sensors, columns, start, kind):
     return None
 
 
-def judge(service, starts, counts):
+def evaluate(service, starts, counts):
     """Prints how faults of one structure are named; the number of missed targets."""
     T, F = service.T, service.F
     false = len(service.healthy.loc[service.healthy["kind"] != "dead"])
@@ -299,7 +299,7 @@ def main():
         for service in family:
             n_days = len(service.days)
             starts = [n_days // 5, n_days // 2] if n_days > 150 else [2, n_days // 3]
-            judge(service, starts, counts)
+            evaluate(service, starts, counts)
     missed += print_naming(counts)
     if "damage" in options.only:
         missed += taken_for_faults(min(options.seeds, 3))

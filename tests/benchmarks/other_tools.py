@@ -77,7 +77,7 @@ def detectors(seed):
 
     baseline, targets = records(seed)
     found = {}
-    whitened = TemperatureCompensator(TemperatureMapper(), targets=targets, scale="global")
+    whitened = TemperatureCompensator(TemperatureMapper(), targets=targets, whiten="global")
     raw = make_column_transformer((StandardScaler(), targets))
     for name, alarm in {
         "whitened, MahalanobisDetector": make_pipeline(whitened, MahalanobisDetector()),

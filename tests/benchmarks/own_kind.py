@@ -46,12 +46,12 @@ def kinds():
     return {name: TemperatureMapper(regressor, random_state=0) for name, regressor in regressors.items()}
 
 
-def judges(targets, chains, scale, block=None):
+def judges(targets, chains, whiten, block=None):
     """Detectors that learn the baseline, by name."""
     estimators = kinds() | {f"chain, {name}": chain for name, chain in chains.items()}
     raw = field_detectors(targets, block=block)
     compensated = {
-        name: make_pipeline(TemperatureCompensator(one, targets=targets, scale=scale), MahalanobisDetector())
+        name: make_pipeline(TemperatureCompensator(one, targets=targets, whiten=whiten), MahalanobisDetector())
         for name, one in estimators.items()
     }
     return {name: raw[name] for name in RAW} | compensated

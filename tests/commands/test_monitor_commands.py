@@ -22,7 +22,7 @@ from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
 
-HEALTHY, ALARM, NOT_JUDGED, FAILED = range(4)
+HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 
 
 @pytest.fixture(scope="module")
@@ -102,20 +102,20 @@ def test_an_alarm_that_has_ended_within_the_new_records_is_one(bridge, records, 
     assert bridge("status").code == HEALTHY
 
 
-def test_records_that_cannot_be_judged(bridge, records):
+def test_records_that_cannot_be_evaluated(bridge, records):
     new = records[FIRST + 10 : FIRST + 20].copy()
     new.iloc[2:] = np.nan
     done = bridge("update", new=new)
-    assert done.code == NOT_JUDGED
-    judged = load_monitor(done.file).judged_[-10:]
-    reasons = judged.loc[judged["state"] == "not evaluated", "reason"].value_counts()
+    assert done.code == NOT_EVALUATED
+    evaluated = load_monitor(done.file).evaluations_[-10:]
+    reasons = evaluated.loc[evaluated["state"] == "not evaluated", "reason"].value_counts()
     assert len(reasons)
     for reason, number in reasons.items():
         assert f"not evaluated, {reason}: {number}\n" in done.out
 
 
 @pytest.mark.parametrize("new", ["known", "none", "too late"])
-def test_without_a_new_judgement_nothing_is_healthy(bridge, records, new):
+def test_without_a_new_evaluation_nothing_is_healthy(bridge, records, new):
     old = records[FIRST + 8 : FIRST + 10]
     rows = {
         "known": old,
@@ -123,7 +123,7 @@ def test_without_a_new_judgement_nothing_is_healthy(bridge, records, new):
         "too late": old.set_axis(pd.to_datetime(["2026-12-30", "2026-12-31"]) + pd.Timedelta("1h")),
     }[new]
     done = bridge("update", new=rows)
-    assert done.code == NOT_JUDGED
+    assert done.code == NOT_EVALUATED
     assert "state: healthy" in done.out
     assert {"known": "2 repeated", "none": "new.csv: 0\n", "too late": "2 too late"}[new] in done.out
 
@@ -226,7 +226,7 @@ def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
     monkeypatch.setattr(skthermo.reporting, "owner_report", fails)
     done = bridge("update", "--report", "status.html", new=records[FIRST + 10 : FIRST + 12])
     assert (done.code, done.err) == (FAILED, "error: the disk is full\n")
-    assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was judged is kept
+    assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was evaluated is kept
     alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
     assert (alarm.code, alarm.err) == (ALARM, "error: the disk is full\n")
 

@@ -34,7 +34,7 @@ def chain():
 def n_checks(monkeypatch):
     """Number of checks so far, of compensators and chains."""
     from skthermo.detection import _compensator
-    from skthermo.surrogate.chain import _parts
+    from skthermo.surrogate.chain import _data_informed
 
     given = []
 
@@ -42,7 +42,7 @@ def n_checks(monkeypatch):
         given.append(tables)
         return check_records(*tables)
 
-    for module in (_compensator, _parts):
+    for module in (_compensator, _data_informed):
         monkeypatch.setattr(module, "check_records", counted)
     return lambda: len(given)
 
@@ -177,7 +177,7 @@ class TestRows:
         assert len(texts) == 1
         assert "73 without any temperature" in texts[0]
 
-    def test_residuals_that_are_changed_in_place_are_judged_as_they_are(self):
+    def test_residuals_that_are_changed_in_place_are_evaluated_as_they_are(self):
         compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
         detector = MahalanobisDetector().fit(compensator.fit_transform(X))
         gaps = LATER.copy()
@@ -210,7 +210,7 @@ class TestRows:
             assert message in texts[0]
             assert "(and 2 times more for other detectors)" in texts[0]
 
-    def test_rows_that_only_one_detector_lacks_are_judged_by_the_others(self):
+    def test_rows_that_only_one_detector_lacks_are_evaluated_by_the_others(self):
         parts = [("lines", detector(LinearRegression())), ("raw", MahalanobisDetector(0.1))]
         fused, _ = said(FusedDetector(parts, 0.1).fit, X)
         alarms, texts = said(fused.predict, without([3], list(T)))

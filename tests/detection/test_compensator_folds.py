@@ -127,7 +127,7 @@ def test_lags_inside_an_estimator_keep_rows_without_stamps_together():
 @pytest.fixture(scope="module")
 def service():
     lags = make_pipeline(LagFeatures([0, 2, 8], freq="3h"), LinearRegression())
-    detector = make_pipeline(compensator(lags, scale="local"), MahalanobisDetector()).fit(year())
+    detector = make_pipeline(compensator(lags, whiten="local"), MahalanobisDetector()).fit(year())
     later = year(seed=1, n_rows=8 * 60)
     later.index = pd.date_range("2026-03-01", periods=len(later), freq="3h")
     later.loc[later.index >= "2026-04-01", ["f1", "f2"]] -= 0.08
@@ -135,7 +135,7 @@ def service():
 
 
 @pytest.mark.filterwarnings("ignore:8 of (480|18) rows cannot be predicted")
-def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
+def test_a_day_behind_the_records_before_it_is_evaluated_as_in_one_pass(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
     limit, n_alarms = detector[-1].threshold_, 0
@@ -150,7 +150,7 @@ def test_a_day_behind_the_records_before_it_is_judged_as_in_one_pass(service):
 
 @pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows cannot be predicted")
 @pytest.mark.filterwarnings("ignore:lags reach 1 day back; the first record given is")
-def test_a_day_alone_is_judged_only_where_its_lags_are_known(service):
+def test_a_day_alone_is_evaluated_only_where_its_lags_are_known(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
     for _, batch in later.iloc[16:].groupby(later.index[16:].floor("D")):

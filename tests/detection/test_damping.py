@@ -1,4 +1,4 @@
-"""Damping ratios beside frequencies: compensated for temperature, and judged together."""
+"""Damping ratios beside frequencies: compensated for temperature, and evaluated together."""
 
 import numpy as np
 import pandas as pd
@@ -26,16 +26,16 @@ BASELINE = records(0)
 FREQUENCIES, DAMPING = ([name for name in BASELINE if name.startswith(first)] for first in ("f", "xi"))
 
 
-def detector(targets, scale="local", last=None):
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=targets, scale=scale)
+def detector(targets, whiten="local", last=None):
+    compensator = TemperatureCompensator(TemperatureMapper(), targets=targets, whiten=whiten)
     others = [name for name in FREQUENCIES + DAMPING if name not in targets]
     fitted = make_pipeline(compensator, last or MahalanobisDetector()).fit(BASELINE.drop(columns=others))
     return lambda X: (fitted.predict(X.drop(columns=others)) == -1).mean()
 
 
-@pytest.mark.parametrize("scale", [None, "global", "local"])
-def test_residuals_of_damping_do_not_depend_on_temperature(scale):
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES + DAMPING, scale=scale)
+@pytest.mark.parametrize("whiten", [None, "global", "local"])
+def test_residuals_of_damping_do_not_depend_on_temperature(whiten):
+    compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES + DAMPING, whiten=whiten)
     residuals = compensator.fit_transform(BASELINE)
     assert list(residuals) == FREQUENCIES + DAMPING
     warmth = BASELINE["T2"]

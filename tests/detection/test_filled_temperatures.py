@@ -1,4 +1,4 @@
-"""Records in which a thermometer is missing are judged, and as strictly as others."""
+"""Records in which a thermometer is missing are evaluated, and as strictly as others."""
 
 import numpy as np
 import pandas as pd
@@ -25,25 +25,25 @@ def campaign(n_rows=4000, seed=0, noise=0.02):
 
 
 BASELINE, LATER = campaign(), campaign(20_000, seed=1)
-SCALES = (None, "global", "local")
+WHITENINGS = (None, "global", "local")
 
 
 @pytest.fixture(scope="module")
 def detectors():
     return {
-        scale: make_pipeline(
-            TemperatureCompensator(LinearRegression(), targets=MODES, scale=scale), MahalanobisDetector(0.02)
+        whiten: make_pipeline(
+            TemperatureCompensator(LinearRegression(), targets=MODES, whiten=whiten), MahalanobisDetector(0.02)
         ).fit(BASELINE)
-        for scale in SCALES
+        for whiten in WHITENINGS
     }
 
 
 @FILLED
 @pytest.mark.parametrize("dead", [["girder"], ["girder", "deck"]], ids=str)
-@pytest.mark.parametrize("scale", SCALES)
-def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detectors, scale, dead):
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detectors, whiten, dead):
     records = LATER.assign(**dict.fromkeys(dead, np.nan))
-    assert (detectors[scale].predict(records) == -1).mean() == pytest.approx(0.02, abs=0.006)
+    assert (detectors[whiten].predict(records) == -1).mean() == pytest.approx(0.02, abs=0.006)
     compensator, detector = detectors[None]
     filled = compensator.sensors_.fill(records.drop(columns=MODES))[0]
     unaware = records[MODES] - compensator.estimator_.predict(pd.DataFrame(filled, columns=list(LATER)[:3]))
@@ -51,24 +51,24 @@ def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detectors, scale,
 
 
 @FILLED
-@pytest.mark.parametrize("scale", SCALES)
-def test_damage_is_still_found_with_a_dead_thermometer(detectors, scale):
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_damage_is_still_found_with_a_dead_thermometer(detectors, whiten):
     damaged = LATER.assign(f1=LATER["f1"] - 0.3, girder=np.nan)
-    assert (detectors[scale].predict(damaged) == -1).mean() > 0.9
+    assert (detectors[whiten].predict(damaged) == -1).mean() > 0.9
 
 
 @FILLED
-@pytest.mark.parametrize("scale", SCALES)
-def test_residuals_have_one_covariance_with_and_without_a_thermometer(detectors, scale):
-    compensator = detectors[scale][0]
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_residuals_have_one_covariance_with_and_without_a_thermometer(detectors, whiten):
+    compensator = detectors[whiten][0]
     alive, dead = (compensator.transform(records) for records in (LATER, LATER.assign(girder=np.nan)))
     np.testing.assert_allclose(alive.cov(), dead.cov(), rtol=0.1, atol=0.1 * np.diag(alive.cov()).max())
 
 
 @FILLED
-@pytest.mark.parametrize("scale", SCALES)
-def test_rows_that_have_every_temperature_are_untouched(detectors, scale):
-    compensator, holed = detectors[scale][0], LATER.copy()
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_rows_that_have_every_temperature_are_untouched(detectors, whiten):
+    compensator, holed = detectors[whiten][0], LATER.copy()
     holed.iloc[::7, 1] = np.nan
     whole = np.arange(len(LATER)) % 7 > 0
     found, expected = (compensator.transform(records).to_numpy()[whole] for records in (holed, LATER))
@@ -76,7 +76,7 @@ def test_rows_that_have_every_temperature_are_untouched(detectors, scale):
 
 
 def test_the_error_of_a_linear_regression_is_its_slope_times_what_is_not_known():
-    compensator = TemperatureCompensator(LinearRegression(), targets=MODES, scale="global").fit(BASELINE)
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES, whiten="global").fit(BASELINE)
     record = LATER.iloc[[0]].assign(girder=np.nan, deck=np.nan)
     with pytest.warns(UserWarning, match="'girder' in 1 of 1 rows"):
         white = compensator.transform(record).to_numpy()[0]
@@ -108,12 +108,12 @@ def test_one_warning_names_sensors_and_counts():
 
 
 @FILLED
-@pytest.mark.parametrize("scale", SCALES)
-def test_gaps_in_the_baseline_cost_no_false_alarms(scale):
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_gaps_in_the_baseline_cost_no_false_alarms(whiten):
     holed = BASELINE.copy()
     holed.iloc[np.random.default_rng(2).random(len(holed)) < 0.2, 1] = np.nan
     detector = make_pipeline(
-        TemperatureCompensator(LinearRegression(), targets=MODES, scale=scale), MahalanobisDetector(0.02)
+        TemperatureCompensator(LinearRegression(), targets=MODES, whiten=whiten), MahalanobisDetector(0.02)
     ).fit(holed)
     assert (detector.predict(LATER) == -1).mean() == pytest.approx(0.02, abs=0.006)
     assert (detector.predict(LATER.assign(girder=np.nan)) == -1).mean() == pytest.approx(0.02, abs=0.006)
@@ -121,7 +121,7 @@ def test_gaps_in_the_baseline_cost_no_false_alarms(scale):
 
 def test_nothing_of_the_records_given_to_fit_is_shared():
     values = BASELINE.to_numpy(copy=True)
-    compensator = TemperatureCompensator(LinearRegression(), targets=[3, 4], scale="local").fit(values)
+    compensator = TemperatureCompensator(LinearRegression(), targets=[3, 4], whiten="local").fit(values)
     before = compensator.transform(LATER.to_numpy())
     values[:] = 0
     np.testing.assert_array_equal(compensator.transform(LATER.to_numpy()), before)

@@ -65,7 +65,7 @@ def test_false_alarms_are_as_asked_and_more_damage_is_found_than_on_average():
     assert (fused(contamination=0.1).fit(BASELINE).predict(LATER) == -1).mean() == pytest.approx(0.1, abs=0.035)
 
 
-def test_what_one_detector_cannot_judge_the_others_do():
+def test_what_one_detector_cannot_evaluate_the_others_do():
     holed = LATER.copy()
     holed.iloc[:5, holed.columns.get_loc("f1")] = np.nan
     forest = behind(LinearRegression(), OutlierDetector(IsolationForest(random_state=0)))
@@ -76,7 +76,7 @@ def test_what_one_detector_cannot_judge_the_others_do():
     with pytest.warns(match="730 of 730 rows are not evaluated") as given:
         found = mixed.predict(holed.assign(**dict.fromkeys(MODES, np.nan)))
     assert (found == 0).all()
-    causes = ["no column has a value there", "this detector needs every column", "none of the 2 detectors can judge"]
+    causes = ["no column has a value there", "this detector needs every column", "none of the 2 detectors can evaluate"]
     assert [cause in str(one.message) for cause, one in zip(causes, given, strict=True)] == [True] * 3
 
 

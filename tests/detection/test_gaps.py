@@ -179,7 +179,7 @@ def test_complete_rows_have_the_plain_distance_whatever_the_baseline_lacks():
     np.testing.assert_allclose(learned.precision_, inverse, rtol=1e-9)
 
 
-def test_a_baseline_without_gaps_judges_rows_with_gaps_by_their_own_modes():
+def test_a_baseline_without_gaps_evaluates_rows_with_gaps_by_their_own_modes():
     """All patterns have the factor 1: the baseline does not say otherwise."""
     detector = MahalanobisDetector().fit(F)
     for there in ([0], [1, 2], [0, 2]):
@@ -207,7 +207,7 @@ def test_rows_of_any_number_at_once_have_the_same_index(monkeypatch):
     np.testing.assert_allclose(detector.damage_index(GAPPY), whole, rtol=1e-9)
 
 
-def test_a_shrunk_covariance_judges_rows_with_gaps_and_learns_from_complete_ones():
+def test_a_shrunk_covariance_evaluates_rows_with_gaps_and_learns_from_complete_ones():
     detector = MahalanobisDetector(covariance=LedoitWolf()).fit(GAPPY)
     complete = GAPPY[~np.isnan(GAPPY).any(axis=1)]
     np.testing.assert_allclose(detector.covariance_.covariance_, LedoitWolf().fit(complete).covariance_, rtol=1e-12)

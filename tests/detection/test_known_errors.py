@@ -12,7 +12,7 @@ from skthermo.residuals.gaussian import Gaussian
 from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
 
 MODES = ["f1", "f2", "f3"]
-SCALES = [None, "global", "local"]
+WHITENINGS = [None, "global", "local"]
 ROOT = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, -0.3, 0.7]])
 """Of the covariance of the scatter."""
 
@@ -87,41 +87,41 @@ def test_without_errors_the_distribution_is_that_of_the_rows():
     np.testing.assert_allclose(learned.mean, plain.mean, atol=1e-6)
 
 
-@pytest.mark.parametrize("scale", SCALES)
-def test_residuals_of_known_errors_have_one_covariance_whatever_the_error(scale):
-    compensator = TemperatureCompensator(Known(), targets=MODES, scale=scale)
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_residuals_of_known_errors_have_one_covariance_whatever_the_error(whiten):
+    compensator = TemperatureCompensator(Known(), targets=MODES, whiten=whiten)
     baseline = compensator.fit_transform(of_known_errors(4000, 0))
     later = of_known_errors(8000, 1)
-    residuals, expected = compensator.transform(later), ROOT @ ROOT.T if scale is None else np.eye(3)
+    residuals, expected = compensator.transform(later), ROOT @ ROOT.T if whiten is None else np.eye(3)
     for part in (baseline, residuals[later["T1"] < 0], residuals[later["T1"] > 10]):
         assert np.abs(np.cov(part.T) - expected).max() < 0.15
-    if scale is not None:
+    if whiten is not None:
         assert np.abs(np.cov(baseline.T) - np.eye(3)).max() < 0.1
 
 
 def test_errors_together_count_in_the_modes_that_are_there():
     records = of_known_errors(6000, 0)
-    compensator = TemperatureCompensator(Known(), targets=MODES, scale="global").fit(records[:3000])
+    compensator = TemperatureCompensator(Known(), targets=MODES, whiten="global").fit(records[:3000])
     warm = records[3000:][records["T1"][3000:] > 10].assign(f2=np.nan)
     assert np.abs(np.cov(compensator.transform(warm)[["f1", "f3"]].T) - np.eye(2)).max() < 0.2
 
 
-@pytest.mark.parametrize("scale", SCALES)
-def test_an_estimator_that_is_certain_changes_nothing(scale):
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_an_estimator_that_is_certain_changes_nothing(whiten):
     records = bridge(0, 500)
-    certain, silent = knowing(0.0, scale=scale), unknowing(scale=scale)
+    certain, silent = knowing(0.0, whiten=whiten), unknowing(whiten=whiten)
     np.testing.assert_array_equal(certain.fit_transform(records[:200]), silent.fit_transform(records[:200]))
     inside = (silent.extrapolation_distance(records) == 0).all(axis=1)
     assert 200 <= inside.sum() < 500
     np.testing.assert_array_equal(certain.transform(records[inside]), silent.transform(records[inside]))
 
 
-@pytest.mark.parametrize("scale", SCALES)
-def test_weeks_of_winter_raise_no_more_alarms_in_summer_than_are_asked_for(scale):
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_weeks_of_winter_raise_no_more_alarms_in_summer_than_are_asked_for(whiten):
     rates, unaware = [], []
     for seed in range(6):
         records = bridge(seed, 405)
-        for compensator, found in ((knowing(scale=scale), rates), (unknowing(scale=scale), unaware)):
+        for compensator, found in ((knowing(whiten=whiten), rates), (unknowing(whiten=whiten), unaware)):
             detector = make_pipeline(compensator, MahalanobisDetector(0.05)).fit(records[:40])
             found.append((detector.predict(records[40:]) == -1).mean())
     assert np.mean(rates) < 0.07
@@ -131,18 +131,18 @@ def test_weeks_of_winter_raise_no_more_alarms_in_summer_than_are_asked_for(scale
 def test_targets_with_gaps_have_clones_and_errors_of_their_own():
     records = bridge(0, 300)
     holed = records.mask(np.random.default_rng(1).uniform(size=records.shape) < [0, 0, 0.2, 0.2, 0.2])
-    compensator = knowing(scale="global").fit(holed[:60])
+    compensator = knowing(whiten="global").fit(holed[:60])
     assert len(compensator.estimator_.estimators_) == 3
     white = compensator.transform(holed[60:])
     assert white.isna().equals(holed[60:][MODES].isna())
-    complete = knowing(scale="global").fit(records[:60])
+    complete = knowing(whiten="global").fit(records[:60])
     assert np.abs(white.std() / complete.transform(records[60:]).std() - 1).max() < 0.4
 
 
 def test_lags_and_filled_temperatures_add_up():
     records = bridge(0, 300)
     lagged = TemperatureCompensator(
-        make_pipeline(LagFeatures([0, 1]), BayesianLogs(MEAN, WIDTH, NOISE, EVERYWHERE)), targets=MODES, scale="global"
+        make_pipeline(LagFeatures([0, 1]), BayesianLogs(MEAN, WIDTH, NOISE, EVERYWHERE)), targets=MODES, whiten="global"
     ).fit(records[:60])
     gap = records[60:].copy()
     gap.loc[gap.index[100], "T1"] = np.nan
@@ -156,7 +156,7 @@ def test_lags_and_filled_temperatures_add_up():
 
 def test_a_row_does_not_depend_on_the_rows_beside_it():
     records = bridge(0, 300)
-    compensator = knowing(scale="local").fit(records[:60])
+    compensator = knowing(whiten="local").fit(records[:60])
     whole = compensator.transform(records[60:])
     alone = pd.concat([compensator.transform(records[row : row + 1]) for row in range(60, 300, 30)])
     np.testing.assert_allclose(alone, whole[::30], rtol=1e-9)

@@ -74,15 +74,15 @@ def test_units_shift_the_score_by_their_logarithm():
 
 @pytest.mark.parametrize("records", [NEW, HOLED], ids=["complete", "with gaps"])
 def test_what_residuals_are_divided_by_does_not_change_the_score(records):
-    plain, whitened = (pipeline(scale=scale).fit(X) for scale in (None, "global"))
+    plain, whitened = (pipeline(whiten=whiten).fit(X) for whiten in (None, "global"))
     scores = [one.score(records) for one in (plain, whitened, plain[0], whitened[0])]
     np.testing.assert_allclose(scores, scores[0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("scale", [None, "global", "local"])
+@pytest.mark.parametrize("whiten", [None, "global", "local"])
 @pytest.mark.parametrize("output", ["default", "pandas"])
-def test_volumes_reach_the_detector_in_arrays_and_frames(scale, output):
-    by_position = TemperatureCompensator(LinearRegression(), targets=range(3, 9), scale=scale).set_output(
+def test_volumes_reach_the_detector_in_arrays_and_frames(whiten, output):
+    by_position = TemperatureCompensator(LinearRegression(), targets=range(3, 9), whiten=whiten).set_output(
         transform=output
     )
     arrays = make_pipeline(by_position, MahalanobisDetector()).fit(X.to_numpy())
@@ -100,14 +100,14 @@ def test_a_covariance_by_weather_is_likelier_where_residuals_scatter_more_in_fro
             np.column_stack([T, [5.0, 9.0] - 0.02 * T[:, np.newaxis] + noise]), columns=["T", "f1", "f2"]
         )
 
-    grid = {"scale": [None, "global", "local"]}
+    grid = {"whiten": [None, "global", "local"]}
     frost = TemperatureCompensator(LinearRegression(), targets=["f1", "f2"])
     search = GridSearchCV(frost, grid, cv=BlockedKFold(4)).fit(frosty(0))
-    assert search.best_params_ == {"scale": "local"}
+    assert search.best_params_ == {"whiten": "local"}
     plain, whitened, local = search.cv_results_["mean_test_score"]
     assert plain == pytest.approx(whitened)
     detectors = [
-        make_pipeline(clone(frost).set_params(scale=scale), MahalanobisDetector()) for scale in ("global", "local")
+        make_pipeline(clone(frost).set_params(whiten=whiten), MahalanobisDetector()) for whiten in ("global", "local")
     ]
     of_global, of_local = (detector.fit(frosty(0)).score(frosty(1)) for detector in detectors)
     assert of_local - of_global == pytest.approx(local - plain, abs=0.05)
@@ -129,8 +129,8 @@ def test_a_search_without_damage_chooses_what_predicts_best():
 def test_filled_temperatures_widen_the_distribution():
     broken = NEW.copy()
     broken.loc[broken.index[::2], "T1"] = np.nan
-    for scale in (None, "global"):
-        whole = pipeline(scale=scale).fit(X)
+    for whiten in (None, "global"):
+        whole = pipeline(whiten=whiten).fit(X)
         assert whole.score(broken) == pytest.approx(whole[0].score(broken), rel=1e-6)
         assert whole.score(broken) < whole.score(NEW)
 

@@ -43,7 +43,7 @@ def test_any_covariance_estimator_serves(covariance):
 
 
 @pytest.mark.parametrize("ask", ["damage_index", "decision_function", "predict"])
-def test_a_call_in_which_nothing_can_be_judged_says_so_once(ask):
+def test_a_call_in_which_nothing_can_be_evaluated_says_so_once(ask):
     detector = MahalanobisDetector().fit(F)
     with pytest.warns(UserWarning, match="are not evaluated") as given:
         found = getattr(detector, ask)(np.full((24, 3), np.nan))

@@ -121,7 +121,7 @@ class Recorder(FromZero):
 
 
 @pytest.mark.filterwarnings("ignore:the 1000 baseline records depend on each other")
-def test_each_record_is_judged_by_a_clone_that_was_fitted_on_records_far_in_time():
+def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_time():
     memory = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=1000))
     Recorder.seen.clear()
     detector = OutlierDetector(Recorder()).fit(np.column_stack([memory, np.arange(1000)]))

@@ -27,8 +27,8 @@ def campaign(n_rows=1200, seed=0, frozen=FROZEN):
     return pd.DataFrame(values, pd.date_range("2025", periods=n_rows, freq="h"), ["T1", "T2", *MODES])
 
 
-def compensator(scale="local", estimator=None, **options):
-    return TemperatureCompensator(estimator or LinearRegression(), scale=scale, **({"targets": MODES} | options))
+def compensator(whiten="local", estimator=None, **options):
+    return TemperatureCompensator(estimator or LinearRegression(), whiten=whiten, **({"targets": MODES} | options))
 
 
 X, LATER = campaign(), campaign(3000, 1)
@@ -67,9 +67,9 @@ def test_global_residuals_have_unit_spread_on_the_whole_only():
 
 def test_false_alarms_are_alike_in_every_regime_with_local_whitening():
     rates = {}
-    for scale in (None, "global", "local"):
-        alarms = make_pipeline(compensator(scale), MahalanobisDetector(0.05)).fit(X).predict(LATER) == -1
-        rates[scale] = [alarms[rows].mean() for rows in (LATER["T1"] < -3, LATER["T1"] > 3)]
+    for whiten in (None, "global", "local"):
+        alarms = make_pipeline(compensator(whiten), MahalanobisDetector(0.05)).fit(X).predict(LATER) == -1
+        rates[whiten] = [alarms[rows].mean() for rows in (LATER["T1"] < -3, LATER["T1"] > 3)]
     assert rates[None] == rates["global"]
     assert rates["global"][0] > 0.07
     assert rates["global"][1] < 0.02
@@ -92,12 +92,12 @@ def test_the_index_of_globally_whitened_residuals_is_that_of_the_residuals():
     assert white[-1].threshold_ == pytest.approx(plain[-1].threshold_, rel=1e-9)
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_columns_stay_the_modes_that_they_were(scale):
-    white, residuals = compensator(scale).fit_transform(X), compensator(None).fit_transform(X)
+@pytest.mark.parametrize("whiten", ["global", "local"])
+def test_columns_stay_the_modes_that_they_were(whiten):
+    white, residuals = compensator(whiten).fit_transform(X), compensator(None).fit_transform(X)
     for mode in MODES:
         assert np.corrcoef(white[mode], residuals[mode])[0, 1] > 0.7
-    swapped = compensator(scale, targets=MODES[::-1]).fit_transform(X)
+    swapped = compensator(whiten, targets=MODES[::-1]).fit_transform(X)
     assert list(swapped) == MODES[::-1]
     np.testing.assert_allclose(swapped[MODES], white, rtol=1e-7, atol=1e-9)
 
@@ -112,8 +112,8 @@ def test_a_baseline_of_equal_spread_loses_nothing():
     same, later = campaign(frozen=THAWED), campaign(3000, 1, frozen=THAWED)
     damaged = later.assign(f1=later["f1"] - 0.2)
     found = []
-    for scale in ("global", "local"):
-        pipeline = make_pipeline(compensator(scale), MahalanobisDetector()).fit(same)
+    for whiten in ("global", "local"):
+        pipeline = make_pipeline(compensator(whiten), MahalanobisDetector()).fit(same)
         healthy_index, index = (pipeline[-1].damage_index(pipeline[0].transform(r)) for r in (later, damaged))
         found.append((index > healthy_index.quantile(0.98)).mean())
     assert 0.3 < found[0] < 0.9
@@ -142,9 +142,9 @@ def test_few_records_have_one_covariance():
 # Weather that the baseline does not know
 
 
-@pytest.mark.parametrize(("scale", "width_of_one_range"), [("global", 0.0), ("local", 0.5)])
-def test_weather_beyond_the_baseline_widens_the_local_spread(scale, width_of_one_range):
-    fitted = compensator(scale).fit(X)
+@pytest.mark.parametrize(("whiten", "width_of_one_range"), [("global", 0.0), ("local", 0.5)])
+def test_weather_beyond_the_baseline_widens_the_local_spread(whiten, width_of_one_range):
+    fitted = compensator(whiten).fit(X)
     hot = LATER.iloc[[500]].copy()
     hot[["T1", "T2"]] = X[["T1", "T2"]].max().to_numpy()
     residual = (hot[MODES] - fitted.estimator_.predict(hot[["T1", "T2"]])).to_numpy()
@@ -162,9 +162,9 @@ def test_weather_beyond_the_baseline_widens_the_local_spread(scale, width_of_one
         np.testing.assert_allclose(white, inside / np.sqrt(1 + (width_of_one_range * steps) ** 2), rtol=1e-9)
 
 
-@pytest.mark.parametrize("scale", [None, "global", "local"])
-def test_weather_outside_the_baseline_is_counted_in_one_warning(scale):
-    fitted, hot = compensator(scale).fit(X), LATER.copy()
+@pytest.mark.parametrize("whiten", [None, "global", "local"])
+def test_weather_outside_the_baseline_is_counted_in_one_warning(whiten):
+    fitted, hot = compensator(whiten).fit(X), LATER.copy()
     hot.iloc[[3, 5, 800], 1] += 60
     with pytest.warns(UserWarning, match="3 of 3000 rows have temperatures far outside") as given:
         fitted.transform(hot)
@@ -187,15 +187,15 @@ def test_the_row_outside_the_baseline_is_named_beside_gaps():
 # Missing modes
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_gaps_stay_and_the_other_modes_are_whitened_by_themselves(scale):
+@pytest.mark.parametrize("whiten", ["global", "local"])
+def test_gaps_stay_and_the_other_modes_are_whitened_by_themselves(whiten):
     holed = X.copy()
     holed = holed.mask(np.random.default_rng(0).random(X.shape) < [0, 0, 0.3, 0.3])
-    white = compensator(scale).fit_transform(holed)
+    white = compensator(whiten).fit_transform(holed)
     np.testing.assert_array_equal(white.isna(), holed[MODES].isna())
     alone = white[white["f2"].isna()]["f1"]
     assert alone.std() == pytest.approx(1, abs=0.15)
-    fitted = compensator(scale).fit(holed)
+    fitted = compensator(whiten).fit(holed)
     later = LATER.assign(f2=np.nan)
     residuals = later["f1"] - fitted.estimator_.predict(later[["T1", "T2"]])[:, 0]
     assert fitted.transform(later)["f2"].isna().all()
@@ -230,13 +230,13 @@ def test_the_size_of_chunks_does_not_matter(monkeypatch):
         np.testing.assert_allclose(white, whole, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("scale", [None, "global", "local"])
-def test_forward_in_time_only_rows_before_the_first_fold_are_nan(scale):
-    white = compensator(scale, cv=TimeSeriesSplit(5)).fit_transform(X)
+@pytest.mark.parametrize("whiten", [None, "global", "local"])
+def test_forward_in_time_only_rows_before_the_first_fold_are_nan(whiten):
+    white = compensator(whiten, cv=TimeSeriesSplit(5)).fit_transform(X)
     np.testing.assert_array_equal(np.flatnonzero(white.isna().any(axis=1)), np.arange(200))
     assert white.iloc[:200].isna().all(axis=None)
     first = LinearRegression().fit(X[["T1", "T2"]][:200], X[MODES][:200])
-    if scale is None:
+    if whiten is None:
         expected = X[MODES][200:400] - first.predict(X[["T1", "T2"]][200:400])
         np.testing.assert_allclose(white[200:400], expected, rtol=1e-9, atol=1e-12)
 
@@ -244,30 +244,30 @@ def test_forward_in_time_only_rows_before_the_first_fold_are_nan(scale):
 # Residuals that cannot be whitened
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_a_mode_without_scatter_is_refused(scale):
+@pytest.mark.parametrize("whiten", ["global", "local"])
+def test_a_mode_without_scatter_is_refused(whiten):
     with pytest.raises(ValueError, match="covariance of 1200 baseline rows and 2 modes is singular"):
-        compensator(scale).fit(X.assign(f1=4.0, f2=9.0))
+        compensator(whiten).fit(X.assign(f1=4.0, f2=9.0))
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_a_perfect_estimator_is_refused(scale):
+@pytest.mark.parametrize("whiten", ["global", "local"])
+def test_a_perfect_estimator_is_refused(whiten):
     linear = X.assign(f1=4 - 0.01 * X["T1"], f2=9 - 0.02 * X["T2"])
     with pytest.raises(ValueError, match="singular"):
-        compensator(scale).fit(linear)
+        compensator(whiten).fit(linear)
 
 
-@pytest.mark.parametrize("scale", ["global", "local"])
-def test_a_mode_without_out_of_fold_residuals_is_named(scale):
+@pytest.mark.parametrize("whiten", ["global", "local"])
+def test_a_mode_without_out_of_fold_residuals_is_named(whiten):
     early = X.copy()
     early.iloc[200:, 3] = np.nan
     with pytest.raises(ValueError, match="f2"):
-        compensator(scale, cv=TimeSeriesSplit(5)).fit(early)
+        compensator(whiten, cv=TimeSeriesSplit(5)).fit(early)
 
 
 def test_deviations_are_those_by_which_single_modes_are_divided():
-    for scale in ("global", "local"):
-        fitted = compensator(scale).fit(X)
+    for whiten in ("global", "local"):
+        fitted = compensator(whiten).fit(X)
         alone = LATER.assign(f2=np.nan)
         more = alone.assign(f1=alone["f1"] + 1.0)
         divided = 1 / (fitted.transform(more) - fitted.transform(alone))["f1"]

@@ -118,7 +118,7 @@ def test_a_mode_without_a_value_is_refused(rule):
 
 
 @each_rule
-def test_absurd_records_of_the_baseline_are_told_of_once_by_name(rule):
+def test_implausible_records_of_the_baseline_are_told_of_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
     with pytest.warns(match="absurdly far") as record:
@@ -131,10 +131,10 @@ def test_the_farther_the_records_the_higher_the_index_of_windows_with_gaps(rule)
     alarm = WindowedAlarm(8, rule=rule).fit(X)
     indices = [alarm.damage_index(HOLED[:200] + scale * X.std()).to_numpy() for scale in (3, 6, 12, 50, 200, 1e5)]
     indices = np.array(indices)[:, 8:]
-    judged = np.isfinite(indices).all(axis=0)
-    np.testing.assert_array_equal(judged, HOLED[:200].notna().any(axis=1).rolling(8).sum()[8:] >= alarm.fewest_)
-    assert judged.sum() > 150
-    assert (np.diff(indices[:, judged], axis=0) > 0).all()
+    evaluated = np.isfinite(indices).all(axis=0)
+    np.testing.assert_array_equal(evaluated, HOLED[:200].notna().any(axis=1).rolling(8).sum()[8:] >= alarm.fewest_)
+    assert evaluated.sum() > 150
+    assert (np.diff(indices[:, evaluated], axis=0) > 0).all()
 
 
 @settings(max_examples=8, deadline=None)
@@ -195,19 +195,19 @@ def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_e
     holed.iloc[200:230] = np.nan
     holed.iloc[213:216, 1] = 9.0  # one mode is enough for a record to count
     alarm = WindowedAlarm(6, rule=rule).fit(X)
-    judged = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
-    np.testing.assert_array_equal(alarm.damage_index(holed).notna(), judged)
-    assert (~judged).sum() == 2 + (215 - 203) + (232 - 219)
+    evaluated = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
+    np.testing.assert_array_equal(alarm.damage_index(holed).notna(), evaluated)
+    assert (~evaluated).sum() == 2 + (215 - 203) + (232 - 219)
     message = (
-        f"{(~judged).sum()} of 1500 rows are not evaluated .* their windows hold fewer than 3 records with a value"
+        f"{(~evaluated).sum()} of 1500 rows are not evaluated .* their windows hold fewer than 3 records with a value"
     )
     with pytest.warns(UserWarning, match=message):
         alarms = alarm.predict(holed)
-    np.testing.assert_array_equal(alarms == 0, ~judged)
+    np.testing.assert_array_equal(alarms == 0, ~evaluated)
 
 
 @each_rule
-def test_gaps_of_the_baseline_are_no_reason_not_to_judge(rule):
+def test_gaps_of_the_baseline_are_no_reason_not_to_evaluate(rule):
     """Every third record has a value, in the baseline as later."""
     baseline, later = (records.copy() for records in (X, LATER))
     baseline[np.arange(1500) % 3 > 0] = later[np.arange(1500) % 3 > 0] = np.nan

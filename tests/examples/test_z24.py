@@ -104,7 +104,7 @@ def test_the_chain_predicts_nearly_as_well_as_a_direct_regression(frozen):
 def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
     records = Z24.Records.of(frozen)
     table = Z24.alarm_table(
-        {label: Z24.compensate(records, Z24.TemperatureMapper(), scale)[0] for label, scale in Z24.SCALES.items()}
+        {label: Z24.compensate(records, Z24.TemperatureMapper(), whiten)[0] for label, whiten in Z24.WHITENINGS.items()}
     )
     assert (table["false alarms"] <= 5).all()
     assert table["damage found"][Z24.WHITENED] > 95

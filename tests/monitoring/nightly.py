@@ -25,7 +25,7 @@ def fitted_monitor(records, regressor=None, **parameters):
 
 def assert_same_course(one, other):
     """Two monitors have said the same, to the last bit."""
-    for name in ("judged_", "events_", "days_", "faults_", "records_", "baseline_"):
+    for name in ("evaluations_", "events_", "days_", "faults_", "records_", "baseline_"):
         pd.testing.assert_frame_equal(getattr(one, name), getattr(other, name), check_exact=True, check_freq=False)
     assert one.counts_ == other.counts_
     assert one.summary() == other.summary()

@@ -18,8 +18,8 @@ def records(severity=0.0, seed=0, group="bottom"):
     return campaign.temperatures.join(campaign.frequencies)
 
 
-def compensated(last, scale=None):
-    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=MODES, scale=scale), last)
+def compensated(last, whiten=None):
+    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=MODES, whiten=whiten), last)
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +43,8 @@ def test_damage_is_softening_and_its_opposite_stiffening(group, baseline, window
 def test_it_does_not_depend_on_how_residuals_are_scaled(baseline):
     later = records(0.03, 2)
     signs = [
-        Direction.of(compensated(MahalanobisDetector(), scale).fit(baseline), baseline, MODES).of_rows(later)
-        for scale in (None, "global")
+        Direction.of(compensated(MahalanobisDetector(), whiten).fit(baseline), baseline, MODES).of_rows(later)
+        for whiten in (None, "global")
     ]
     assert np.mean(signs[0] == signs[1]) > 0.98
     assert signs[0].mean() > 0.3

@@ -38,15 +38,15 @@ def monitor_of(regressor=BayesianLogs, **options):
     return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
 
 
-@pytest.mark.parametrize("scale", [None, "global", "local"])
-def test_any_batches_give_the_decisions_of_one_pass(scale):
+@pytest.mark.parametrize("whiten", [None, "global", "local"])
+def test_any_batches_give_the_decisions_of_one_pass(whiten):
     records = served(0, WEEKS + 120)
-    whole, parts = (monitor_of(scale=scale).fit(records[:WEEKS]) for _ in range(2))
+    whole, parts = (monitor_of(whiten=whiten).fit(records[:WEEKS]) for _ in range(2))
     whole.update(records[WEEKS:])
     cuts = [WEEKS, *np.sort(np.random.default_rng(1).integers(WEEKS, WEEKS + 120, 4)), WEEKS + 120]
     for first, last in itertools.pairwise(cuts):
         parts.update(records[first:last])
-    pd.testing.assert_frame_equal(whole.judged_, parts.judged_)
+    pd.testing.assert_frame_equal(whole.evaluations_, parts.evaluations_)
     pd.testing.assert_frame_equal(whole.events_, parts.events_)
 
 

@@ -82,7 +82,7 @@ FOREST = OutlierDetector(IsolationForest(n_estimators=20, random_state=0), block
 DETECTORS = {
     "raw": (MahalanobisDetector(), "nothing"),
     "lags": (make_pipeline(compensator(lagged()), MahalanobisDetector()), "30 h"),
-    "whitened, mean by time": (make_pipeline(compensator(lagged(), scale="local"), WindowedAlarm("36h")), "66 h"),
+    "whitened, mean by time": (make_pipeline(compensator(lagged(), whiten="local"), WindowedAlarm("36h")), "66 h"),
     "mean by number": (make_pipeline(compensator(lagged()), WindowedAlarm(5)), "4 records and 30 h"),
     "m of n": (make_pipeline(compensator(KNeighborsRegressor(20)), WindowedAlarm(6, rule="m-of-n")), "5 records"),
     "m of n by time": (make_pipeline(compensator(HINGES), WindowedAlarm("2D", rule="m-of-n")), "48 h"),
@@ -127,7 +127,7 @@ def last_of_each(parts):
 
 def assert_same_course(monitor, answers, after, parts):
     pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
-    for name in ("events_", "days_", "judged_", "faults_", "records_", "corrected_"):
+    for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
     for count in ("n_records", "n_not_evaluated", "n_implausible"):
         assert monitor.counts_[count] == after.counts_[count]
@@ -179,16 +179,16 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
 @pytest.mark.parametrize("name", DETECTORS)
 def test_memory_is_what_lags_and_windows_need(name):
     monitor, _, _ = fitted(name)
-    assert str(monitor.memory_) == DETECTORS[name][1]
-    judge, times = monitor.active_, ALL.index.asi8
+    assert str(monitor.lookback_) == DETECTORS[name][1]
+    evaluate, times = monitor._active, ALL.index.asi8
     rows = range(N_BASELINE, N_BASELINE + 3)
-    alone = [judge.alone(ALL, times, row) for row in rows]
-    np.testing.assert_allclose(judge.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
+    alone = [evaluate.alone(ALL, times, row) for row in rows]
+    np.testing.assert_allclose(evaluate.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
 
 
 def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch):
     monitor, _, _ = fitted("lags")
-    judge, exact = monitor.active_, ActiveDetector._exact
+    evaluate, exact = monitor._active, ActiveDetector._exact
     edge = 3.0000005
     bits = iter([edge - 1e-12, edge + 1e-12])
 
@@ -197,7 +197,7 @@ def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch
         return np.full(len(records), edge + 1e-12 if len(records) < 10 else next(bits))
 
     monkeypatch.setattr(ActiveDetector, "_exact", at_an_edge)
-    first, second = (judge.index(ALL[: N_BASELINE + 20], N_BASELINE) for _ in range(2))
+    first, second = (evaluate.index(ALL[: N_BASELINE + 20], N_BASELINE) for _ in range(2))
     monkeypatch.setattr(ActiveDetector, "_exact", exact)
     np.testing.assert_array_equal(first, second)
     assert first[0] == 3.000001
@@ -262,7 +262,7 @@ def test_a_baseline_without_records_is_refused():
 def test_too_late_records_are_told_and_not_evaluated():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[50:80])
-    before = monitor.judged_
+    before = monitor.evaluations_
     with pytest.warns(UserWarning, match="2 of 2 new records are not evaluated"):
         answers = monitor.update(SERVICE[:2])
     assert answers["state"].eq("not evaluated").all()
@@ -271,7 +271,7 @@ def test_too_late_records_are_told_and_not_evaluated():
     with pytest.warns(UserWarning, match="before the end of the baseline"):
         monitor.update(early)
     assert monitor.counts_["n_too_late"] == 3
-    pd.testing.assert_frame_equal(monitor.judged_, before)
+    pd.testing.assert_frame_equal(monitor.evaluations_, before)
 
 
 def test_known_records_are_repeated_or_refused():
@@ -363,9 +363,9 @@ class RunningMean(TransformerMixin, BaseEstimator):
 @pytest.mark.nightly
 def test_memory_of_steps_that_are_not_known_is_asked_for():
     detector = make_pipeline(compensator().set_output(transform="pandas"), RunningMean(), MahalanobisDetector())
-    with pytest.raises(ValueError, match=r"looks at later records, or farther back; expected .* memory='48h'"):
+    with pytest.raises(ValueError, match=r"looks at later records, or farther back; expected .* lookback='48h'"):
         Monitor(detector).fit(BASELINE)
-    monitor = Monitor(detector, memory="2D", sensors=False).fit(BASELINE)
+    monitor = Monitor(detector, lookback="2D", sensors=False).fit(BASELINE)
     other = copy.deepcopy(monitor)
     whole = monitor.update(ALL[N_BASELINE:])
     parts = [other.update(day) for _, day in ALL[N_BASELINE:].resample("D")]
@@ -382,16 +382,16 @@ def test_frequency_columns_have_to_be_known():
 
 @pytest.mark.nightly
 def test_state_does_not_grow_with_history():
-    monitor = Monitor(DETECTORS["lags"][0], keep="20D").fit(BASELINE)
+    monitor = Monitor(DETECTORS["lags"][0], retention="20D").fit(BASELINE)
     sizes = []
     for _, week in ALL[N_BASELINE:].resample("7D"):
         monitor.update(week)
-        sizes.append((len(monitor.records_), len(monitor.judged_), len(monitor.corrected_)))
+        sizes.append((len(monitor.records_), len(monitor.evaluations_), len(monitor.corrected_)))
     assert sizes[-1] == sizes[-2] == (81, 81, 81)
     assert len(monitor.days_) == 25
-    assert len(monitor.course_.checkpoints) <= 9
-    other = Monitor(DETECTORS["lags"][0], keep="20D").fit(BASELINE)
-    assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is judged
+    assert len(monitor._course.checkpoints) <= 9
+    other = Monitor(DETECTORS["lags"][0], retention="20D").fit(BASELINE)
+    assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is evaluated
     pd.testing.assert_frame_equal(other.days_, monitor.days_)
 
 
@@ -437,13 +437,13 @@ def test_a_monitor_is_cloned_and_has_parameters():
     monitor, _, after = fitted("lags")
     twin = clone(monitor)
     assert not hasattr(twin, "detector_")
-    assert twin.get_params()["late"] == "7D"
-    assert twin.set_params(late="2D", detector__mahalanobisdetector__contamination=0.01).late == "2D"
+    assert twin.get_params()["max_delay"] == "7D"
+    assert twin.set_params(max_delay="2D", detector__mahalanobisdetector__contamination=0.01).max_delay == "2D"
     again = pickle.loads(pickle.dumps(after))
-    pd.testing.assert_frame_equal(again.judged_, after.judged_)
+    pd.testing.assert_frame_equal(again.evaluations_, after.evaluations_)
     assert again.summary() == after.summary()
-    with pytest.raises(ValueError, match="expected to keep records two days longer"):
-        Monitor(MahalanobisDetector(), targets=MODES, keep="5D").fit(BASELINE)
+    with pytest.raises(ValueError, match="retention"):
+        Monitor(MahalanobisDetector(), targets=MODES, retention="5D").fit(BASELINE)
 
 
 @pytest.mark.nightly

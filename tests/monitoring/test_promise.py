@@ -119,7 +119,7 @@ def test_as_many_alarms_as_excursions_come_from_their_order_alone():
     assert abs(len(events) - 30) <= 1
 
 
-def test_gaps_and_records_that_are_not_judged_are_no_time_of_the_baseline():
+def test_gaps_and_records_that_are_not_evaluated_are_no_time_of_the_baseline():
     whole = pd.Series(chi(np.random.default_rng(4), 730), stamps(730))
     holes = whole.mask((whole.index > "2025-04-01") & (whole.index < "2025-10-01"))
     assert promised_rule(whole).n_years == pytest.approx(729 / 365.25)

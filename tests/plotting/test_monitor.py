@@ -12,7 +12,7 @@ FAULTS = pd.DataFrame(
         "column": ["T1", "T1", "f2", "T2"],
         "kind": ["stuck", "dead", "swapped", "dead"],
         "since": pd.to_datetime(["2025-03-01", "2025-05-01", "2025-04-01", "2020-01-01"]),
-        "told": pd.to_datetime(["2025-03-05", "2025-05-02", "2025-04-02", "2020-01-02"]),
+        "detected": pd.to_datetime(["2025-03-05", "2025-05-02", "2025-04-02", "2020-01-02"]),
         "until": pd.to_datetime(["2025-04-01", None, "2025-05-01", "2020-02-01"]),
         "detail": "",
     }
@@ -24,7 +24,7 @@ def drawn_rows(display):
 
 
 def test_days_without_a_judged_record_are_ticks_and_counted():
-    monitor = FakeMonitor(freq="12h", n_days=80, n_unjudged=6)
+    monitor = FakeMonitor(freq="12h", n_days=80, n_not_evaluated=6)
     monitor.days_ = monitor.days_.drop(monitor.days_.index[10:14])  # four days without any record
     display = MonitorDisplay.from_estimator(monitor)
     (ticks,) = [line for line in display.ax_.lines if line.get_gid() == "not evaluated"]
@@ -36,23 +36,23 @@ def test_days_without_a_judged_record_are_ticks_and_counted():
 
 def test_records_in_alarm_have_a_colour_and_a_marker_of_their_own():
     monitor = FakeMonitor(zone="Europe/Brussels")
-    monitor.judged_.loc[monitor.judged_.index[-5:], "state"] = "alarm"
+    monitor.evaluations_.loc[monitor.evaluations_.index[-5:], "state"] = "alarm"
     display = MonitorDisplay.from_estimator(monitor, by="record", start="2025-06-01", end=monitor.last_)
     quiet, alarm = display.points_
     assert len(alarm.get_xdata()) == 5
-    assert len(quiet.get_xdata()) == (monitor.judged_.index >= "2025-06-01").sum() - 5
+    assert len(quiet.get_xdata()) == (monitor.evaluations_.index >= "2025-06-01").sum() - 5
     assert alarm.get_marker() != quiet.get_marker()
     assert alarm.get_color() != quiet.get_color()
-    np.testing.assert_array_equal(alarm.get_ydata(), monitor.judged_["index"].iloc[-5:])
+    np.testing.assert_array_equal(alarm.get_ydata(), monitor.evaluations_["index"].iloc[-5:])
 
 
 def test_a_new_threshold_is_a_step_on_the_day_of_its_first_record():
     monitor = FakeMonitor(freq="12h", n_days=60)
-    monitor.judged_.loc[monitor.judged_.index[31:], "threshold"] = 5.0  # from noon of the sixteenth day
+    monitor.evaluations_.loc[monitor.evaluations_.index[31:], "threshold"] = 5.0  # from noon of the sixteenth day
     steps = MonitorDisplay.from_estimator(monitor).threshold_line_.get_ydata()
     np.testing.assert_array_equal(steps, [3.0] * 15 + [5.0] * 15)
     steps = MonitorDisplay.from_estimator(monitor, by="record").threshold_line_.get_ydata()
-    np.testing.assert_array_equal(steps, monitor.judged_["threshold"])
+    np.testing.assert_array_equal(steps, monitor.evaluations_["threshold"])
 
 
 def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis():

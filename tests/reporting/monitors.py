@@ -1,11 +1,11 @@
-"""A monitor whose judgements are given, with the attributes of a fitted one."""
+"""A monitor whose evaluations are given, with the attributes of a fitted one."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
-NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "told", "until", "detail"])
+NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "detected", "until", "detail"])
 
 
 def event_row(start, end, kind="damage", modes="f1", acknowledged=False, harmless=False, note=""):
@@ -32,7 +32,7 @@ class FakeMonitor:
         *,
         freq="1D",
         n_days=180,
-        n_unjudged=0,
+        n_not_evaluated=0,
         reason="",
         events=(),
         drift=None,
@@ -49,10 +49,10 @@ class FakeMonitor:
         )
         stamps = pd.date_range("2025-01-01", periods=n_days, freq=freq, tz=zone)
         index = 1 + np.abs(np.sin(np.arange(len(stamps))))
-        index[len(index) - n_unjudged if n_unjudged is not None else 0 :] = np.nan
+        index[len(index) - n_not_evaluated if n_not_evaluated is not None else 0 :] = np.nan
         known = ~np.isnan(index)
-        judged = {"state": np.where(known, "healthy", "not evaluated"), "index": index, "threshold": 3.0}
-        judged = pd.DataFrame(judged, stamps).assign(reason=np.where(known, "", reason), modes="", event=0)
+        evaluated = {"state": np.where(known, "healthy", "not evaluated"), "index": index, "threshold": 3.0}
+        evaluated = pd.DataFrame(evaluated, stamps).assign(reason=np.where(known, "", reason), modes="", event=0)
         columns = ["kind", "start", "end", "peak", "peak_time", "modes", "n_alarms", "acknowledged", "harmless", "note"]
         self.events_ = pd.DataFrame(list(events), range(1, len(events) + 1), columns)
         for name in ("start", "end", "peak_time"):
@@ -62,7 +62,7 @@ class FakeMonitor:
         self.days_ = self.days_.assign(index_median=groups.median(), index_max=groups.max())
         for group in () if drift is None else drift.index:
             self.days_[f"drift {group}"] = np.linspace(0, drift["change"][group], len(self.days_))
-        self.judged_ = judged[judged.index > stamps[-1] - pd.Timedelta("400D")]
+        self.evaluations_ = evaluated[evaluated.index > stamps[-1] - pd.Timedelta("400D")]
         self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
         self.targets_, self.threshold_, self.clear_threshold_ = ["f1", "f2"], 3.0, 2.0
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
@@ -76,7 +76,7 @@ class FakeMonitor:
 
     def state(self):
         is_open = self.events_["end"].isna() & (self.events_["kind"] == "damage")
-        return "alarm" if is_open.any() else str(self.judged_["state"].iloc[-1])
+        return "alarm" if is_open.any() else str(self.evaluations_["state"].iloc[-1])
 
     def update(self, new):
         raise NotImplementedError

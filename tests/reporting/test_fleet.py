@@ -42,7 +42,7 @@ def fleet():
     monitors = {
         "healthy": FakeMonitor(),
         "silent": FakeMonitor(n_days=60),
-        "blind": FakeMonitor(n_unjudged=20, reason="no mode has a value"),
+        "blind": FakeMonitor(n_not_evaluated=20, reason="no mode has a value"),
         "drifting": FakeMonitor(drift=drift_of(-0.02)),
         "worn": FakeMonitor(drift=drift_of(-0.2)),
         "explained": FakeMonitor(events=[{**ENDED, "acknowledged": True, "harmless": True}]),

@@ -1,4 +1,4 @@
-"""The page on a monitor: it never calls healthy what nobody has judged, and says what the monitor says."""
+"""The page on a monitor: it never calls healthy what nobody has evaluated, and says what the monitor says."""
 
 import re
 
@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._changes import drift, drift_sentences, sensors
 from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import introduction, unjudged
+from skthermo.reporting.service._sections import introduction, not_evaluated
 from skthermo.reporting.service._standing import Standing
 from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
@@ -25,7 +25,7 @@ from tests.reporting.pages import HOSTILE, QUOTED, Page
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-SECTIONS = ["today", "events", "index", "drift", "sensors", "unjudged", "promise", "settings"]
+SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "promise", "settings"]
 SPACE = "\xa0"
 
 
@@ -97,7 +97,7 @@ def test_it_says_what_the_real_monitor_says(page, real):
     assert numbers == [str(number) for number in monitor.events_.index[::-1]]
 
 
-def test_a_monitor_that_has_judged_nothing_is_not_called_healthy(real, tmp_path):
+def test_a_monitor_that_has_evaluated_nothing_is_not_called_healthy(real, tmp_path):
     file = owner_report(real[1], tmp_path / "a.html", now=real[1].last_)
     page = Page(file.read_text(encoding="utf-8"))
     assert state_of(page) == "not-evaluated"
@@ -128,17 +128,17 @@ def test_an_alarm_stays_one_without_records_and_says_so():
     assert "so that nothing is known of the days since" in page.text
 
 
-@pytest.mark.parametrize("n_unjudged", [3, None], ids=["some", "all"])
-def test_what_is_not_judged_says_since_when_and_why(n_unjudged):
+@pytest.mark.parametrize("n_not_evaluated", [3, None], ids=["some", "all"])
+def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
     reason = f"all of {QUOTED} are missing"
-    monitor = FakeMonitor(n_unjudged=n_unjudged, reason=reason)
+    monitor = FakeMonitor(n_not_evaluated=n_not_evaluated, reason=reason)
     page = today_of(monitor)
     assert state_of(page) == "not-evaluated"
-    since = monitor.judged_.index[-n_unjudged if n_unjudged else 0]
+    since = monitor.evaluations_.index[-n_not_evaluated if n_not_evaluated else 0]
     assert headline(page) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
     assert f"Because: {reason}." in page.text
     number = int(monitor.counts_["n_not_evaluated"])
-    page = Page(unjudged(standing_of(monitor)))
+    page = Page(not_evaluated(standing_of(monitor)))
     assert f"{number:,} ({share_text(number / 180)}) were not evaluated" in page.text
     assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
     assert page.cells == [str(number), "2"]
@@ -224,14 +224,14 @@ def test_no_structure_is_healthy_that_has_lost_much_stiffness_slowly(significant
 
 
 def test_silence_of_the_sensors_longer_than_what_is_kept():
-    monitor = FakeMonitor(n_days=900, n_unjudged=500)
+    monitor = FakeMonitor(n_days=900, n_not_evaluated=500)
     since = monitor.days_.index[400]
-    assert since < monitor.judged_.index[0]
+    assert since < monitor.evaluations_.index[0]
     assert (
         headline(today_of(monitor)) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
     )
-    n_kept = len(monitor.judged_)
-    text = Page(unjudged(standing_of(monitor))).text
+    n_kept = len(monitor.evaluations_)
+    text = Page(not_evaluated(standing_of(monitor))).text
     assert f"Why {500 - n_kept} of them, which are older, were not evaluated is no longer kept." in text
 
 
@@ -241,7 +241,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
             "column": ["T1", "f2"],
             "kind": ["stuck", "swapped"],
             "since": pd.to_datetime(["2025-03-01", "2025-04-01"]),
-            "told": pd.to_datetime(["2025-03-05", "2025-04-02"]),
+            "detected": pd.to_datetime(["2025-03-05", "2025-04-02"]),
             "until": pd.to_datetime([None, "2025-05-01"]),
             "detail": ["repeats 7", ""],
         }

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from skthermo._estimators.arguments import check_bounds, check_theta
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, Bounds, RandomState
+from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine._base import AffineBase, Change, Groups, Names
 from skthermo.fem.affine._basis import Basis, grow_basis
 from skthermo.fem.affine._core import AffineCore
@@ -151,5 +152,6 @@ class ReducedModel(AffineBase):
             warn_user(
                 f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
                 f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
+                ModelWarning,
                 "outside the reduced box",
             )

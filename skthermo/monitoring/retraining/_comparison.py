@@ -75,7 +75,7 @@ def _above(ratio: Array) -> Array:
 
 
 def _compared(old: Array, new: Array, blocks: Array) -> list[Any]:
-    """Means of both, of their difference where both judge, and whether it is clearly positive."""
+    """Means of both, of their difference where both evaluate, and whether it is clearly positive."""
     difference, error = block_mean(new - old, blocks)
     return [np.nanmean(old), np.nanmean(new), difference, error, bool(difference > CLEAR * error)]
 

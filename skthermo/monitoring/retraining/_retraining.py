@@ -110,7 +110,8 @@ class Retraining:
         str
             Plain English, several lines.
         """
-        lines = [f"{self.kind.capitalize()}: {'accepted' if self.accepted else 'refused; the old detector judges on'}."]
+        outcome = "accepted" if self.accepted else "refused; the old detector stays in use"
+        lines = [f"{self.kind.capitalize()}: {outcome}."]
         lines += [f"{'In spite of' if self.accepted else 'Because'}: {reason}." for reason in self.reasons]
         for row in self.excluded.itertuples():
             until = "the last record" if pd.isna(row.end) else f"{row.end:%Y-%m-%d %H:%M}"
@@ -130,7 +131,7 @@ def retrained(
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
-    old, targets = monitor.active_, list(monitor.targets_)
+    old, targets = monitor._active, list(monitor.targets_)
     prior, since = monitor.prior_, monitor.since_
     baseline = pd.concat([old.trained, harvest.records])
     if prior is not None:
@@ -175,7 +176,7 @@ def retrained(
 def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = _stamp(since, monitor.trained_.index)
-    old, targets, prior = monitor.active_, list(monitor.targets_), monitor.prior_
+    old, targets, prior = monitor._active, list(monitor.targets_), monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
         prior = old.trained
@@ -213,7 +214,7 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
 def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
     """Records since the baseline that may train."""
     kept = _until(_kept(monitor, records), until)
-    margin = margin_of(monitor.memory_, monitor.trained_)
+    margin = margin_of(monitor.lookback_, monitor.trained_)
     return Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
 
 
@@ -269,7 +270,7 @@ def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
     """Kept records of each event that was not acknowledged as harmless."""
     records, events, found = monitor.corrected_, monitor.events_, {}
-    margin = margin_of(monitor.memory_, monitor.trained_)  # which windows reach back into
+    margin = margin_of(monitor.lookback_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
         inside = records[(records.index >= event.start - margin) & (pd.isna(event.end) | (records.index <= event.end))]
         if not event.harmless and len(inside):

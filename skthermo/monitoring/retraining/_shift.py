@@ -63,7 +63,7 @@ class WeatherFree:
         if len(records.columns) == len(targets):
             return cls(records[targets] / level - 1, level, None, WEEK)
         within = [one for one in detector.get_params().values() if isinstance(one, TemperatureCompensator)]
-        plain = clone(within[0]).set_params(scale=None) if within else _broken_lines(targets)
+        plain = clone(within[0]).set_params(whiten=None) if within else _broken_lines(targets)
         with without_warnings():
             left = np.asarray(plain.fit_transform(records))
         named = pd.DataFrame(left, records.index, list(plain.get_feature_names_out()))[targets]

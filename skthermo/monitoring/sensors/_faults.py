@@ -1,4 +1,4 @@
-"""Faults that were told, with their beginning and end."""
+"""Faults that were detected, with their beginning and end."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from skthermo._tables.times import DAY_NS
 
 LASTS = np.iinfo(np.int64).min  # end of a fault that lasts
 SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
-COLUMNS = ["column", "kind", "since", "told", "until", "detail"]
-LEFT_OUT = ("dead", "stuck", "absurd", "offset", "drift")
+COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
+LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
 DEPARTURES = ("offset", "drift", "disagree")
 MONTH = 30.4  # days
 
@@ -31,7 +31,7 @@ class SensorFaults:
     other: NDArray[np.int64]
     kind: NDArray[np.str_]
     since: NDArray[np.int64]
-    told: NDArray[np.int64]
+    detected: NDArray[np.int64]
     until: NDArray[np.int64]
     size: Array
     rate: Array
@@ -54,14 +54,22 @@ class SensorFaults:
         return found
 
     def opened(
-        self, kind: str, column: int, since: int, told: int, *, other: int = -1, size: float = 0.0, rate: float = 0.0
+        self,
+        kind: str,
+        column: int,
+        since: int,
+        detected: int,
+        *,
+        other: int = -1,
+        size: float = 0.0,
+        rate: float = 0.0,
     ) -> SensorFaults:
         """With one more fault, or with that one again which has just ended."""
         same = (self.column == column) & (self.other == other) & (self.kind == kind)
         again = np.flatnonzero(same & (self.until > since - SOON))
         if again.size:
             return self.with_values(int(again[-1]), until=LASTS)
-        values = (column, other, kind, since, told, LASTS, size, rate)
+        values = (column, other, kind, since, detected, LASTS, size, rate)
         whole = (np.append(getattr(self, part.name), value) for part, value in zip(fields(self), values, strict=True))
         return SensorFaults(*whole)
 
@@ -78,10 +86,10 @@ class SensorFaults:
         for fault in range(len(self.column)):
             ours, other = int(self.column[fault]), int(self.other[fault])
             for column, partner in [(ours, other), (other, ours)][: 1 if other < 0 else 2]:
-                times = (int(part[fault]) for part in (self.since, self.told, self.until))
+                times = (int(part[fault]) for part in (self.since, self.detected, self.until))
                 rows.append([names[column], str(self.kind[fault]), *times, self._detail(fault, names, partner)])
         table = pd.DataFrame(rows, columns=COLUMNS)
-        for name in ("since", "told", "until"):
+        for name in ("since", "detected", "until"):
             stamps = pd.DatetimeIndex(np.array(table[name].tolist(), dtype="datetime64[ns]"))
             table[name] = stamps if not zone else stamps.tz_localize("UTC").tz_convert(zone)
         return table
@@ -92,11 +100,11 @@ class SensorFaults:
         return {
             "dead": "has had no value for longer than gaps of the baseline",
             "stuck": f"repeats {size:.6g}; left out",
-            "absurd": f"shows what cannot be, such as {size:.6g}; left out",
+            "implausible": f"shows what cannot be, such as {size:.6g}; left out",
             "offset": f"{size:+.1f} degrees beside what the other thermometers foretell; left out",
             "drift": f"{rate * MONTH:+.2f} degrees a month, {size:+.1f} so far, beside what the other thermometers "
             "foretell; left out",
             "disagree": f"{abs(size):.1f} degrees between what it, {names[partner]!r} and any others foretell: which "
-            "is wrong cannot be told, none is left out",
+            "is wrong is not known, none is left out",
             "swapped": f"its values are in the column of {names[partner]!r}; put back in place",
         }[str(self.kind[fault])]

@@ -30,7 +30,7 @@ FEWEST = np.array([3, 5, 3])  # records of a run of each kind that may be a faul
 USUAL_RANK = 3  # the usual run is the longest but so many: faults of the baseline are no rule
 TIMES_LONGEST = (1.7, 4.0)  # times the longest run of the baseline that faults exceed
 TIMES_USUAL = (3.0, 4.0)  # times its usual run
-KINDS_OF_RUNS = {"absurd": ABSURD, "stuck": REPEATED, "dead": MISSING}
+KINDS_OF_RUNS = {"implausible": ABSURD, "stuck": REPEATED, "dead": MISSING}
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class SensorWatch:
     def of(cls, T: pd.DataFrame, F: pd.DataFrame, *, per_year: float = 0.1) -> SensorWatch:
         """Learn from the baseline; lags of a sensor may have columns of their own.
 
-        ``per_year`` offsets and drifts of healthy thermometers may be told in a year, over all of them.
+        ``per_year`` offsets and drifts of healthy thermometers may be reported in a year, over all of them.
         """
         by_sensor = columns_by_sensor(T)
         order = np.argsort(T.index.asi8, kind="stable")
@@ -170,14 +170,14 @@ class SensorWatch:
         )
 
     def faults(self, state: WatchState) -> pd.DataFrame:
-        """Faults told so far: ``column``, ``kind``, ``since``, ``told``, ``until`` (NaT while it lasts), ``detail``."""
+        """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
         return state.faults.table([*self.sensors, *self.modes], self.zone)
 
     def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Records without what sensors at fault show: NaN there, and exchanged modes back in place."""
         temperatures, frequencies = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
         own = [columns[0] for columns in self.columns]
-        impossible, absurd, _, _ = self._judged(temperatures[:, own], frequencies)
+        impossible, absurd, _, _ = self._evaluated(temperatures[:, own], frequencies)
         out = self._left_out(state.faults)
         for sensor, columns in enumerate(self.columns):
             temperatures[impossible[:, sensor], columns[0]] = np.nan
@@ -195,7 +195,7 @@ class SensorWatch:
         moments = stamps.as_unit("ns").asi8
         temperatures = as_floats(T_day)[:, [own[0] for own in self.columns]]
         frequencies = self._in_place(state.faults, as_floats(F_day))
-        impossible, absurd, rest, expected = self._judged(temperatures, frequencies)
+        impossible, absurd, rest, expected = self._evaluated(temperatures, frequencies)
         runs = state.runs.after(moments, np.hstack([temperatures, frequencies]), np.hstack([impossible, absurd]))
         midnight = int(self._midnight(day))
         before, state = state.faults, replace(state, runs=runs)
@@ -223,7 +223,7 @@ class SensorWatch:
             (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
         )
 
-    def _judged(
+    def _evaluated(
         self, temperatures: Array, frequencies: Array
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array]:
         """Impossible temperatures, absurd frequencies, and logarithms of frequencies beside expected ones and these."""
@@ -316,8 +316,8 @@ class SensorWatch:
         """Offsets and drifts that have ended are closed; those that last are estimated again."""
         for fault in state.faults.lasting(*DEPARTURES):
             faults = state.faults
-            sensor, told = int(faults.column[fault]), int(faults.told[fault])
-            after = state.days * DAY_NS > told
+            sensor, detected = int(faults.column[fault]), int(faults.detected[fault])
+            after = state.days * DAY_NS > detected
             departures = Departures(state.days, *state.departures[:, :, sensor])
             before = departures.rows(after & (state.days <= state.days[-1] - RECENT)).known()
             level = faults.size[fault] if len(before.days) < RECENT else np.median(before.values * before.deviations)
@@ -327,7 +327,7 @@ class SensorWatch:
                 until = int(self._midnight(end))
                 state = replace(state, faults=faults.with_values(fault, until=until))
                 state = self._departing(self._forgotten(state, sensor, end))
-            elif midnight - told < LONGEST * DAY_NS / 2 and faults.kind[fault] != "disagree":
+            elif midnight - detected < LONGEST * DAY_NS / 2 and faults.kind[fault] != "disagree":
                 found = self._change(state, sensor)
                 if found is not None and self._is_fault(sensor, found):
                     state = replace(state, faults=faults.with_values(fault, **self._described(found)))
@@ -339,20 +339,20 @@ class SensorWatch:
         return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
 
     def _with_departures(self, state: WatchState, midnight: int) -> WatchState:
-        """A thermometer that departs from the others from now on, at most one a day; or that it cannot be told."""
+        """A thermometer that departs from the others from now on, at most one a day; or that it is not known which."""
         changes = self._changes(state)
-        told = {sensor: found for sensor, found in changes.items() if self._is_fault(sensor, found)}
-        if not told or len(changes) < 2:
+        detected = {sensor: found for sensor, found in changes.items() if self._is_fault(sensor, found)}
+        if not detected or len(changes) < 2:
             return state
-        worst = max(told, key=lambda sensor: told[sensor].weight)
-        found = self._described(told[worst])
-        without = self._departing(replace(state, faults=state.faults.opened(column=worst, told=midnight, **found)))
+        worst = max(detected, key=lambda sensor: detected[sensor].weight)
+        found = self._described(detected[worst])
+        without = self._departing(replace(state, faults=state.faults.opened(column=worst, detected=midnight, **found)))
         left = self._changes(without)
         also = [sensor for sensor in left if self._is_fault(sensor, left[sensor])]
         rivals = [
             sensor
             for sensor in left
-            if sensor not in also and changes[sensor].weight ** 2 + 2 * CLEAR > told[worst].weight ** 2
+            if sensor not in also and changes[sensor].weight ** 2 + 2 * CLEAR > detected[worst].weight ** 2
         ]
         n_departing = 1 + len(also) + len(state.faults.lasting("offset", "drift"))
         is_clear = len(changes) > LEAST_OTHERS and 2 * n_departing < len(self.sensors)
@@ -361,11 +361,11 @@ class SensorWatch:
             for fault in faults.lasting("disagree"):  # the one at fault has been found
                 faults = faults.with_values(fault, until=midnight)
             return replace(without, faults=faults)
-        if state.faults.lasting("disagree") or (is_clear and told[worst].n_days < RECENT):
+        if state.faults.lasting("disagree") or (is_clear and detected[worst].n_days < RECENT):
             return state
         other = max(set(changes) - {worst}, key=lambda sensor: changes[sensor].weight)
         found |= {"kind": "disagree", "rate": 0.0}
-        return replace(state, faults=state.faults.opened(column=worst, other=other, told=midnight, **found))
+        return replace(state, faults=state.faults.opened(column=worst, other=other, detected=midnight, **found))
 
     def _changes(self, state: WatchState) -> dict[int, Change]:
         """The most likely change of each thermometer that is not left out and has a value."""

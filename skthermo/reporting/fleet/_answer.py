@@ -10,14 +10,14 @@ import pandas as pd
 from skthermo._tables.text import counted, counted_number, significant
 from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
 from skthermo.reporting.fleet._bridge import CALLED, FAILED, OPEN, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
-from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, banner, first_section
+from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, banner, first_section
 
 MOST_NAMED = 5  # largest number of bridges in a sentence
 
 COUNTED = {
     ALARM: "in alarm",
     ATTENTION: "without an alarm, but with much stiffness lost slowly",
-    NOT_JUDGED: "not evaluated by the monitor",
+    NOT_EVALUATED: "not evaluated by the monitor",
     FAILED: "that could not be fitted",
     UNWATCHED: "without a monitor",
     HEALTHY: "healthy",
@@ -32,7 +32,7 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any,
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
     unexplained = sum(bridge.place == UNEXPLAINED for bridge in bridges)
     state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
-    state = NOT_JUDGED if unknown and state == HEALTHY else state
+    state = NOT_EVALUATED if unknown and state == HEALTHY else state
     headline = _headline(numbers, len(bridges), unknown, unexplained)
     standing = banner(state, written, headline, f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}.")
     known = [
@@ -106,7 +106,7 @@ def _steps(bridges: Sequence[Bridge]) -> list[str]:
         steps.append("Find out what the events were that have ended, and acknowledge them.")
     if ATTENTION in states:
         steps.append("Ask an engineer whether the bridges that lost stiffness slowly can bear it.")
-    if NOT_JUDGED in states:
+    if NOT_EVALUATED in states:
         steps.append("Check loggers and sensors of the bridges that are not evaluated.")
     if FAILED in states:
         steps.append("Ask an engineer to look at the records and the models of the bridges that could not be fitted.")

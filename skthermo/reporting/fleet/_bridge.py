@@ -11,10 +11,10 @@ import pandas as pd
 from skthermo._tables.text import counted, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
-from skthermo.reporting.service import ALARM, ATTENTION, NOT_JUDGED, Standing, moment
+from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, Standing, moment
 
 FAILED, UNWATCHED = "not fitted", "no monitor"
-UNKNOWN_STATES = (NOT_JUDGED, FAILED, UNWATCHED)
+UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
 STANDS_OUT, MAY_BE_CHANCE = "Stands out among all bridges.", "Chance among so many bridges may explain it."
 MONTH = 31  # days whose share that was judged is told
 
@@ -59,7 +59,7 @@ class Bridge:
     @classmethod
     def unread(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
         """A bridge whose monitor cannot be read or asked."""
-        return cls(name, NOT_JUDGED, SILENT, np.inf, why=error, n_warnings=n_warnings)
+        return cls(name, NOT_EVALUATED, SILENT, np.inf, why=error, n_warnings=n_warnings)
 
     @classmethod
     def watched(cls, name: Hashable, standing: Standing, called: set[int], n_warnings: int = 0) -> Bridge:
@@ -77,7 +77,7 @@ class Bridge:
             place, size = UNEXPLAINED, float(ended.loc[unexplained, "peak"].max()) / threshold
         elif standing.state == ATTENTION:
             place = WORN
-        elif standing.state == NOT_JUDGED:
+        elif standing.state == NOT_EVALUATED:
             place, size = SILENT, (standing.now - standing.doubt.since) / pd.Timedelta("1D")
         elif change > 0:
             place = DRIFTING
@@ -104,7 +104,7 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
     if len(opened):
         return opened["start"].min()
-    if standing.state == NOT_JUDGED:
+    if standing.state == NOT_EVALUATED:
         return standing.doubt.since
     ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
     return ends.max() if len(ends) else standing.monitor.days_.index[0]
@@ -119,7 +119,7 @@ def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list
         texts.append(f"Modes that drive it: {modes}." if modes else "")
         if standing.is_silent:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
-    elif standing.state == NOT_JUDGED:
+    elif standing.state == NOT_EVALUATED:
         texts.append(f"{standing.doubt.explanation}.")
     elif standing.state == ATTENTION:
         texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
@@ -153,7 +153,7 @@ def _drift(standing: Standing) -> tuple[float, str]:
 
 def _index(standing: Standing, threshold: float, highest: float) -> str:
     """Newest judged damage index over the threshold, and the highest of an event that is open."""
-    known = standing.judged["index"].dropna()
+    known = standing.evaluations["index"].dropna()
     if not len(known):
         return "none judged"
     text = f"{known.iloc[-1] / threshold:.2f}"

@@ -22,7 +22,7 @@ from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.service import (
     ATTENTION,
     HEALTHY,
-    NOT_JUDGED,
+    NOT_EVALUATED,
     Standing,
     Time,
     banner,
@@ -47,7 +47,7 @@ HEADLINES = {
         "Not evaluated: it could not be fitted",
         "An engineer should look at the records and at the model of this bridge; the others are not affected.",
     ),
-    NOT_JUDGED: (
+    NOT_EVALUATED: (
         "Not evaluated: its monitor cannot be used",
         "An engineer should look at the monitor of this bridge; the others are not affected.",
     ),
@@ -142,7 +142,7 @@ def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, wri
     """Sections on a bridge without a monitor: what its model has learned, or why it could not."""
     unknown = "Whether the bridge is healthy is not known: silence never means healthy."
     headline, advice = HEADLINES.get(bridge.state, HEADLINES[UNWATCHED])
-    state = banner(NOT_JUDGED, written, headline, bridge.why, unknown)
+    state = banner(NOT_EVALUATED, written, headline, bridge.why, unknown)
     sections = [section("today", "Today", state, paragraphs(advice))]
     report = getattr(chain, "report_", None)
     if hasattr(report, "offsets"):
@@ -195,10 +195,10 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
 
 def _state(bridge: Bridge) -> Html:
     """Symbol and word of a state, and what else an owner should know."""
-    drawn = symbol(NOT_JUDGED if bridge.state in UNKNOWN_STATES else bridge.state)
+    drawn = symbol(NOT_EVALUATED if bridge.state in UNKNOWN_STATES else bridge.state)
     word = "stiffness lost" if bridge.state == ATTENTION else bridge.state
     word = "healthy again" if bridge.state == HEALTHY and bridge.place == UNEXPLAINED else word
-    name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_JUDGED
+    name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_EVALUATED
     badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
     return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
 

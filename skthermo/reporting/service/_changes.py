@@ -17,7 +17,7 @@ FARTHEST = 100.0  # years ahead, beyond which nothing is foretold
 KINDS = {
     "dead": "gives no value",
     "stuck": "repeats one value",
-    "absurd": "shows what cannot be",
+    "implausible": "shows what cannot be",
     "offset": "has jumped",
     "drift": "drifts",
     "disagree": "contradicts another sensor",
@@ -85,7 +85,7 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
     if found is not None:
         meaning = (
             "Structures age: parts lose stiffness slowly. The monitor follows this with the model of the structure, "
-            "and takes it out before it judges, so that slow ageing raises no false alarm. Errors are two standard "
+            "and takes it out before it evaluates, so that slow ageing raises no false alarm. Errors are two standard "
             "errors. A drift counts as certain only where it is well beyond its error."
         )
         drawn = draw_drift(standing) if is_drawn else None
@@ -145,7 +145,7 @@ def sensors(standing: Standing) -> Section:
                 str(fault["column"]),
                 KINDS.get(fault["kind"], fault["kind"]),
                 moment(fault["since"], is_short=True),
-                moment(fault["told"], is_short=True),
+                moment(fault["detected"], is_short=True),
                 moment(fault["until"], is_short=True) or "it lasts",
                 fault["detail"],
             ]

@@ -51,7 +51,7 @@ def _failing(standing: Standing, event: pd.Series) -> str:
     faults = standing.monitor.faults_
     end = standing.last if pd.isna(event["end"]) else event["end"]
     at_that_time = [
-        fault["since"] <= end and event["start"] < fault["told"] + ONE_DAY for _, fault in faults.iterrows()
+        fault["since"] <= end and event["start"] < fault["detected"] + ONE_DAY for _, fault in faults.iterrows()
     ]
     names = sorted({str(name) for name in faults.loc[at_that_time, "column"]}) if any(at_that_time) else []
     return f"{listed(names)} failed at that time" if names else ""

@@ -9,7 +9,7 @@ from skthermo.plotting import MonitorDisplay
 from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
-from skthermo.reporting.service._standing import MONTH, NOT_JUDGED, YEAR, Standing
+from skthermo.reporting.service._standing import MONTH, NOT_EVALUATED, YEAR, Standing
 
 LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
 
@@ -17,11 +17,11 @@ LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
 def draw_month(standing: Standing) -> Html:
     """Damage index of each record in the month before the newest one."""
     start = standing.last - MONTH
-    judged = standing.judged[standing.judged.index >= start]
-    alarms, unknown = ((judged["state"] == state).sum() for state in ("alarm", NOT_JUDGED))
+    evaluated = standing.evaluations[standing.evaluations.index >= start]
+    alarms, unknown = ((evaluated["state"] == state).sum() for state in ("alarm", NOT_EVALUATED))
     alt = (
-        f"Damage index of {counted(len(judged), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
-        f"judged. {_highest(judged['index'])}"
+        f"Damage index of {counted(len(evaluated), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
+        f"evaluated. {_highest(evaluated['index'])}"
     )
     return _drawn(standing, alt, "The last month, by record", start=start, by="record", parts=["index"])
 
@@ -36,9 +36,10 @@ def draw_days(standing: Standing) -> list[Html]:
     for title, start in spans.items():
         days = standing.monitor.days_[standing.monitor.days_.index >= start]
         n_days = (standing.last.normalize() - days.index[0]).days + 1
+        n_without = n_days - int((days["n_evaluated"] > 0).sum())
         alt = (
             f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "
-            f"{n_days - int((days['n_evaluated'] > 0).sum()):,} without a judged record. {_highest(days['index_max'])}"
+            f"{n_without:,} without an evaluated record. {_highest(days['index_max'])}"
         )
         drawn.append(_drawn(standing, alt, title, start=start, parts=["index"]))
     return drawn
@@ -57,7 +58,7 @@ def chart_year(standing: Standing) -> Html:
     alarms = int((days["n_alarms"] > 0).sum())
     alt = (
         f"Damage index of {counted(len(days), 'day')}: {alarms:,} with an alarm, "
-        f"{int(days['index_max'].isna().sum()):,} without a judged record. {_highest(days['index_max'])}"
+        f"{int(days['index_max'].isna().sum()):,} without an evaluated record. {_highest(days['index_max'])}"
     )
     return chart(days["index_max"], days["n_alarms"] > 0, standing.monitor.threshold_, alt, spans)
 
@@ -85,4 +86,4 @@ def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4
 
 def _highest(index: pd.Series) -> str:
     highest = index.max()
-    return f"The highest index is {significant(highest, 3)}." if highest == highest else "None was judged."
+    return f"The highest index is {significant(highest, 3)}." if highest == highest else "None was evaluated."

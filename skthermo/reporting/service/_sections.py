@@ -11,7 +11,7 @@ from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.service._changes import drift, sensors
 from skthermo.reporting.service._events import events, promise
 from skthermo.reporting.service._figures import chart_year, draw_days, draw_month
-from skthermo.reporting.service._standing import NOT_JUDGED, Standing, moment
+from skthermo.reporting.service._standing import NOT_EVALUATED, Standing, moment
 from skthermo.reporting.service._today import today
 
 MOST_REASONS = 12  # largest number of reasons in a table
@@ -25,7 +25,7 @@ def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[H
         _index(standing, is_one_of_many),
         drift(standing, is_drawn=not is_one_of_many),
         sensors(standing),
-        unjudged(standing),
+        not_evaluated(standing),
         promise(standing),
         _settings(standing.monitor),
     ]
@@ -56,28 +56,28 @@ def _index(standing: Standing, is_small: bool) -> Section:
         caption = (
             "Highest damage index of each day in the year up to the newest record, of "
             f"{moment(standing.last)}. Dots below the dashed line are as the healthy structure; an event begins above "
-            "it, and is shaded. Ticks at the bottom are days without a judged record: nothing is known of them."
+            "it, and is shaded. Ticks at the bottom are days without an evaluated record: nothing is known of them."
         )
         return section("index", title, element("figure", chart_year(standing), element("figcaption", caption)))
     text = (
         f"The drawings end with the newest record, of {moment(standing.last)}. Points below the dashed line are as the "
         "healthy structure; an event begins above it. Grey ticks at the bottom are records or days that were not "
-        "judged, days without any record among them: nothing is known of them."
+        "evaluated, days without any record among them: nothing is known of them."
     )
-    drawn = [draw_month(standing)] if len(standing.judged) else []
+    drawn = [draw_month(standing)] if len(standing.evaluations) else []
     caption = "Damage index: of each record in the last month; the highest and the median of each day in longer times."
     return section("index", title, paragraphs(text), figure(caption, drawn + draw_days(standing)))
 
 
-def unjudged(standing: Standing) -> Section:
+def not_evaluated(standing: Standing) -> Section:
     """How many records were not evaluated, and why."""
-    counts, judged, days = standing.monitor.counts_, standing.judged, standing.monitor.days_
+    counts, evaluated, days = standing.monitor.counts_, standing.evaluations, standing.monitor.days_
     title = "What was not evaluated"
     if not standing.has_records:
-        return section("unjudged", title, paragraphs("No record has come since the baseline."))
+        return section("not_evaluated", title, paragraphs("No record has come since the baseline."))
     number, unknown = int(counts["n_records"]), int(counts["n_not_evaluated"])
     n_days = (days.index[-1] - days.index[0]).days + 1
-    text = f"All of {counted(number, 'record')} were judged."
+    text = f"All of {counted(number, 'record')} were evaluated."
     if unknown:
         text = (
             f"Of {counted(number, 'record')} in service, {unknown:,} ({share_text(unknown / number)}) were not "
@@ -85,26 +85,26 @@ def unjudged(standing: Standing) -> Section:
         )
     silent = n_days - len(days)
     without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
-    is_unknown = judged["state"] == NOT_JUDGED
-    since = f"since {moment(judged.index[0])}" if len(judged) else ""
+    is_unknown = evaluated["state"] == NOT_EVALUATED
+    since = f"since {moment(evaluated.index[0])}" if len(evaluated) else ""
     forgotten = unknown - int(is_unknown.sum()) - int(counts.get("n_too_late", 0))
     older = (
         f"Why {forgotten:,} of them, which are older, were not evaluated is no longer kept." if forgotten > 0 else ""
     )
     parts = [paragraphs(text, older, without)]
     caption = f"Why records were not evaluated: those that are kept, {since}."
-    parts.append(_reasons(caption, judged.loc[is_unknown, "reason"].replace("", "no reason given")))
-    remarks = judged.loc[~is_unknown, "reason"]
-    parts.append(_reasons(f"Remarks on records that were judged all the same, {since}.", remarks[remarks != ""]))
+    parts.append(_reasons(caption, evaluated.loc[is_unknown, "reason"].replace("", "no reason given")))
+    remarks = evaluated.loc[~is_unknown, "reason"]
+    parts.append(_reasons(f"Remarks on records that were evaluated all the same, {since}.", remarks[remarks != ""]))
     names = {
         "n_repeated": "that came again, and were counted once",
-        "n_late": "that came late, and were judged all the same",
-        "n_too_late": "that came too late to be judged",
+        "n_late": "that came late, and were evaluated all the same",
+        "n_too_late": "that came too late to be evaluated",
         "n_implausible": "(single values) that no sensor measures, and were taken as missing",
     }
     rows = [[f"Records {text}", f"{int(counts[name]):,}"] for name, text in names.items() if counts.get(name)]
     parts.append(table("What else was noticed.", ["What", "Number"], rows) if rows else Html())
-    return section("unjudged", title, *parts)
+    return section("not_evaluated", title, *parts)
 
 
 def _reasons(caption: str, reasons: pd.Series) -> Html:

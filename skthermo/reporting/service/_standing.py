@@ -16,7 +16,7 @@ from skthermo.monitoring import Monitor
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
 Time: TypeAlias = str | datetime | None
-ALARM, ATTENTION, HEALTHY, NOT_JUDGED = "alarm", "attention", "healthy", "not evaluated"
+ALARM, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "attention", "healthy", "not evaluated"
 
 
 class Doubt(NamedTuple):
@@ -50,14 +50,14 @@ class Standing:
         return self.monitor.events_
 
     @cached_property
-    def judged(self) -> pd.DataFrame:
-        """Judgements of the records that are kept."""
-        return self.monitor.judged_
+    def evaluations(self) -> pd.DataFrame:
+        """Evaluations of the records that are kept."""
+        return self.monitor.evaluations_
 
     @cached_property
     def step(self) -> pd.Timedelta:
         """Usual time between records."""
-        stamps = self.monitor.baseline_.index.append(self.judged.index)
+        stamps = self.monitor.baseline_.index.append(self.evaluations.index)
         return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else ONE_DAY
 
     @property
@@ -85,7 +85,7 @@ class Standing:
         """An alarm lasts until its event ends; nothing is healthy without new records, or with much stiffness lost."""
         said = self.monitor.state()
         if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records or self.error):
-            return NOT_JUDGED
+            return NOT_EVALUATED
         return ATTENTION if said == HEALTHY and self.worn else said
 
     @property
@@ -121,8 +121,8 @@ class Standing:
         if self.state == ATTENTION:
             return (
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
-                "the stiffness since the baseline. The monitor takes slow drift out before it judges, so that this "
-                "raises no alarm. An engineer should judge whether the structure can bear it."
+                "the stiffness since the baseline. The monitor takes slow drift out before it evaluates, so that this "
+                "raises no alarm. An engineer should evaluate whether the structure can bear it."
             )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
@@ -143,8 +143,8 @@ class Standing:
         if self.is_silent:
             text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
             return Doubt(self.last, f"Not evaluated: no record since {last}", text)
-        reason = str(self.judged["reason"].iloc[-1]) if len(self.judged) else ""
-        since = self.unjudged_since
+        reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
+        since = self.not_evaluated_since
         return Doubt(since, f"Not evaluated since {moment(since)}", f"Because: {reason or 'no reason is given'}")
 
     @property
@@ -153,12 +153,12 @@ class Standing:
         return duration_text(self.step).removeprefix("1 ")
 
     @property
-    def unjudged_since(self) -> pd.Timestamp:
-        """First record after the last one that was judged."""
-        days, judged = self.monitor.days_, self.judged
-        known = judged.index[judged["state"] != NOT_JUDGED]
+    def not_evaluated_since(self) -> pd.Timestamp:
+        """First record after the last one that was evaluated."""
+        days, evaluated = self.monitor.days_, self.evaluations
+        known = evaluated.index[evaluated["state"] != NOT_EVALUATED]
         if len(known):
-            return judged.index[judged.index > known[-1]][0]
+            return evaluated.index[evaluated.index > known[-1]][0]
         some = days.index[days["n_evaluated"] > 0]
         after = days.index[days.index > some[-1]] if len(some) else days.index
         return after[0] if len(after) else self.last
@@ -186,12 +186,12 @@ class Standing:
         return days.reindex(pd.date_range(first, max(first, last), freq="D"))
 
     def recent(self) -> str:
-        """How many records of the last month were judged."""
+        """How many records of the last month were evaluated."""
         days = self.monitor.days_
         days = days[days.index > self.last - MONTH]
-        number, judged = int(days["n_records"].sum()), int(days["n_evaluated"].sum())
-        which = f"{judged:,}" if judged < number else "all"
-        return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were judged."
+        number, evaluated = int(days["n_records"].sum()), int(days["n_evaluated"].sum())
+        which = f"{evaluated:,}" if evaluated < number else "all"
+        return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were evaluated."
 
 
 def time_of(now: Time, zone: tzinfo | None = None) -> pd.Timestamp:

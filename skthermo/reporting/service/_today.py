@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from skthermo._tables.text import counted, listed, significant
 from skthermo.reporting._html import Html, Section, bullets, element, joined, paragraphs, section
 from skthermo.reporting.service._changes import drift_sentences, sensor_sentences
-from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_JUDGED, Standing, moment
+from skthermo.reporting.service._standing import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, Standing, moment
 
 EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
-SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATION, NOT_JUDGED: "M6 12h12"}
+SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATION, NOT_EVALUATED: "M6 12h12"}
 """Lines within a circle: a tick, an exclamation mark, a dash."""
 
 MOST_NAMED = 5  # largest number of events in a sentence
@@ -56,7 +56,7 @@ def symbol(state: str) -> Html:
 def _newest(standing: Standing) -> list[str]:
     if not standing.has_records:
         return []
-    newest = standing.judged.iloc[-1] if len(standing.judged) else None
+    newest = standing.evaluations.iloc[-1] if len(standing.evaluations) else None
     text = f"The newest record is of {moment(standing.last)}; one usually comes every {standing.step_text}."
     if newest is not None and newest["index"] == newest["index"]:
         text += f" Its damage index is {significant(newest['index'], 3)}; an event begins above "
@@ -99,7 +99,7 @@ def _what_to_do(standing: Standing) -> list[str]:
         )
     if standing.is_silent or standing.is_ahead or standing.error or not standing.has_records:
         steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")
-    elif standing.state == NOT_JUDGED:
+    elif standing.state == NOT_EVALUATED:
         steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")
     if len(standing.failed):
         steps.append("Have the failed sensors repaired; the section on sensors lists them.")

@@ -63,7 +63,7 @@ def with_fault(records, kind):
         T.loc[late, "T1"] += 3.0
     elif kind == "drift":
         T.loc[late, "T1"] += (late - late[0]) / pd.Timedelta(days=10)
-    elif kind == "absurd":
+    elif kind == "implausible":
         F.loc[late, "f4"] *= 1.4
         return T, F, ["f4"]
     elif kind == "swapped":
@@ -79,7 +79,7 @@ def test_healthy_sensors_are_left_alone(watch, records):
         pd.testing.assert_frame_equal(masked, given)
 
 
-@pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "drift", "absurd", "swapped"])
+@pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "drift", "implausible", "swapped"])
 def test_a_fault_is_named_dated_and_left_out(watch, records, kind):
     T, F, columns = with_fault(records, kind)
     state = service(watch, T, F, N_DAYS if kind == "drift" else 30)
@@ -89,7 +89,7 @@ def test_a_fault_is_named_dated_and_left_out(watch, records, kind):
     assert faults["until"].isna().all()
     onset = after(T)[0]
     assert (abs(faults["since"] - onset) <= pd.Timedelta(days=20 if kind == "drift" else 1)).all()
-    assert (faults["told"] - onset <= pd.Timedelta(days=40 if kind == "drift" else 3)).all()
+    assert (faults["detected"] - onset <= pd.Timedelta(days=40 if kind == "drift" else 3)).all()
     masked = pd.concat(watch.masked(state, T, F), axis=1).loc[after(T, ONSET + 5)]
     if kind == "swapped":
         np.testing.assert_array_equal(masked[columns], records[1].loc[masked.index, columns])
