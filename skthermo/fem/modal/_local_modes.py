@@ -95,7 +95,6 @@ class LocalModes:
         -------
         ndarray of shape (n_dofs, n_candidates)
             Of unit modal mass.
-
         """
         return self._at_dofs(check_dofs(dofs, self._n_dof), self._shapes)
 
