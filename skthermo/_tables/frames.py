@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, median, real_array
+from skthermo._tables.arrays import Array, as_floats, median, real_array, robust_deviation
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
@@ -153,10 +153,9 @@ def warn_of_absurd(X: ArrayLike) -> None:
     values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
     if np.isnan(values).all(axis=0).any():
         return
-    distances = np.abs(values - median(values))
-    middle = median(distances)
-    far = distances > ABSURD * 1.4826 * middle
-    if (far & (middle > 0)).any():
+    deviations = robust_deviation(values)
+    far = (np.abs(values - median(values)) > ABSURD * deviations) & (deviations > 0)
+    if far.any():
         row, column = np.argwhere(far)[0]
         warn_user(
             f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "

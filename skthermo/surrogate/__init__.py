@@ -1,7 +1,6 @@
 """From monitoring data to a thermal FE model: inverse surrogate, temperature mapper, the chain."""
 
-from skthermo.surrogate._mapper import TemperatureMapper
-from skthermo.surrogate._regression import paper_network
+from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
 from skthermo.surrogate.inverse import InverseSurrogate
 

@@ -20,7 +20,6 @@ from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._evaluation import ask_each
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._pod_curve import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
@@ -28,6 +27,7 @@ from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
+    ask_each,
     clean_frequencies,
 )
 from skthermo.studies.replicates import Replicates

@@ -32,9 +32,7 @@ from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
-from skthermo.surrogate.inverse._inversions import Inversions
-from skthermo.surrogate.inverse._training import SimulatedTraining, held_out
+from skthermo.surrogate.inverse._training import InverseColumns, Inversions, ShapeScores, SimulatedTraining, held_out
 from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
