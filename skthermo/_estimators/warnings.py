@@ -62,10 +62,10 @@ KINDS: dict[type[SkthermoWarning], str] = {
         "worse than the mean"
     ),
     ResultWarning: (
-        "bands without models, confused groups, covariance with gaps, curve beside its points, families that are "
-        "not found, family without a curve, inert settings searched, many false alarms, search that refits, "
-        "separated severities, severity at its bound, the last records differ, unexplained shifts, unknown, "
-        "unseen groups"
+        "bands without models, blind detector, confused groups, covariance with gaps, curve beside its points, "
+        "families that are not found, family without a curve, inert settings searched, many false alarms, "
+        "search that refits, separated severities, severity at its bound, the last records differ, unexplained "
+        "shifts, unknown, unseen groups"
     ),
     SkthermoWarning: ("bridges that failed, monitors that begin again, versions of a monitor, warnings of bridges"),
 }

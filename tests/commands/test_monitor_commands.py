@@ -225,10 +225,10 @@ def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
 
     monkeypatch.setattr(skthermo.reporting, "owner_report", fails)
     done = bridge("update", "--report", "status.html", new=records[FIRST + 10 : FIRST + 12])
-    assert (done.code, done.err) == (FAILED, "error: the disk is full\n")
+    assert (done.code, done.err) == (FAILED, "error: status.html was not written: the disk is full\n")
     assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was evaluated is kept
     alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
-    assert (alarm.code, alarm.err) == (ALARM, "error: the disk is full\n")
+    assert (alarm.code, alarm.err) == (ALARM, "error: a.html was not written: the disk is full\n")
 
 
 def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeypatch):
@@ -241,7 +241,7 @@ def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeyp
 
 
 def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch):
-    def fails(*args):
+    def fails(*args, **named):
         raise KeyError("a mistake of ours")
 
     monkeypatch.setattr("skthermo.monitoring._monitor.Monitor.update", fails)
