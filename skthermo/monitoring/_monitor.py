@@ -154,7 +154,8 @@ class Monitor(SavesFrames, Estimator):
 
     A logger's clock may be wrong. After a jump of more than ``max_jump``, records are taken in if they are of the
     present by the clock of this computer, or if ten or more of them confirm each other and none is in the future.
-    Otherwise they are set aside, and never make true records late.
+    Otherwise they are set aside, and never make true records late. Where earlier records are in the future already, as
+    in a simulation, only a year or more is a jump.
 
     Examples
     --------

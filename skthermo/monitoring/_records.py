@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import as_floats
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
-from skthermo._tables.times import DAY_NS
+from skthermo._tables.times import DAY_NS, YEAR
 from skthermo._validation import with_nan
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
@@ -145,13 +145,15 @@ class RecordStore(SavesFrames):
 
         After a jump, those up to the next one are taken in if they reach the present, or if they are enough to confirm
         each other and are not in the future: a logger may have been silent for months. Where earlier records were in
-        the future already, as in a simulation, the clock says nothing.
+        the future already, as in a simulation, the clock says nothing, and only a year or more is a jump.
         """
-        times, jump, last = stamps.asi8, self.max_jump.value, self.last.as_unit("ns").value
+        times, last = stamps.asi8, self.last.as_unit("ns").value
         now = pd.Timestamp.now("UTC").as_unit("ns").value + DAY_NS  # stamps without a time zone are local
+        is_live = last <= now
+        jump = self.max_jump.value if is_live else max(self.max_jump.value, YEAR.value)
         before = np.maximum.accumulate(np.append(last, times[:-1]))
         for start, stop in pairwise([*np.flatnonzero(times - before > jump), len(times)]):
-            newest, is_live = times[stop - 1], last <= now
+            newest = times[stop - 1]
             is_present = is_live and now - jump <= newest <= now
             if (is_live and newest > now) or (not is_present and stop - start < CONFIRMED):
                 return int(start)

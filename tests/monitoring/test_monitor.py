@@ -394,7 +394,7 @@ def test_state_does_not_grow_with_history():
         sizes.append((len(monitor.records_), len(monitor.evaluations_), len(monitor.corrected_)))
     assert sizes[-1] == sizes[-2] == (81, 81, 81)
     assert len(monitor.days_) == 25
-    assert len(monitor._course.checkpoints) <= 9
+    assert len(monitor._state.checkpoints) <= 9
     other = Monitor(DETECTORS["lags"][0], retention="20D").fit(BASELINE)
     assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is evaluated
     pd.testing.assert_frame_equal(other.days_, monitor.days_)

@@ -459,7 +459,7 @@ class SensorWatch:
         rivals = [s for s in left if s not in also and self._blame(s, changes[s]) + 2 * CLEAR > blame]
         n_departing = 1 + len(also) + len(state.faults.lasting("offset", "drift"))
         is_clear = len(changes) > LEAST_OTHERS and 2 * n_departing < len(self.sensors)
-        if not self.is_reference[worst] and any(self.is_reference[sensor] for sensor in set(left) - set(also)):
+        if not self.is_reference[worst] and any(self.is_reference[sensor] for sensor in set(changes) - {worst, *also}):
             is_clear |= n_departing == 1
         if is_clear and not rivals:
             faults = without.faults
