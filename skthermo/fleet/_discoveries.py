@@ -30,7 +30,7 @@ class Discoveries:
         and ``is_discovery``.
     p_values : Series
         By bridge that was judged: that of its highest event, 1 without one.
-    not_judged : list
+    not_evaluated : list
         Names of bridges with a monitor that nothing is known of: they count neither as healthy nor as called.
     expected_false_per_year : float
         Bridges that would be called in a year, if all were healthy, by the level at which bridges are called now.
@@ -47,7 +47,7 @@ class Discoveries:
     share: float
     table: pd.DataFrame
     p_values: pd.Series
-    not_judged: list[Hashable]
+    not_evaluated: list[Hashable]
     expected_false_per_year: float
     promised_false_per_year: float
 
@@ -82,8 +82,8 @@ class Discoveries:
             f"Where p values hold, {percent(self.share)} of those called are false on average, and about {left} a year "
             f"over all bridges, where single monitors promise {promised}. Outliers and new weather make more.",
         ]
-        if self.not_judged:
-            lines.append(f"Not evaluated, and so not known to be healthy: {', '.join(map(str, self.not_judged))}.")
+        if self.not_evaluated:
+            lines.append(f"Not evaluated, and so not known to be healthy: {', '.join(map(str, self.not_evaluated))}.")
         return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -95,18 +95,18 @@ def discover(
     window = pd.Timedelta(days=check_size(days, "days", 0, np.inf, "a number of days, such as 365"))
     last = [without_zone(standing["last"]) for standing in standings.values() if not pd.isna(standing["last"])]
     begin = max(last, default=pd.NaT) - window
-    tables, p_values, years, promised, not_judged = [], {}, {}, 0.0, []
+    tables, p_values, years, promised, not_evaluated = [], {}, {}, 0.0, []
     for name in monitors:
         try:
             monitor = monitors[name]
             promised += monitor.false_alarm_estimate_.expected
             table, n_years = _compared(monitor, begin)
         except Exception:  # damaged files raise errors of every type, and the table of errors tells them
-            not_judged.append(name)
+            not_evaluated.append(name)
             continue
         is_blind = standings[name]["state"] == "not evaluated" or not n_years
         if (is_blind and not len(table)) or table["p_value"].isna().any():
-            not_judged.append(name)
+            not_evaluated.append(name)
             continue
         p_values[name], years[name] = table["p_value"].min() if len(table) else 1.0, n_years
         table = table.reset_index()
@@ -119,7 +119,7 @@ def discover(
     table = pd.concat(tables, ignore_index=True)[columns] if tables else pd.DataFrame(columns=columns)
     table["is_discovery"] = table["p_value"].astype(float) <= limit
     false = float((-np.log1p(-level) / np.array(list(years.values()), dtype=float)).sum()) if len(p) else 0.0
-    return Discoveries(share, table, p, not_judged, false, promised)
+    return Discoveries(share, table, p, not_evaluated, false, promised)
 
 
 def _limits(p_values: Array, share: float) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import DAY
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
@@ -228,6 +229,7 @@ class ActiveDetector(SavesFrames):
                 f"a fall by {PROBED[-1]:g} standard deviations of the baseline stays at or below the threshold "
                 f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
                 "another detector, or more false alarms a year",
+                ResultWarning,
                 "blind detector",
             )
 

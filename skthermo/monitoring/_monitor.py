@@ -29,6 +29,7 @@ from skthermo._validation import (
     seeded,
 )
 from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, Acknowledgement, event_table
@@ -286,6 +287,7 @@ class Monitor(SavesFrames, Estimator):
             warn_user(
                 f"{n_markers} of {baseline.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
+                RecordsWarning,
                 "markers",
             )
         trained, columns = trained[inputs], inputs if compensators else self.targets_
@@ -735,6 +737,7 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     warn_user(
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
+        UnevaluatedRowsWarning,
         "records not evaluated",
     )
 

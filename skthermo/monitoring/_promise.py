@@ -15,6 +15,7 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
 from skthermo._tables.times import DAY, YEAR
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
 
 N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
@@ -243,6 +244,7 @@ def _warn_of_baseline(
         warn_user(
             f"the baseline has no record of {unseen}: the number of false alarms a year is that of the seasons that it "
             "shows, and nothing is promised for the others; expected a whole year",
+            WeatherWarning,
             "seasons without baseline",
         )
     if asked < FAR:
@@ -250,6 +252,7 @@ def _warn_of_baseline(
             f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
             f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
+            FewRecordsWarning,
             "threshold beyond the baseline",
         )
     if (highest**2 - tail.base) / tail.excess > _largest_share(tail.k, DOUBTFUL):
@@ -259,6 +262,7 @@ def _warn_of_baseline(
             f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
             f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
             "without records of a fault or of another state",
+            RecordsWarning,
             "excursion of the baseline",
         )
 

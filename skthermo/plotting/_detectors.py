@@ -320,7 +320,7 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
         return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
 
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
-    unjudged = tested["not_judged"] if "not_judged" in tested else pd.Series(dtype=float)
+    unjudged = tested["not_evaluated"] if "not_evaluated" in tested else pd.Series(dtype=float)
     notes = {name: f"{share_text(share)} not evaluated" for name, share in unjudged.items() if share > 0}
     label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
     false, found = "healthy records in alarm (%)", "damaged records in alarm (%)"
@@ -406,7 +406,7 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
     share = np.nan
     if {"n_records", "n_not_evaluated"} <= set(results.columns):
         share = results["n_not_evaluated"] / (results["n_records"] + results["n_not_evaluated"])
-    results = results.assign(not_judged=share)
+    results = results.assign(not_evaluated=share)
     simulated, measured = (results[results["source"] == source] for source in (SIMULATED, REFERENCE))
     both = set(simulated["scenario"]) & set(measured["scenario"])
     if not both:
@@ -417,8 +417,10 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
     left = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
     right = measured.set_index(keys)
     is_single = right.get("n_repeats", pd.Series(1, right.index)) == 1
-    right = right[["rate", "not_judged"]].set_axis(["mark", "not_judged_measured"], axis=1).assign(single=is_single)
-    left = left.loc[left["scenario"].isin(both), [*keys, "measure", "value", "low", "high", "not_judged"]]
+    right = (
+        right[["rate", "not_evaluated"]].set_axis(["mark", "not_evaluated_measured"], axis=1).assign(single=is_single)
+    )
+    left = left.loc[left["scenario"].isin(both), [*keys, "measure", "value", "low", "high", "not_evaluated"]]
     table = left.join(right, on=keys).reset_index(drop=True)
     known = table[["low", "high", "mark"]].notna().all(axis=1) & (table.pop("single") == 1)
     inside = table["mark"].between(table["low"], table["high"]).astype(float)
@@ -427,7 +429,7 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
 
 def _unjudged(row: pd.Series) -> str:
     """What share of the measured and of the simulated records is not evaluated; nothing if all are."""
-    measured, simulated = row["not_judged_measured"], row["not_judged"]
+    measured, simulated = row["not_evaluated_measured"], row["not_evaluated"]
     if measured > 0:
         return f"{share_text(measured)} not evaluated{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
     return f"{share_text(simulated)} of simulated not evaluated" if simulated > 0 else ""

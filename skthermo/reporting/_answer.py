@@ -70,7 +70,7 @@ def how_soon(study: DetectabilityStudy) -> Html:
         "may also be a false one: the chance that the structure without damage raises one in the same time stands "
         "beside. The longer the time, the more of both there are."
     )
-    delayed = float(waits["not_judged"].max())
+    delayed = float(waits["not_evaluated"].max())
     if delayed:
         meaning += f" In {share_text(delayed)} of the time no record can be judged, which delays what is found."
     labels = (WITHIN.get(name, f"{name} records" if name.isdigit() else name) for name in times)

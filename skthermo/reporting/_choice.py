@@ -91,7 +91,7 @@ class Choice:
         points = [100 * row[f"pod_deficit{end}"] for end in ("", "_ci_low", "_ci_high")]
         ends = f" ({points[1]:.1f} to {points[2]:.1f})" if np.isfinite(points[1]) else ""
         behind = "" if name == self.best.name else f"{points[0]:.1f}{ends}"
-        return [*cells, behind, share_text(row["not_judged"])]
+        return [*cells, behind, share_text(row["not_evaluated"])]
 
 
 def quoted(name: object) -> str:

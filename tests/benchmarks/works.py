@@ -2,7 +2,7 @@
 
     python tests/benchmarks/works.py NAME [--quick] [--results FILE.npz]
 
-Prints JSON: processor seconds of the work and of what stands beside it (a loop of eigsh, pandas), peak megabytes.
+Prints JSON: processor seconds of the work and of what stands beside it (a loop of eigsh, pandas, ...), peak megabytes.
 Works use what every state of the library offers: public names, default settings.
 """
 
@@ -24,8 +24,8 @@ import scipy.io
 import scipy.signal  # which the library loads once it is used
 import scipy.sparse.linalg
 from bridges import frame_bridge
-from hourly_year import hourly_year
 from joblib.externals.loky import get_reusable_executor
+from sklearn.impute import KNNImputer
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
@@ -34,10 +34,13 @@ from skthermo.datasets import load_z24, make_kw51, make_kw51_campaign, make_trus
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.fem import AffineModel, add_noise, linearise, sample
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import BiasAligner, LagFeatures
-from skthermo.studies import DetectabilityStudy, identify_damage
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
+from skthermo.studies import DetectabilityStudy, identify_damage, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from skthermo.updating import ModelUpdater
+
+sys.path.append(str(Path(__file__).parents[2] / "examples"))
+from detector_recipes import field_detectors
 
 DATA = Path(os.environ["SKTHERMO_DATA"]) if "SKTHERMO_DATA" in os.environ else None
 BOUNDS = 0.3
@@ -137,15 +140,43 @@ def frame_linearise(clock, quick):
     clock.keep(1e-5, derivatives=jacobian / np.abs(jacobian).max(axis=2, keepdims=True) + 1)
 
 
+def hourly_year(n_hours):
+    """Temperatures of KW51, and frequencies of stiffnesses that fall as it warms."""
+    random, hour = np.random.default_rng(0), np.arange(n_hours)
+    season, day = np.sin(2 * np.pi * hour / 8760), np.sin(2 * np.pi * hour / 24)
+    air = 10 + 10 * season + 5 * day + random.standard_normal(n_hours)
+    theta = 1 - 4e-4 * np.outer(air - 10, [1.0, 1.2, 0.8, 1.0, 0.9])
+    F = add_noise(make_kw51().reduced(0.05, random_state=0).frequencies(theta), 0.001, random_state=0)
+    stamps = pd.date_range("2025-01-01", periods=n_hours, freq="h")
+    return pd.DataFrame({"T": air}, stamps), pd.DataFrame(F, stamps, [f"f{mode + 1}" for mode in range(6)])
+
+
 def kw51_by_hand(clock, quick):
     """Fit of a chain to an hourly year of KW51, complete rows, the reduced model made by hand before."""
-    T, F = hourly_year(make_kw51(), 800 if quick else 8760)
+    T, F = hourly_year(800 if quick else 8760)
     model = make_kw51().reduced(BOUNDS, random_state=0)
     inverse = InverseSurrogate(model, noise=0.001)
     fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
     with clock.work():
         fem.fit(T, F)
     clock.keep(1e-6, predictions=fem.predict(T[::50]), parameters=fem.predict_parameters(T[::50]))
+
+
+def kw51_damaged(clock, quick):
+    """Fit to an hourly year of KW51 and simulation of it in fifteen states of damage, beside 100 full solves."""
+    T, F = hourly_year(800 if quick else 8760)
+    model = make_kw51()
+    inverse = InverseSurrogate(noise=0.001, reduce=True)
+    fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
+    with clock.work():
+        fem.fit(T, F)
+        damages = [{group: severity} for group in [*model.groups][:5] for severity in (0.05, 0.1, 0.2)]
+        simulated = [fem.simulate(T, damage=damage) for damage in damages]
+    clock.keep(1e-6, simulated=np.stack([frequencies[::50] for frequencies in simulated]))
+    rows = np.random.default_rng(1).choice(len(T), 20, replace=False)
+    theta = fem.predict_parameters(T.iloc[rows])
+    full = np.stack([model.damaged(damage).frequencies(theta) for damage in damages])
+    clock.keep(NOT_COMPARED, error=np.abs(np.stack([f.iloc[rows] for f in simulated]) / full - 1).max())
 
 
 def kw51_with_gaps(clock, quick, *, updated=True):
@@ -228,11 +259,11 @@ def local_whitening(clock, quick):
     clock.keep(1e-7, learned=1 + np.abs(learned), judged=1 + np.abs(judged))
 
 
-def lags_of(clock, n_sensors):
+def lags_of(clock, n_sensors, n_rows=8760):
     random = np.random.default_rng(0)
-    T = pd.DataFrame(random.standard_normal((8760, n_sensors)), pd.date_range("2025", periods=8760, freq="h"))
+    T = pd.DataFrame(random.standard_normal((n_rows, n_sensors)), pd.date_range("2020", periods=n_rows, freq="h"))
     T = T.add_prefix("T")
-    for _ in range(200 // n_sensors):
+    for _ in range(max(200 // n_sensors * 8760 // n_rows, 5)):
         with clock.beside():
             pd.concat([T.shift(k) for k in range(24)], axis=1)
         with clock.work():
@@ -248,6 +279,24 @@ def lag_features(clock, quick):
 def lag_features_of_one(clock, quick):
     """24 lags of 8760 temperatures of one sensor, regular stamps."""
     lags_of(clock, 1)
+
+
+def lag_features_of_many(clock, quick):
+    """24 lags of 100,000 x 7 temperatures, regular stamps."""
+    lags_of(clock, 7, 10_000 if quick else 100_000)
+
+
+def gaps(clock, quick):
+    """KNNGapImputer beside KNNImputer: seven correlated columns, 10 % missing."""
+    random = np.random.default_rng(0)
+    values = random.standard_normal((3000 if quick else 30_000, 7)) @ random.standard_normal((7, 7))
+    values[random.random(values.shape) < 0.1] = np.nan
+    with clock.work():
+        filled = KNNGapImputer(n_neighbors=10).fit_transform(values)
+    with clock.beside():
+        reference = KNNImputer(n_neighbors=10).fit_transform(values)
+    clock.keep(EXACT, filled=filled)
+    clock.keep(NOT_COMPARED, error=np.abs(filled - reference).max())
 
 
 def truss_chain(clock, quick):
@@ -364,8 +413,30 @@ def detectability(clock, quick):
     clock.keep(1e-6, rates=1 + table["rate"])
 
 
-def hourly_monitor():
-    campaign = make_truss_campaign(2, samples_per_year=8760, samples_per_day=24, random_state=0)
+def many_detectors(clock, quick):
+    """A study of eight detectors on 13 states of the truss, 20 repeats, beside a study for each."""
+    fem, year, later = truss_years()
+    everyone = field_detectors(list(year.frequencies))
+    names = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, Gaussian mixture"]
+    names += ["linear regression", "broken lines", "broken lines, whitened", "conditional covariance"]
+
+    def decisions(*chosen):
+        detectors = {name: everyone[name] for name in chosen}
+        options = {"n_repeats": 2 if quick else 20, "random_state": 0, "uncertainty": "noise"}
+        study = DetectabilityStudy(fem, detectors, sweep(fem, (0.1, 0.2, 0.3)), **options)
+        study.run(later.temperatures)
+        return study.decisions_
+
+    with clock.work():
+        together = decisions(*names)
+    with clock.beside():
+        alone = [decisions(name) for name in names]
+    differ = [not np.array_equal(d, together[key], equal_nan=True) for one in alone for key, d in one.items()]
+    clock.keep(NOT_COMPARED, error=np.mean(differ))
+
+
+def hourly_monitor(n_years=2):
+    campaign = make_truss_campaign(n_years, samples_per_year=8760, samples_per_day=24, random_state=0)
     records = campaign.temperatures.join(campaign.frequencies)
     weather = make_pipeline(LagFeatures([0, 6, 24], freq="1h"), LinearRegression())
     compensator = TemperatureCompensator(weather, targets=list(campaign.frequencies))
@@ -390,6 +461,19 @@ def monitor_update(clock, quick):
     monitor.fit(records[:8760])
     with clock.work():
         states = [monitor.update(records[start : start + 24]) for start in range(8760, 8760 + 60 * 24, 24)]
+    clock.keep(1e-7, states=pd.concat([numbers(state) for state in states]))
+
+
+def monitor_update_later(clock, quick):
+    """Monitor.update, sixteen single days after ten years of hourly records, beside those after one year."""
+    n_years = 2 if quick else 10
+    monitor, records = hourly_monitor(n_years + 2)
+    monitor.fit(records[:8760])
+    for clocked, first in ((clock.beside, 8760), (clock.work, 8760 * n_years)):
+        for start in range(8760 + 16 * 24, first, 730):
+            monitor.update(records[start : min(start + 730, first)])
+        with clocked():
+            states = [monitor.update(records[start : start + 24]) for start in range(first, first + 16 * 24, 24)]
     clock.keep(1e-7, states=pd.concat([numbers(state) for state in states]))
 
 
@@ -438,6 +522,7 @@ WORKS = {
     "frame-10000": frame_10000,
     "frame-linearise": frame_linearise,
     "kw51-by-hand": kw51_by_hand,
+    "kw51-damaged": kw51_damaged,
     "kw51-gaps": kw51_with_gaps,
     "kw51-not-updated": kw51_not_updated,
     "frame-chain": frame_chain,
@@ -445,6 +530,8 @@ WORKS = {
     "local-whitening": local_whitening,
     "lags": lag_features,
     "lags-one": lag_features_of_one,
+    "lags-many": lag_features_of_many,
+    "gaps": gaps,
     "full-truss": full_truss,
     "full-kw51": full_kw51,
     "full-frame": full_frame,
@@ -456,8 +543,10 @@ WORKS = {
     "z24-chain": z24_chain,
     "identify": identified,
     "study": detectability,
+    "study-of-eight": many_detectors,
     "monitor-fit": monitor_fit,
     "monitor-update": monitor_update,
+    "monitor-later": monitor_update_later,
     "updater": updater,
     "two-jobs": two_jobs,
     "ten-minutes": ten_minutes,

@@ -76,7 +76,7 @@ def test_every_detector_finds_much_damage(fitted):
 
 @pytest.mark.nightly
 @pytest.mark.filterwarnings(r"ignore:\d of \d rows (have no temperature|cannot be predicted|are not evaluated)")
-def test_gaps_are_not_judged_by_those_that_need_complete_rows(fitted, later, targets):
+def test_gaps_are_not_evaluated_by_those_that_need_complete_rows(fitted, later, targets):
     gaps = later[:6].copy()
     gaps.iloc[1, list(later).index("f2")] = np.nan
     gaps.iloc[3] = np.nan

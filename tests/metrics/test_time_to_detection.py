@@ -54,36 +54,3 @@ def test_no_alarm_on_stamps_is_no_time():
 
 def test_the_first_record_is_the_onset_by_default_also_on_stamps():
     assert time_to_detection(SERIES[1:], 3.0) == pd.Timedelta("3h")
-
-
-@pytest.mark.parametrize(
-    ("index", "onset", "message"),
-    [
-        (INDEX, 6, "onset is 6 for 6 records; expected one not after the last record"),
-        (INDEX, -1, "onset is -1 for 6 records; expected a position"),
-        (INDEX, 0.5, "onset is 0.5 for 6 records; expected a position"),
-        ([], None, "onset is None for 0 records"),
-        (
-            SERIES,
-            "2026",
-            "onset is '2026' for 6 records; expected one not after the last record",
-        ),
-        (SERIES, "soon", "onset is 'soon' for 6 records; expected a position from 0, or a time"),
-        (
-            SERIES.tz_localize("UTC"),
-            "2025",
-            "onset is '2025' .* or a time in the time zone UTC",
-        ),
-        (SERIES[::-1], SERIES.index[0], "the damage index is not in order of time"),
-        ([INDEX], 0, r"damage_index has shape \(1, 6\); expected a vector"),
-    ],
-)
-def test_bad_input_is_named(index, onset, message):
-    with pytest.raises(ValueError, match=message):
-        time_to_detection(index, 3.0, onset)
-
-
-@pytest.mark.parametrize("threshold", [NAN, np.inf, [1.0, 2.0], None])
-def test_the_threshold_is_one_finite_number(threshold):
-    with pytest.raises(ValueError, match=r"threshold is .*; expected"):
-        time_to_detection(INDEX, threshold)

@@ -100,7 +100,7 @@ def test_groups_are_headings():
         DetectorsDisplay.from_predictions(BOTH, groups={"other": "raw"})
 
 
-def test_failures_and_records_that_are_not_judged_are_told():
+def test_failures_and_records_that_are_not_evaluated_are_told():
     results = pd.concat([BOTH, FAILED], ignore_index=True)
     results.loc[(results["detector"] == "linear") & (results["source"] == "reference"), "n_not_evaluated"] = 50
     display = DetectorsDisplay.from_predictions(results)
@@ -150,7 +150,7 @@ def ranking_of(**rows):
     for name in ("false_alarms", "pod", "pod_deficit"):
         table[f"{name}_ci_low"], table[f"{name}_ci_high"] = table[name] - 0.01, table[name] + 0.01
     table["within_limit"], table["significantly_worse"] = table["false_alarms"] < 0.03, table["pod_deficit_ci_low"] > 0
-    return table.assign(not_judged=0.0, error="")
+    return table.assign(not_evaluated=0.0, error="")
 
 
 RANKING = ranking_of(
@@ -166,7 +166,7 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
         {"error": "LinAlgError: singular", "within_limit": False, "significantly_worse": False}, ["none"]
     )
     ranking = pd.concat([RANKING, failed])
-    ranking.loc["raw", "not_judged"] = 0.25
+    ranking.loc["raw", "not_evaluated"] = 0.25
     display = DetectorsDisplay.from_predictions(ranking)
     names = rows_named(display.axes_[0])
     assert names == [

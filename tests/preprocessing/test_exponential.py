@@ -109,24 +109,3 @@ def test_time_grows_with_the_rows():
         return time.process_time() - start
 
     assert seconds(200_000) < 40 * max(min(seconds(20_000) for _ in range(3)), 0.01)
-
-
-@pytest.mark.parametrize(
-    ("options", "X", "message"),
-    [
-        ({"time_constants": ["30D"]}, T.to_numpy(), "'30D' is a duration, but X has no DatetimeIndex"),
-        ({"time_constants": [3]}, T, "time constant is 3; expected a duration"),
-        ({"time_constants": ["1M"]}, T, "time constant is '1M'; expected a duration of fixed length"),
-        ({"time_constants": ["-1h"]}, T, "time constant is '-1h'"),
-        ({"time_constants": ["11000D"]}, T, "expected at most ten years"),
-        ({"time_constants": ["24h", "1D"]}, T, "expected different ones"),
-        ({"time_constants": []}, T, "time_constants is"),
-        ({"time_constants": [0]}, T.to_numpy(), "positive number of rows"),
-        ({"sensors": ["soil"]}, T, "sensors is .*'soil'.*; expected different ones of the columns"),
-        ({"sensors": []}, T, "sensors is"),
-        ({}, pd.concat([T, T[:1]]), "1 duplicate stamps"),
-    ],
-)
-def test_bad_input_is_named(options, X, message):
-    with pytest.raises(ValueError, match=message):
-        ExponentialMeans(**options).fit(X)

@@ -72,20 +72,3 @@ def test_a_row_without_any_temperature_is_compared_with_its_neighbours():
     raw.iloc[100, 4] *= 1.5
     cleaned = HampelFilter(targets=list(F)).fit(X).transform(raw)
     assert cleaned.isna().iloc[100].tolist() == [True, True, True, False, True, False, False, False, False]
-
-
-@pytest.mark.parametrize(
-    ("options", "data", "message"),
-    [
-        ({"window": "1D"}, X.to_numpy(), "window is '1D', but X has no DatetimeIndex"),
-        ({"window": "7"}, X, "window is '7'; expected a positive duration with its unit"),
-        ({"window": "1M"}, X, "window is '1M'; expected a duration of fixed length"),
-        ({"window": 2}, X, "window"),
-        ({"targets": ["f9"]}, X, r"targets \['f9'\] are not columns of X"),
-        ({"targets": list(X)}, X, "targets are 9 of the 9 columns"),
-        ({"n_deviations": 0}, X, "n_deviations"),
-    ],
-)
-def test_bad_input_is_refused(options, data, message):
-    with pytest.raises(ValueError, match=message):
-        HampelFilter(**options).fit(data)

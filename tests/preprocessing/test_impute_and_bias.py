@@ -146,26 +146,3 @@ def test_reference_may_be_a_model_or_nothing():
     np.testing.assert_array_equal(BiasAligner(truss).fit(F).reference_, nominal)
     np.testing.assert_array_equal(BiasAligner().fit(F).reference_, 0)
     np.testing.assert_array_equal(BiasAligner(method="scale").fit(F).reference_, 1)
-
-
-@pytest.mark.parametrize(
-    ("aligner", "X", "message"),
-    [
-        (BiasAligner([4.0, 9.0]), F, r"reference .* has shape \(2,\); expected a frequency for each of the 3 modes"),
-        (BiasAligner([4.0, np.nan, 9.0]), F, "reference"),
-        (BiasAligner(make_truss()), F, r"has shape \(6,\)"),
-        (BiasAligner(), F.assign(f3=np.nan), "frequency column 'f3' is NaN in all 80 rows"),
-        (BiasAligner(method="scale"), F * [1, 1, 0], "the mean of mode 'f3' is zero"),
-        (BiasAligner(method="ratio"), F, "method"),
-    ],
-)
-def test_aligner_names_what_is_wrong(aligner, X, message):
-    with pytest.raises(ValueError, match=message):
-        aligner.fit(X)
-
-
-def test_aligner_wants_as_many_modes_back():
-    with pytest.raises(ValueError, match="X has 2 features; expected 3 modes"):
-        BiasAligner().fit(F).inverse_transform(F[["f1", "f2"]].to_numpy())
-    with pytest.raises(ValueError, match="feature names"):
-        BiasAligner().fit(F).inverse_transform(F[["f2", "f1", "f3"]])

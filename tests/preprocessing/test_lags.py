@@ -200,46 +200,6 @@ def test_columns_named_by_integers_keep_their_names():
     assert list(lagged.columns) == ["3_lag0", "3_lag1", "7_lag0", "7_lag1"]
 
 
-@pytest.mark.parametrize(
-    ("options", "X", "message"),
-    [
-        ({"freq": "1h"}, T.to_numpy(), "freq is '1h', but X has no DatetimeIndex"),
-        ({"tolerance": "1h"}, T.to_numpy(), "tolerance is '1h', but X has no DatetimeIndex"),
-        ({"freq": "soon"}, T, "freq is 'soon'; expected a duration"),
-        ({"freq": "-1h"}, T, "freq is '-1h'; expected a positive duration"),
-        ({"freq": "24"}, T, "freq is '24'; expected a positive duration with its unit"),
-        ({"lags": [0, 0]}, T, r"lags is \[0, 0\]; expected"),
-        ({"lags": [-1]}, T, r"lags is \[-1\]"),
-        ({"lags": 0}, T, "lags"),
-        ({}, pd.concat([T, T.iloc[[3]]]), "1 duplicate stamps, the first 2025-01-01 03:00:00 in row 30"),
-        ({}, T.set_axis([pd.NaT, *T.index[1:]]), r"missing stamp \(NaT\) in row 0"),
-        ({"freq": "MS"}, T, "freq is 'MS'; expected a duration of fixed length with its unit, such as '10min'"),
-        ({"freq": pd.offsets.MonthBegin()}, T, "freq is <MonthBegin>; expected a duration of fixed length"),
-        ({"freq": np.timedelta64(1, "M")}, T, "expected a duration of fixed length"),
-        ({"freq": np.timedelta64("NaT")}, T, "freq is .*NaT.*; expected a .*duration"),
-        ({"lags": 10**9}, T, "lags are 1000000000 for 30 rows; expected at most 10000, or as many as there are rows"),
-        ({"lags": [0, 10**6]}, T, "lags reach back 1000000 times 0 days 01:00:00; expected at most 100 years"),
-        ({"lags": [True, False]}, T, "expected a positive number or different non-negative integers"),
-        ({}, T.set_axis(HOURS - HOURS[0]), "X has an index of durations, the first 0 days 00:00:00; expected a Date"),
-        ({}, T.set_axis(HOURS.strftime("%Y-%m-%d %H:%M")), "stamps as text, the first '2025-01-01 00:00'; expected"),
-        ({}, T.set_index([np.zeros(30), HOURS]), "stamps on one of the index levels"),
-        ({}, T.set_axis(OFFSETS), "stamps with several offsets from UTC .*utc=True"),
-        ({}, T.set_axis(pd.Index([None, *HOURS[1:].to_pydatetime()], dtype=object)), "missing stamp .NaT. in row 0"),
-        ({}, T.iloc[[0]], "X has 1 sample, whose stamp gives no step"),
-    ],
-)
-def test_bad_input_is_named(options, X, message):
-    with pytest.raises(ValueError, match=message):
-        LagFeatures(**options).fit(X)
-
-
-def test_transform_wants_the_kind_of_rows_that_fit_saw():
-    with pytest.raises(ValueError, match="X has rows without a DatetimeIndex; expected a DatetimeIndex"):
-        LagFeatures().fit(T).transform(T.reset_index(drop=True))
-    with pytest.raises(ValueError, match="X has a DatetimeIndex; expected rows without"):
-        LagFeatures().fit(T.reset_index(drop=True)).transform(T)
-
-
 def test_new_rows_without_stamps_are_padded_with_a_warning():
     X = T.to_numpy(copy=True)
     lags = LagFeatures(25).fit(X)

@@ -97,20 +97,3 @@ class TestChecks:
     def test_a_trend_beside_memory_stays_one(self):
         findings = check_records(*bridge(8, 730, "40D", trend=-0.03)).table
         assert {"trend", "step"} & set(findings["what"])
-
-
-@pytest.mark.parametrize("table", [0, 1])
-@pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
-@pytest.mark.parametrize("wrong", [1j, np.inf, "1"])
-def test_what_is_no_finite_real_number_is_refused(table, kind, wrong):
-    tables = [frame[:50].astype(object) for frame in bridge(0, 100)]
-    tables[table].iloc[3, 0] = wrong
-    with pytest.raises(ValueError, match=r"(?i)complex|infinity|text"):
-        find_memory(*map(kind, tables))
-
-
-def test_columns_of_the_same_name_are_refused():
-    T, F = bridge(0, 100)
-    for tables in ((T, F.set_axis(["f1", "f1"], axis=1)), (pd.concat([T, T], axis=1), F)):
-        with pytest.raises(ValueError, match="expected each name once"):
-            find_memory(*tables)

@@ -196,7 +196,7 @@ def test_more_false_alarms_do_not_pay(task):
     assert not loud["within_limit"].item()
 
 
-def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
+def test_scenarios_count_alike_and_what_is_not_evaluated_is_not_found(fem):
     late = ProgressiveDamage("late", {"bottom": 0.1}, onset=WEATHER.index[100])
     task = task_of(fem, [Scenario("healthy"), Scenario("early", {"top": 0.1}), late], columns=MODES)
     assert (task.y[task.states["scenario"] == "late"] == 1).sum() == 200
@@ -207,7 +207,7 @@ def test_scenarios_count_alike_and_what_is_not_judged_is_not_found(fem):
     values[rows_of(task, "early", 0)] = np.nan
     assert task.scoring(noted(task, values), task.X[365:], task.y[365:]) == 0.75
     values[task.y == 1] = np.nan
-    with pytest.raises(ValueError, match="none of 240 healthy records is judged"):
+    with pytest.raises(ValueError, match="none of 240 healthy records is evaluated"):
         task.scoring(noted(task, values), task.X[365:], task.y[365:])
 
 
@@ -298,7 +298,7 @@ def test_confirmation_judges_fresh_noise_and_weather(fem):
     limit = min(known[int(0.02 * len(known))], 0)
     assert tuned["fresh"] == pytest.approx(np.mean([np.mean(np.array(each) < limit) for each in decisions.values()]))
     assert tuned["false_alarms"] == pytest.approx((known < 0).mean())
-    assert tuned["not_judged"] == pytest.approx(np.isnan(healthy).mean())
+    assert tuned["not_evaluated"] == pytest.approx(np.isnan(healthy).mean())
     assert tuned["fresh_ci_low"] < tuned["fresh"] < tuned["fresh_ci_high"]
     assert tuned["within_limit"] == (tuned["false_alarms_ci_low"] <= 0.02)
     single = task.confirm(WindowedAlarm(1), OTHER, random_state=3)
@@ -349,7 +349,7 @@ def test_a_scorer_refuses_other_rows_and_what_it_cannot_judge(fem, task):
         task.scoring(detector, SIDE_BY_SIDE, np.ones(365))
     with pytest.raises(ValueError, match="expected a frame"):
         task.scoring(detector, task.X.to_numpy(), task.y)
-    with pytest.raises(ValueError, match="would judge them"):
+    with pytest.raises(ValueError, match="temperatures"):
         task.scoring(MahalanobisDetector().fit(task.baseline), task.X[365:], task.y[365:])
     with pytest.raises(ValueError, match="rows is damaged"):
         task.scoring(detector, task.X.iloc[rows_of(task, "healthy", 0)], np.ones(120))

@@ -13,8 +13,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
-from skthermo.studies.detectability._judged import JudgedRecords
 from skthermo.studies.detectability._ranking import rank
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures
@@ -98,7 +98,7 @@ def test_rates_are_means_of_those_of_the_results(study, table):
         )
         assert row["pod"] == pytest.approx(rates["rate"].iloc[1:].mean())
         assert row["pod bottom"] == pytest.approx(rates["rate"].iloc[1:3].mean())
-        assert row["not_judged"] == 0
+        assert row["not_evaluated"] == 0
         smallest = study.minimum_detectable_damage(detector=name)["mdd"].iloc[0]
         assert row["mdd bottom"] == smallest or np.isnan([row["mdd bottom"], smallest]).all()
         assert row["time_to_detection"] == rates["time_to_detection"].iloc[1:].mean()
@@ -250,7 +250,7 @@ def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
     assert "Clearly worse: 'deaf'" in study.summary()
 
 
-def test_records_that_are_not_judged_are_said(fem):
+def test_records_that_are_not_evaluated_are_said(fem):
     class HalfBlind(MahalanobisDetector):
         def decision_function(self, X):
             return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
@@ -258,7 +258,7 @@ def test_records_that_are_not_judged_are_said(fem):
     some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
     study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0, uncertainty="noise")
     study.run(WEATHER)
-    share = study.ranking().loc["half", "not_judged"]
+    share = study.ranking().loc["half", "not_evaluated"]
     assert share == pytest.approx(0.5, abs=0.01)
     assert f"neither healthy nor damaged: 'half' {share:.1%}." in study.summary()
 
@@ -328,7 +328,7 @@ def judged(random, names, pods, n_repeats=10, n_records=50, share=0.02):
     for name, pod in zip(names, pods, strict=True):
         for scenario, rate in (("healthy", share), ("damaged", pod)):
             decisions = random.uniform(size=shape) - rate
-            records.append(JudgedRecords(name, scenarios[scenario], SIMULATED, index, decisions))
+            records.append(EvaluatedRecords(name, scenarios[scenario], SIMULATED, index, decisions))
     return records, pd.DataFrame([one.summary(0.95) for one in records])
 
 

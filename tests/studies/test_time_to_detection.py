@@ -13,7 +13,7 @@ from scipy.stats import norm
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario
-from skthermo.studies.detectability._judged import JudgedRecords
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 from skthermo.studies.detectability._waits import Waits
 from tests.surrogate.chains import F, T, chain, mapper
 
@@ -23,7 +23,7 @@ WEATHER = make_truss_campaign(random_state=1).temperatures
 def judged(decisions, index=None, scenario=None):
     index = pd.date_range("2030-01-01", periods=decisions.shape[1], freq="D") if index is None else index
     scenario = scenario or Scenario("a tenth", {"bottom": 0.1})
-    return JudgedRecords("detector", scenario, "simulated", pd.Series(0.0, index), decisions)
+    return EvaluatedRecords("detector", scenario, "simulated", pd.Series(0.0, index), decisions)
 
 
 def decisions_with(rate, memory=0.0, shape=(20, 400), seed=0):
@@ -90,7 +90,7 @@ def test_bounds_hold_the_long_run(memory):
     assert np.mean([lowest <= truth <= highest for lowest, highest in bounds]) >= 0.83
 
 
-def test_records_that_are_not_judged_delay():
+def test_records_that_are_not_evaluated_delay():
     decisions = decisions_with(0.2, shape=(300, 400))
     every = Waits.of(judged(decisions))
     decisions[:, ::2] = np.nan

@@ -128,8 +128,8 @@ class Arrangement:
         counts: dict[str, list[tuple[float, int, int]]] = {}
         for (family, severity), table in tables.items():
             decisions = np.asarray(detector.decision_function(self._seen(table)), dtype=float)
-            judged = int((~np.isnan(decisions)).sum())
-            counts.setdefault(family, []).append((abs(severity), int((decisions < 0).sum()), judged))
+            evaluated = int((~np.isnan(decisions)).sum())
+            counts.setdefault(family, []).append((abs(severity), int((decisions < 0).sum()), evaluated))
         return {family: _a90(*np.transpose(rows)) for family, rows in counts.items()}
 
     def _seen(self, table: pd.DataFrame) -> Any:
@@ -143,7 +143,7 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="the (severities|curve lies)")
             curve = pod_curve(severities, n_detected, n_records)
-    except ValueError:  # the rate does not increase with severity, or nothing could be judged
+    except ValueError:  # the rate does not increase with severity, or nothing could be evaluated
         return np.inf
     return curve.a90 if np.isfinite(curve.a90) else float(np.nan_to_num(np.mean(curve.bracket), nan=np.inf))
 
@@ -173,7 +173,7 @@ class Candidate:
 
     @property
     def memory(self) -> int:
-        """Number of records, up to the one that is judged, on which a decision depends: those of the longest window."""
+        """Number of records, up to the evaluated one, on which a decision depends: those of the longest window."""
         parts, longest = [self.detector], 1
         while parts:
             part = parts.pop()

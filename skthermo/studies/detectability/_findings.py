@@ -14,11 +14,10 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
-from skthermo.studies.detectability._families import FamilyRates, families_of
-from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement
-from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, check_probability, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
+from skthermo.studies.detectability._simulation import SIMULATED, EvaluatedRecords, Evaluation, ask_each
 from skthermo.studies.detectability._waits import soonest, waits_table
 from skthermo.studies.scenarios import BaseScenario
 
@@ -47,7 +46,7 @@ class StudyFindings:
     @classmethod
     def of(
         cls,
-        judgement: Judgement,
+        evaluation: Evaluation,
         candidates: Mapping[str, Candidate],
         scenarios: list[BaseScenario],
         detectors: Sequence[str],
@@ -56,12 +55,14 @@ class StudyFindings:
         warnings: Sequence[str],
     ) -> StudyFindings:
         """What detectors that have not failed decided, and the errors of the others."""
-        records = {name: judgement.records(name, scenarios) for name in candidates if name not in judgement.errors}
-        rows = judgement.ask(records, lambda name: [one.summary(confidence) for one in records[name]])
-        errors = {name: f"{type(error).__name__}: {error}" for name, error in judgement.errors.items()}
+        records = {name: evaluation.records(name, scenarios) for name in candidates if name not in evaluation.errors}
+        rows, failed = ask_each(
+            records, lambda name: [one.summary(confidence) for one in records[name]], evaluation.errors
+        )
+        errors = {name: f"{type(error).__name__}: {error}" for name, error in failed.items()}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": errors.get(name)}])]
         table = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0]))
-        judged = {(one.detector, one.scenario.name, one.source): one for name in rows for one in records[name]}
+        evaluated = {(one.detector, one.scenario.name, one.source): one for name in rows for one in records[name]}
         return cls(
             table=table if replicates is None else replicates.banded(table, confidence),
             scenarios=scenarios,
@@ -69,10 +70,10 @@ class StudyFindings:
             detectors={name: candidates[name].detector for name in rows},
             thresholds={name: candidates[name].threshold for name in rows},
             arrangements={name: candidates[name].arrangement for name in rows},
-            indices={key: one.damage_index for key, one in judged.items()},
-            decisions={key: one.decisions for key, one in judged.items()},
-            transitions={key: np.array(found) for key, found in judgement.transitions.items() if key[0] in rows},
-            calibration={key: np.array(found) for key, found in judgement.calibration.items() if key[0] in rows},
+            indices={key: one.damage_index for key, one in evaluated.items()},
+            decisions={key: one.decisions for key, one in evaluated.items()},
+            transitions={key: found for key, found in evaluation.transitions.items() if key[0] in rows},
+            calibration={key: found for key, found in evaluation.calibration.items() if key[0] in rows},
             errors=errors,
             replicates=replicates,
             uncertainty=None if replicates is None else replicates.table(),
@@ -90,7 +91,23 @@ class StudyFindings:
         )
 
     def detector_name(self, detector: str | None = None) -> str:
-        """Name of the only detector, or one that has results."""
+        """Name of the only detector, or a name that is known.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Needed where there are several.
+
+        Returns
+        -------
+        str
+            Of a detector that has results.
+
+        Raises
+        ------
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
         known = self.table.loc[self.table["error"] == "", "detector"].unique().tolist()
         if detector is None and self.table["detector"].nunique() == 1:
             return known[0]
@@ -98,8 +115,38 @@ class StudyFindings:
             raise ValueError(f"detector is {detector!r:.100}; expected the name of one of {known}")
         return detector
 
-    def pod_curve(self, family: str, source: str, *, log: bool = False, detector: str | None = None) -> PODCurve:
-        """Probability of detection over severity, with the curves of the replicates."""
+    def pod_curve(
+        self, family: str, source: str = "simulated", *, log: bool = False, detector: str | None = None
+    ) -> PODCurve:
+        """Probability of detection over severity for one family of scenarios.
+
+        Parameters
+        ----------
+        family : str
+            Of the scenarios.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        log : bool, default=False
+            Whether the logit is linear in the logarithm of the severity.
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        PODCurve
+            Records count as their effective numbers, so that serial correlation is in its bounds. Its `PODCurve.band`
+            and ``a90_band`` hold all that ``uncertainty`` names.
+
+        Raises
+        ------
+        ValueError
+            If there is no such family, the curve cannot be fitted, or there are several detectors and none is named.
+
+        Warns
+        -----
+        UserWarning
+            If the curve has no finite slope, or lies outside the bounds of some tested severities.
+        """
         found = self._family(family, source, detector)
         curves = [] if self.replicates is None else self.replicates.curves(found, log)
         return replace(found.curve(log), replicates=tuple(curves))
@@ -107,7 +154,40 @@ class StudyFindings:
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
     ) -> pd.DataFrame:
-        """Smallest severity that is detected reliably, for every family and source."""
+        """Smallest severity that is detected reliably, for every family and source.
+
+        Parameters
+        ----------
+        level : float, default=0.9
+            Probability of detection that counts as reliable.
+        method : {"grid", "curve"}, default="grid"
+            Of the tested severities the smallest from which the rate stays at or above the level (bounds: the same for
+            the upper and the lower bounds of the rates); or where the fitted curve and its two-sided bounds reach it.
+        detector : str, optional
+            Name of one of several detectors; by default all.
+
+        Returns
+        -------
+        DataFrame
+            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``ci_low`` and
+            ``ci_high``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
+            not increase, or a family has one severity only, ``mdd`` is NaN and the bounds are the two tested severities
+            between which it lies. Detectors that failed are left out. With replicates, also ``pi_low`` and
+            ``pi_high``, between which that of a measured campaign should lie: quantiles over the replicates, infinite
+            if the level may not be reached.
+
+        Raises
+        ------
+        ValueError
+            If there is no family, the level is not between 0 and 1, a family has both damage and strengthening, or
+            there is no such detector.
+
+        Warns
+        -----
+        UserWarning
+            If a curve has no finite slope or lies outside the bounds of some tested severities, or there is none
+            because the POD does not increase. Of texts that differ in their numbers only, the first is given.
+        """
         check_probability(level, "level")
         if method not in ("grid", "curve"):
             raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
@@ -135,12 +215,95 @@ class StudyFindings:
         within: Sequence[str | int] | None = None,
         level: float = 0.95,
         *,
-        source: str = SIMULATED,
+        source: str = "simulated",
         confidence: float | None = None,
         detector: str | None = None,
         smallest: bool = False,
     ) -> pd.DataFrame:
-        """Chance to find damage within some times, and the time within which it is found."""
+        """How soon damage is found: the chance to find it within some times, and the time within which it is found.
+
+        Damage may begin at any time of the records, so that each season counts with its own weather: all onsets count
+        alike, and after the last record comes the first one again. The damage of a scenario with an onset of its own
+        begins there. It is found with the first alarm.
+
+        Parameters
+        ----------
+        within : sequence of str or int, optional
+            Times such as "7D", or numbers of records where the weather has no ``DatetimeIndex``. By default a day, a
+            week and 30 days, or 1, 7 and 30 records.
+        level : float, default=0.95
+            Share of the cases in which damage is found reliably.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        confidence : float, optional
+            Of the bounds, two-sided; by default that of the study.
+        detector : str, optional
+            Name of one of several detectors; by default all.
+        smallest : bool, default=False
+            Whether to give only one row for each detector and family: the smallest severity that is found reliably
+            within the longest of the times, or the largest one where none is.
+
+        Returns
+        -------
+        DataFrame
+            One row for each detector and scenario:
+
+            - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
+            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D ci_low`` and
+              ``7D ci_high``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
+              within the same time, which would have come without damage, too (NaN without a healthy scenario). NaN
+              where the time is shorter than that between two records, or longer than all of them;
+            - ``median``: time within which half of the cases are found;
+            - ``reliable``: the same for the share ``level``, and ``reliable highest``: time from which the lower
+              bound of the probability is as high. NaT (NaN) where that takes longer than the records;
+            - ``not_evaluated``: share of the time without a record that is evaluated, which delays what is found;
+            - ``text``: in words, after the name of the scenario.
+
+            Times are counted in the usual time between records, from the one before the onset on. They are numbers of
+            records where there are no stamps.
+
+        Raises
+        ------
+        ValueError
+            If a time is none, the level is not between 0 and 1, or there is no such source or detector.
+
+        Notes
+        -----
+        A probability is the share of onsets in all repeats. Those next to each other wait for the same alarm: bounds
+        allow for this dependence as those of rates do. They hold the noise alone, as all of the study's.
+
+        An alarm within the time may be a false one: compare the two probabilities. With a probability h of the
+        healthy structure, damage that changes nothing is "found" in the share h of the cases.
+
+        Windows that begin before the damage and end in it are evaluated as such, at the onsets of ``transitions_``, of
+        which there are fewer.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.detection import MahalanobisDetector
+        >>> from skthermo.studies import DetectabilityStudy, sweep
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
+        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
+        >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
+        >>> results = study.run(weather)
+        >>> waits = study.time_to_detection(["1D", "7D"]).set_index("scenario")
+        >>> waits[["1D", "7D", "7D ci_low", "7D ci_high", "7D healthy"]].round(2)
+                       1D    7D  7D ci_low  7D ci_high  7D healthy
+        scenario
+        healthy      0.02  0.10       0.07        0.16         0.1
+        bottom 10 %  0.22  0.83       0.79        0.86         0.1
+        bottom 20 %  0.93  1.00       0.99        1.00         0.1
+        >>> waits[["median", "reliable"]]
+                     median reliable
+        scenario
+        healthy     50 days 274 days
+        bottom 10 %  3 days  13 days
+        bottom 20 %  1 days   2 days
+        """
         check_probability(level, "level")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
         self._check_source(source)
@@ -149,19 +312,121 @@ class StudyFindings:
         table = waits_table(records, self.transitions, within, level, asked)
         return soonest(table, within) if check_flag(smallest, "smallest") else table
 
-    def is_undetected(self, family: str, source: str, detector: str | None) -> bool:
-        """Whether no severity of a family raises clearly more alarms than the healthy structure does."""
+    def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
+        """Whether no severity of a family raises clearly more alarms than the healthy structure does.
+
+        Parameters
+        ----------
+        family : str
+            Of the scenarios.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        bool
+            True if no rate is above the highest upper bound of the rates of false alarms.
+
+        Raises
+        ------
+        ValueError
+            If there is no such family or source, or there are several detectors and none is named.
+        """
         return self._family(family, source, detector).is_undetected
 
     def ranking(
         self,
-        max_false_alarms: float,
-        source: str = SIMULATED,
+        max_false_alarms: float = 0.02,
+        source: str = "simulated",
         confidence: float | None = None,
         *,
         by: Literal["pod", "pod_at_equal_pfa"] = "pod",
     ) -> pd.DataFrame:
-        """Detectors in the order of what they find."""
+        """Detectors in the order of what they find, with what is not significant.
+
+        First stand those that keep the limit of false alarms, in the order of their probability of detection (POD),
+        then the others, those with the fewest false alarms first.
+
+        Parameters
+        ----------
+        max_false_alarms : float, default=0.02
+            Limit of the share of healthy records in alarm.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        confidence : float, optional
+            Of the bounds, two-sided; by default that of the study.
+        by : {"pod", "pod_at_equal_pfa"}, default="pod"
+            What is compared: detectors as they are, or with thresholds moved to equal false alarms.
+
+        Returns
+        -------
+        DataFrame
+            One row for each detector, indexed by ``detector``, best first, those that failed last:
+
+            - ``false_alarms``, ``false_alarms_ci_low``, ``false_alarms_ci_high``: rate and bounds, means over the
+              healthy scenarios;
+            - ``within_limit``: False only where the lower bound is above the limit;
+            - ``pod``, ``pod_ci_low``, ``pod_ci_high``: the same of the damaged scenarios;
+            - ``pod_at_equal_pfa``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the
+              limit
+              (less where indices are tied); NaN for measured records, which have no calibration;
+            - ``pod_deficit``, ``pod_deficit_ci_low``, ``pod_deficit_ci_high``: POD of the first row less that of this
+              one, by the
+              measure of the order; the bounds hold for all rows together, and are NaN where there is one repeat;
+            - ``significantly_worse``: whether the lower bound is above 0. The choice among the others is not
+              significant;
+            - ``auc``: area under the ROC curve, the mean over the damaged scenarios; 0.5 is chance;
+            - ``time_to_detection``: mean over the damaged scenarios; NaN where one of them raises no alarm;
+            - ``not_evaluated``: share of the records that the detector cannot evaluate, which count nowhere else;
+            - for each family ``pod FAMILY``, ``pod FAMILY ci_low``, ``pod FAMILY ci_high`` and ``mdd FAMILY``, the
+              minimum detectable damage at a POD of 0.9 (NaN: not reached, or the severities have no order);
+            - ``error``: "", or the error of a detector that failed.
+
+        Raises
+        ------
+        ValueError
+            If no scenario of this source is healthy, or none is damaged, or ``by="pod_at_equal_pfa"`` and there are no
+            healthy records to move thresholds by.
+
+        Notes
+        -----
+        The default order is by detectors as they will be used. On the truss, simulation and truth agree on it better
+        than on the order at equal false alarms: simulated noise is resampled from the records that the detectors have
+        learned, so that those that overfit them need too low a threshold in the simulation.
+
+        Differences are paired: all detectors evaluate the same records in every repeat (common random numbers). Their
+        bounds are t intervals of jackknife pseudo-values over the repeats, which hold the error of the moved threshold,
+        too, with Bonferroni's correction for all comparisons with the first row. They hold the noise alone: neither
+        another baseline nor an error of the model is in them. A threshold learned from n independent records at 2 %
+        has itself a true rate with a standard deviation of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
+
+        Examples
+        --------
+        >>> from sklearn.ensemble import IsolationForest
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.detection import MahalanobisDetector, OutlierDetector
+        >>> from skthermo.studies import DetectabilityStudy
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> detectors = {"forest": OutlierDetector(IsolationForest()), "Mahalanobis": MahalanobisDetector()}
+        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
+        >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
+        >>> results = study.run(weather)
+        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
+        detector
+        Mahalanobis          0.02  0.22              0.21                False
+        forest               0.02  0.18              0.17                False
+        >>> print(study.summary())
+        'Mahalanobis' finds 21.9% of the damaged records at 1.6% false alarms.
+        Not clearly worse: 'forest' (17.8% at 1.6%).
+        This holds the noise alone: other weather, another baseline or an error of the model may change the order.
+        'healthy' raises a false alarm within 1 day in 2, within 7 days in 10, within 30 days in 37 of 100 cases.
+        'bottom 10 %' is found within 13 days in 95 of 100 cases; a healthy structure alarms by then in 18 of 100.
+        """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
         if by not in ("pod", "pod_at_equal_pfa"):
@@ -183,9 +448,36 @@ class StudyFindings:
         return rank(records, rows, calibration, self.errors, limit, asked, by)
 
     def labelled_scores(
-        self, detector: str | None, source: str, scenarios: Sequence[str] | None
+        self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
     ) -> tuple[NDArray[np.bool_], Array]:
-        """Which records are damaged, and how suspicious a detector finds them."""
+        """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        scenarios : sequence of str, optional
+            Damaged states whose records are put together, from the onset of damage on; by default all.
+
+        Returns
+        -------
+        is_damaged : ndarray of shape (n_records,)
+            Records of all repeats; those that are not evaluated are left out.
+        scores : ndarray of shape (n_records,)
+            Minus the decision function: positive is an alarm.
+
+        Raises
+        ------
+        ValueError
+            If the detector is not known, or it has evaluated no healthy or no damaged records of these scenarios.
+
+        Examples
+        --------
+        Found damage over false alarms, for all thresholds, is ``RocCurveDisplay.from_predictions(
+        *study.labelled_scores("raw"), name="raw")`` of scikit-learn.
+        """
         name = self.detector_name(detector)
         parts: dict[bool, list[Array]] = {False: [], True: []}
         for (of, *_), one in self._records(source).items():
@@ -196,13 +488,32 @@ class StudyFindings:
         healthy, damaged = (np.concatenate([*some, []]) for some in parts.values())
         if not len(healthy) or not len(damaged):
             raise ValueError(
-                f"detector {name!r} has judged {len(healthy)} healthy and {len(damaged)} damaged records of source "
+                f"detector {name!r} has evaluated {len(healthy)} healthy and {len(damaged)} damaged records of source "
                 f"{source!r} and scenarios {scenarios}; expected some of both"
             )
         return np.repeat([False, True], [len(healthy), len(damaged)]), np.r_[healthy, damaged]
 
-    def summary(self, max_false_alarms: float, source: str = SIMULATED) -> str:
-        """Which detector finds most, how soon, and which are not clearly worse, in plain sentences."""
+    def summary(self, max_false_alarms: float = 0.02, source: str = "simulated") -> str:
+        """Which detector finds most, and which are not clearly worse, in plain sentences.
+
+        Parameters
+        ----------
+        max_false_alarms : float, default=0.02
+            Limit of the share of healthy records in alarm.
+        source : str, default="simulated"
+            "simulated" or "reference".
+
+        Returns
+        -------
+        str
+            What `ranking` says, a line for each group of detectors, and what `time_to_detection` says of the first
+            one: of the healthy structure, and of each family the smallest severity that is found reliably.
+
+        Raises
+        ------
+        ValueError
+            As `ranking`.
+        """
         ranking = self.ranking(max_false_alarms, source)
         waits = self.time_to_detection(source=source, detector=ranking.index[0], smallest=True)
         lines = [in_words(ranking, max_false_alarms), *(f"{one.scenario!r} {one.text}." for one in waits.itertuples())]
@@ -211,7 +522,24 @@ class StudyFindings:
         return "\n".join(lines)
 
     def uncertainty_summary(self, detector: str | None = None) -> str:
-        """What the bands hold, and which part of the widest one is the largest, in plain sentences."""
+        """What the bands hold, and which part of the widest one is the largest, in plain sentences.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        str
+            A line on what the bands hold, one on the scenario with the widest band, and one on rates that are outside
+            their bands, as those of a model that the training records contradict are.
+
+        Raises
+        ------
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
         return sentences(self.table, self.uncertainty, self.detector_name(detector), self.confidence)
 
     def many_false_alarms(self) -> str:
@@ -233,11 +561,11 @@ class StudyFindings:
         if source not in known:
             raise ValueError(f"source is {source!r:.100}; expected one of {known}")
 
-    def _records(self, source: str) -> dict[tuple[str, str, str], JudgedRecords]:
-        """What the detectors judged of one source."""
+    def _records(self, source: str) -> dict[tuple[str, str, str], EvaluatedRecords]:
+        """What the detectors evaluated of one source."""
         scenarios = {one.name: one for one in self.scenarios}
         return {
-            key: JudgedRecords(key[0], scenarios[key[1]], source, self.indices[key], decisions)
+            key: EvaluatedRecords(key[0], scenarios[key[1]], source, self.indices[key], decisions)
             for key, decisions in self.decisions.items()
             if key[2] == source
         }

@@ -16,7 +16,7 @@ FEW_ALARMS = 10  # minimum number of alarms, and of records without one, to esti
 
 @dataclass(frozen=True)
 class Rate:
-    """Rate of alarms over all judged records, its bounds, and the number of independent records with the same error."""
+    """Rate of alarms over evaluated records, its bounds, and the number of independent records with the same error."""
 
     n_alarms: int
     n_records: int
@@ -36,8 +36,8 @@ def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = Fa
     Decisions, (n_repeats, n_records), are of the same records with different noise, in order of time, and NaN where
     there is none. With ``whole_repeats``, all records of a repeat depend on each other.
     """
-    judged = ~np.isnan(decisions)
-    n_alarms, n_records = int((decisions < 0).sum()), int(judged.sum())
+    evaluated = ~np.isnan(decisions)
+    n_alarms, n_records = int((decisions < 0).sum()), int(evaluated.sum())
     if not n_records:
         return Rate(0, 0, 0.0, 0.0, 1.0)
     if all(np.array_equal(repeat, decisions[0], equal_nan=True) for repeat in decisions[1:]):
@@ -64,7 +64,7 @@ class Blocks:
     """
 
     starts: NDArray[np.intp]
-    judged: NDArray[np.bool_]
+    evaluated: NDArray[np.bool_]
 
     @classmethod
     def of(cls, decisions: Array, whole_repeats: bool = False) -> "Blocks":
@@ -81,16 +81,16 @@ class Blocks:
     @property
     def freedom(self) -> int:
         """Degrees of freedom of the variance."""
-        n_repeats, n_blocks = len(self.judged), len(self.starts)
+        n_repeats, n_blocks = len(self.evaluated), len(self.starts)
         return max((n_repeats - 1) * n_blocks if n_repeats > 1 else n_blocks - 1, 1)
 
     def sums(self, values: Array) -> Array:
-        """Sums over the judged records of each repeat and block, (n_repeats, n_blocks)."""
-        return np.add.reduceat(np.where(self.judged, values, 0.0), self.starts, axis=1)
+        """Sums over the evaluated records of each repeat and block, (n_repeats, n_blocks)."""
+        return np.add.reduceat(np.where(self.evaluated, values, 0.0), self.starts, axis=1)
 
     def variance(self, values: Array) -> Array:
         """Variance of the mean of values: between repeats within blocks or, of a single repeat, between blocks."""
-        sums, counts = self.sums(values), self.sums(np.ones(self.judged.shape))
+        sums, counts = self.sums(values), self.sums(np.ones(self.evaluated.shape))
         axis = 0 if len(sums) > 1 else 1
         number = sums.shape[axis]
         means = sums.sum(axis=axis, keepdims=True) / np.maximum(counts.sum(axis=axis, keepdims=True), 1)
@@ -99,7 +99,7 @@ class Blocks:
 
 def _n_effective(blocks: Blocks, decisions: Array, confidence: float) -> float:
     """Number of records over the design effect, for an interval whose variance is estimated (Korn & Graubard 1998)."""
-    alarms, n_records = (decisions < 0).astype(float), blocks.judged.sum()
+    alarms, n_records = (decisions < 0).astype(float), blocks.evaluated.sum()
     rate = alarms.sum() / n_records
     effects = [1.0]
     if 0 < rate < 1:

@@ -9,8 +9,8 @@ import pandas as pd
 from scipy.stats import t
 
 from skthermo._tables.arrays import Array
-from skthermo.studies.detectability._families import families_of
-from skthermo.studies.detectability._judged import JudgedRecords
+from skthermo.studies.detectability._pod_curve import families_of
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 
 LEVEL = 0.9  # probability of detection that counts as reliable
 
@@ -54,8 +54,8 @@ class Contender:
         healthy = np.sort(self.healthy[~np.isnan(self.healthy)])
         areas = []
         for decisions in self.damaged:
-            judged = decisions[~np.isnan(decisions)]
-            below = (healthy.searchsorted(judged, "left") + healthy.searchsorted(judged, "right")) / 2
+            evaluated = decisions[~np.isnan(decisions)]
+            below = (healthy.searchsorted(evaluated, "left") + healthy.searchsorted(evaluated, "right")) / 2
             areas.append(1 - below.mean() / len(healthy))
         return float(np.mean(areas))
 
@@ -74,7 +74,7 @@ def _without(decisions: Array, left_out: int | None) -> Array:
 
 
 def rank(
-    records: Sequence[JudgedRecords],
+    records: Sequence[EvaluatedRecords],
     rows: pd.DataFrame,
     calibration: Mapping[str, Array],
     errors: Mapping[str, str],
@@ -122,13 +122,13 @@ def rank(
         "pod_deficit_ci_low",
         "pod_deficit_ci_high",
     ]
-    first += ["significantly_worse", "auc", "time_to_detection", "not_judged"]
+    first += ["significantly_worse", "auc", "time_to_detection", "not_evaluated"]
     table = table[[*first, *(name for name in table if name not in first)]].assign(error="")
     failed = {"within_limit": False, "significantly_worse": False, "error": list(errors.values())}
     return pd.concat([table, pd.DataFrame(failed, index=list(errors))]).rename_axis("detector") if errors else table
 
 
-def _contender(name: str, records: Sequence[JudgedRecords], calibration: Array | None) -> Contender:
+def _contender(name: str, records: Sequence[EvaluatedRecords], calibration: Array | None) -> Contender:
     mine = [one for one in records if one.detector == name]
     healthy = np.hstack([one.decisions.ravel() for one in mine if one.scenario.is_healthy])
     return Contender(healthy, [one.from_onset()[0] for one in mine if not one.scenario.is_healthy], calibration)
@@ -144,7 +144,7 @@ def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:
         "within_limit": bool(means.loc["PFA", "ci_low"] <= limit),
         **dict(zip(["pod", "pod_ci_low", "pod_ci_high"], means.loc["POD"], strict=True)),
         "time_to_detection": pd.Series(waits).mean() if is_known else np.nan,
-        "not_judged": rows["n_not_evaluated"].sum() / (rows["n_not_evaluated"] + rows["n_records"]).sum(),
+        "not_evaluated": rows["n_not_evaluated"].sum() / (rows["n_not_evaluated"] + rows["n_records"]).sum(),
     }
 
 
@@ -196,7 +196,7 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
-    unseen = ranked.loc[ranked["not_judged"] > 0, "not_judged"]
+    unseen = ranked.loc[ranked["not_evaluated"] > 0, "not_evaluated"]
     shares = [f"{name!r} {share:.1%}" for name, share in unseen.items()]
     lines += [f"Records that are not evaluated, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
     lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]

@@ -1,5 +1,7 @@
 """Rates of alarms in many replicates, and the bands that a measured campaign should lie in."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -15,12 +17,20 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import ModelWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._families import FamilyRates
-from skthermo.studies.detectability._judged import SIMULATED, JudgedRecords, Judgement, Key
-from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
-from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod_curve
+from skthermo.studies.detectability._simulation import (
+    LARGEST_SEED,
+    SIMULATED,
+    EvaluatedRecords,
+    Evaluation,
+    Key,
+    Simulation,
+    clean_frequencies,
+)
 from skthermo.studies.replicates import Replicates
+from skthermo.studies.scenarios import BaseScenario
 
 N_DRAWS = 3  # draws of the noise in each replicate, which tell its share from that of what else varies
 MOST_FAILURES = 0.5  # share of replicates that may fail
@@ -31,7 +41,7 @@ NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 @dataclass(frozen=True, eq=False)
 class ReplicateRates:
     """Rates of alarms in replicates, (n_replicates, n_parts, n_draws), by detector and scenario, as parts are added
-    one after the other, and ``own`` rates of the study's repeats; ``n_records`` are judged in each draw, and
+    one after the other, and ``own`` rates of the study's repeats; ``n_records`` are evaluated in each draw, and
     ``with_noise`` tells whether bands hold the noise, too."""
 
     rates: Mapping[Key, Array]
@@ -43,11 +53,16 @@ class ReplicateRates:
 
     @classmethod
     def of(
-        cls, simulation: Simulation, judgement: Judgement, replicates: Replicates, n_jobs: int | None, verbose: int = 0
-    ) -> "ReplicateRates":
-        """Judge the records of every replicate; those that fail are counted in a warning, unless most fail.
+        cls,
+        simulation: Simulation,
+        evaluation: Evaluation,
+        replicates: Replicates,
+        n_jobs: int | None,
+        verbose: int = 0,
+    ) -> ReplicateRates:
+        """Evaluate the records of every replicate; those that fail are counted in a warning, unless most fail.
 
-        Given are the simulation of the study and how its detectors have judged the records of the repeats.
+        Given are the simulation of the study and the evaluation of its repeats.
         """
         simulation = replace(simulation, clean={}, reference=None)
         jobs = (delayed(_rates_of_replicate)(simulation, replicates, number) for number in range(len(replicates.seeds)))
@@ -64,9 +79,10 @@ class ReplicateRates:
             warn_user(
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
+                ModelWarning,
                 "failed replicates",
             )
-        own = _counted(judgement, simulation.scenarios, simulation.T)
+        own = _counted(evaluation, simulation.scenarios, simulation.T)
         keys = [key for key in found[0] if all(key in one for one in (own, *found))]
         rates = {key: np.array([one[key][0] for one in found]) for key in keys}
         n_records = {key: float(np.mean([one[key][1] for one in found])) for key in keys}
@@ -96,7 +112,7 @@ class ReplicateRates:
 
         Student's law on the scale of the logit: of few replicates, quantiles are hardly known.
         """
-        spread, number = WorldSpread.of(self.logits(key)), len(self.rates[key])
+        spread, number = Spread.of(self.logits(key)), len(self.rates[key])
         variance = spread.between + self.with_noise * spread.within
         margin = t.ppf((1 + confidence) / 2, number - 1) * np.sqrt(variance * (1 + 1 / number))
         lowest, highest = self._rates(spread.mean + np.array([-margin, margin]), key)
@@ -165,14 +181,14 @@ class ReplicateRates:
         """Standard deviation of the rate due to each part."""
         steps = self.rates[key]
         changes = np.concatenate([steps[:, :1], np.diff(steps, axis=1)], axis=1)
-        deviations = {"noise": np.sqrt(WorldSpread.of(steps[:, -1]).within)} if self.with_noise else {}
+        deviations = {"noise": np.sqrt(Spread.of(steps[:, -1]).within)} if self.with_noise else {}
         for number, part in enumerate(self.parts):
-            deviations[part] = np.sqrt(WorldSpread.of(changes[:, number]).between)
+            deviations[part] = np.sqrt(Spread.of(changes[:, number]).between)
         return deviations
 
 
 @dataclass(frozen=True)
-class WorldSpread:
+class Spread:
     """Mean of values, (n_replicates, n_draws), and their variances between replicates and within them."""
 
     mean: float
@@ -180,7 +196,7 @@ class WorldSpread:
     within: float
 
     @classmethod
-    def of(cls, values: Array) -> "WorldSpread":
+    def of(cls, values: Array) -> Spread:
         """Analysis of variance of values, (n_replicates, n_draws)."""
         means, within = values.mean(axis=1), float(values.var(axis=1, ddof=1).mean())
         between = max(float(means.var(ddof=1)) - within / values.shape[1], 0.0)
@@ -188,7 +204,7 @@ class WorldSpread:
 
 
 def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: int) -> Any:
-    """Rates, (n_parts, n_draws), and numbers of judged records by detector and scenario; or the text of an error."""
+    """Rates, (n_parts, n_draws), and numbers of evaluated records by detector and scenario; or the text of an error."""
     with without_warnings(), single_blas_thread():
         random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
         seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
@@ -206,30 +222,26 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
 
 
 def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int) -> dict[Key, tuple[Array, float]]:
-    """Rates of alarms, (n_draws,), and the mean number of judged records, by detector and scenario."""
+    """Rates of alarms, (n_draws,), and the mean number of evaluated records, by detector and scenario."""
     clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first)
     drawn = replace(simulation, fem=chain, T=T, clean=clean)
-    judgement = Judgement()
+    repeats: list[Evaluation] = []
     for number, pair in enumerate(seeds):
-        one = Judgement(errors=judgement.errors)
-        for records in drawn.records(simulation.scenarios, number, pair):
-            drawn.judge(replace(records, healthy=None), one)
-        for key, decisions in one.decisions.items():
-            judgement.decisions.setdefault(key, []).extend(decisions)
-    found = _counted(judgement, simulation.scenarios, T)
+        records = (replace(one, healthy=None) for one in drawn.records(simulation.scenarios, number, pair))
+        repeats.append(drawn.evaluate(records, repeats[-1].errors if repeats else {}))
+    found = _counted(repeats[0].with_repeats(repeats[1:]), simulation.scenarios, T)
     return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
 
 
-def _counted(judgement: Judgement, scenarios: Any, T: Any) -> dict[Key, tuple[Array, float]]:
-    """Rates of alarms among simulated records, (n_repeats,), and how many are judged, by detector and scenario."""
+def _counted(evaluation: Evaluation, scenarios: Sequence[BaseScenario], T: Any) -> dict[Key, tuple[Array, float]]:
+    """Rates of alarms among simulated records, (n_repeats,), and how many are evaluated, by detector and scenario."""
     rows, by_name = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T)))), {one.name: one for one in scenarios}
     found = {}
-    for (name, scenario, source), decisions in judgement.decisions.items():
+    for (name, scenario, source), decisions in evaluation.decisions.items():
         if source == SIMULATED:
-            records = JudgedRecords(name, by_name[scenario], source, rows, np.array(decisions))
-            counted = records.from_onset()[0]
-            judged = (~np.isnan(counted)).sum(axis=1)
-            found[name, scenario] = (counted < 0).sum(axis=1) / np.maximum(judged, 1), float(judged.mean())
+            counted = EvaluatedRecords(name, by_name[scenario], source, rows, decisions).from_onset()[0]
+            evaluated = (~np.isnan(counted)).sum(axis=1)
+            found[name, scenario] = (counted < 0).sum(axis=1) / np.maximum(evaluated, 1), float(evaluated.mean())
     return found
 
 

@@ -1,25 +1,163 @@
-"""Simulated and reference records of all scenarios, as the detectors of a study judge them."""
+"""Simulated and reference records of all scenarios, and how the detectors of a study evaluate them."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
 from joblib import delayed
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import without_warnings
+from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.times import row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._judged import REFERENCE, SIMULATED, Judgement
-from skthermo.studies.detectability._waits import damaged_rows, transitions_of
+from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.scenarios import BaseScenario
+
+SIMULATED, REFERENCE = "simulated", "reference"
+
+Answer = TypeVar("Answer")
+Key: TypeAlias = tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluatedRecords:
+    """What a detector makes of the records of one scenario and source: their damage index in the first repeat, with
+    their index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
+
+    detector: str
+    scenario: BaseScenario
+    source: str
+    damage_index: pd.Series
+    decisions: Array
+
+    def from_onset(self) -> tuple[Array, Array]:
+        """Decisions from the onset of the damage on, in order of time, and the times since then."""
+        times, onset = row_times(self.damage_index), self.scenario.onset
+        start = times.min() if onset is None else time_of(self.damage_index, onset, "onset")
+        order = np.argsort(times, kind="stable")
+        order = order[times[order] >= start]
+        return self.decisions[:, order], times[order] - start
+
+    def summary(self, confidence: float) -> dict[str, Any]:
+        """Rates, bounds and time to detection, from the onset of the damage on."""
+        scenario, (decisions, waits) = self.scenario, self.from_onset()
+        rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
+        if not rate.n_records:
+            raise ValueError(
+                f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
+                "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
+                "after the onset"
+            )
+        pi_low, pi_high = band_of(decisions, confidence)
+        return {
+            "detector": self.detector,
+            "scenario": scenario.name,
+            "family": scenario.family,
+            "severity": scenario.severity,
+            "source": self.source,
+            "measure": "PFA" if scenario.is_healthy else "POD",
+            "rate": rate.rate,
+            "ci_low": rate.lowest,
+            "ci_high": rate.highest,
+            "pi_low": pi_low,
+            "pi_high": pi_high,
+            "n_alarms": rate.n_alarms,
+            "n_records": rate.n_records,
+            "n_not_evaluated": decisions.size - rate.n_records,
+            "n_effective": rate.n_effective,
+            "n_repeats": len(decisions),
+            "time_to_detection": _mean_wait(decisions < 0, waits, self.damage_index),
+            "error": "",
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What detectors decided in the repeats of a study, by detector, scenario and source.
+
+    ``decisions`` have shape (n_repeats, n_records); ``transitions``, (n_repeats, n_onsets, n_window), are those of
+    detectors with windows on records that are damaged after some onsets only. ``calibration`` holds decisions on
+    healthy records with noise of other seeds, by detector and source, ``indices`` the damage indices of the first
+    repeat, and ``errors`` those of the detectors that failed, by name.
+    """
+
+    decisions: Mapping[Key, Array]
+    errors: Mapping[str, Exception]
+    transitions: Mapping[Key, Array] = field(default_factory=dict)
+    calibration: Mapping[Key, Array] = field(default_factory=dict)
+    indices: Mapping[Key, pd.Series] = field(default_factory=dict)
+
+    def with_repeats(self, later: Sequence[Evaluation]) -> Evaluation:
+        """This evaluation and those of later repeats together."""
+        joined = {}
+        for name in ("decisions", "transitions", "calibration"):
+            repeats = [getattr(one, name) for one in (self, *later)]
+            joined[name] = {key: np.concatenate([one[key] for one in repeats if key in one]) for key in repeats[0]}
+        errors = dict(self.errors)
+        for one in later:
+            errors |= one.errors
+        return replace(self, errors=errors, **joined)
+
+    def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
+        """Those of a detector, in the order of the scenarios."""
+        return [
+            EvaluatedRecords(detector, scenario, source, self.indices[key], self.decisions[key])
+            for scenario in scenarios
+            for source in (SIMULATED, REFERENCE)
+            if (key := (detector, scenario.name, source)) in self.decisions
+        ]
+
+
+def ask_each(
+    detectors: Iterable[str], question: Callable[[str], Answer], errors: Mapping[str, Exception]
+) -> tuple[dict[str, Answer], dict[str, Exception]]:
+    """Answers of detectors that have not failed before, and all errors, new ones included.
+
+    The first error is raised if no detector is left.
+    """
+    asked, found, errors = [name for name in detectors if name not in errors], {}, dict(errors)
+    for name in asked:
+        try:
+            with warnings_of_detector(name if len(asked) > 1 else None):
+                found[name] = question(name)
+        except Exception as error:
+            errors[name] = error
+    if not found:
+        raise next(iter(errors.values()))
+    return found, errors
+
+
+def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
+    """Range that holds the rate of one more repeat with this probability, or that of all repeats if they are too few.
+
+    Of n rates, the k-th smallest exceeds that of one more repeat with probability k / (n + 1). One rate has no range.
+    """
+    evaluated = (~np.isnan(decisions)).sum(axis=1)
+    rates = (decisions < 0).sum(axis=1)[evaluated > 0] / evaluated[evaluated > 0]
+    if len(rates) < 2:
+        return float("nan"), float("nan")
+    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2], method="weibull")
+    return float(lowest), float(highest)
+
+
+def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Any) -> Any:
+    """Mean time to the first alarm over the repeats that have one, in records or as a Timedelta."""
+    detected = alarms[alarms.any(axis=1)].argmax(axis=1)
+    if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
+        return pd.Timedelta(int(waits[detected].mean()), "ns") if detected.size else pd.NaT
+    return float(detected.mean()) if detected.size else float("nan")
+
 
 LARGEST_SEED = np.iinfo(np.int32).max
 
@@ -40,9 +178,10 @@ class Records:
     @property
     def has_onsets(self) -> bool:
         """Whether damage that is there from the beginning may be thought to begin at any record."""
-        return self.source == SIMULATED and not self.scenario.is_healthy and self.scenario.onset is None
+        is_known = self.source == SIMULATED and self.healthy is not None
+        return is_known and not self.scenario.is_healthy and self.scenario.onset is None
 
-    def beginning(self, memory: int) -> "Records":
+    def beginning(self, memory: int) -> Records:
         """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
         damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
         return replace(self, values=np.where(damaged, self.values, self.healthy))
@@ -63,16 +202,17 @@ class Measurement:
     outliers: Any
 
     @classmethod
-    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> "Measurement":
+    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
-        return cls(noise, gaps, fem.service_records(outliers) if np.ndim(outliers) else outliers)
+        return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
     def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
         """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
-        noise = fem.draw_noise(T, self.noise, gaps=self.gaps, outliers=self.outliers, random_state=seed)
+        weather = fem.weather(T)
+        noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
         if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
             return noise, T
-        missing = fem.draw_gaps(T, self.gaps, outliers=self.outliers, random_state=seed)[0]
+        missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
         return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
 
 
@@ -89,43 +229,38 @@ class Simulation:
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
-    def first_repeat(self, judgement: Judgement, measured: Mapping[str, Any], seeds: Sequence[int]) -> None:
-        """Judge the records of the first repeat and measured ones.
+    def first_repeat(
+        self, measured: Mapping[str, Any], seeds: Sequence[int], errors: Mapping[str, Exception]
+    ) -> Evaluation:
+        """Evaluate the records of the first repeat and measured ones.
 
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
-        for records in self.records(self.scenarios, 0, seeds):
-            self.judge(records, judgement, with_indices=True)
+        records = itertools.chain(self.records(self.scenarios, 0, seeds), self._measured(measured))
+        found = self.evaluate(records, errors, with_indices=True)
+        with without_warnings():
+            return self._calibrated(found, 0, seeds)
+
+    def without(self, failed: Collection[str]) -> Simulation:
+        """The same without the detectors that failed."""
+        return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
+
+    def other_repeats(self, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0) -> list[Evaluation]:
+        """Evaluate the records of later repeats; the warnings of the first are the only ones given."""
+        with without_warnings():
+            jobs = (delayed(self._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
+            return run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose)
+
+    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Evaluation:
+        with without_warnings(), single_blas_thread():
+            return self._calibrated(self.evaluate(self.records(self.scenarios, number, seeds), {}), number, seeds)
+
+    def _measured(self, measured: Mapping[str, Any]) -> Iterator[Records]:
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
-                records = Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
-                self.judge(records, judgement, with_indices=True)
-        with without_warnings():
-            self._calibrate(judgement, 0, seeds)
-
-    def without(self, failed: Collection[str]) -> "Simulation":
-        """The same without the detectors that failed."""
-        return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
-
-    def other_repeats(
-        self, judgement: Judgement, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
-    ) -> None:
-        """Judge the records of later repeats, too; the warnings of the first are the only ones given."""
-        left = self.without(judgement.errors)
-        with without_warnings():
-            jobs = (delayed(left._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            for later in run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose):
-                judgement.extend(later)
-
-    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Judgement:
-        judgement = Judgement()
-        with without_warnings(), single_blas_thread():
-            for records in self.records(self.scenarios, number, seeds):
-                self.judge(records, judgement)
-            self._calibrate(judgement, number, seeds)
-        return judgement
+                yield Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
 
     def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
         """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
@@ -151,34 +286,59 @@ class Simulation:
         with without_warnings():
             return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
 
-    def judge(self, records: Records, judgement: Judgement, with_indices: bool = False) -> None:
-        """Add the decisions of every detector and, if asked, its damage indices."""
+    def evaluate(
+        self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
+    ) -> Evaluation:
+        """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another."""
+        decisions, transitions, indices = {}, {}, {}
+        for one in records:
+            answers, errors = ask_each(self.candidates, partial(self._answer, one, with_indices), errors)
+            for name, (index, decided, during) in answers.items():
+                key = name, one.scenario.name, one.source
+                decisions[key] = decided[np.newaxis]
+                if during is not None:
+                    transitions[key] = during[np.newaxis]
+                if with_indices:
+                    indices[key] = index
+        return Evaluation(decisions, errors, transitions, indices=indices)
 
-        def judged(name: str) -> tuple[Any, Array, Array | None]:
-            candidate = self.candidates[name]
-            seen, memory, during = records.seen_by(candidate), candidate.memory, None
-            if memory > 1 and records.has_onsets:
-                with without_warnings():
-                    during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
-            index = candidate.damage_index(seen, records.rows) if with_indices else None
-            return index, candidate.decisions(seen), during
+    def _answer(self, records: Records, with_index: bool, name: str) -> tuple[Any, Array, Array | None]:
+        """Damage index, decisions and those of transitions of one detector."""
+        candidate = self.candidates[name]
+        seen, memory, during = records.seen_by(candidate), candidate.memory, None
+        if memory > 1 and records.has_onsets:
+            with without_warnings():
+                during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
+        index = candidate.damage_index(seen, records.rows) if with_index else None
+        return index, candidate.decisions(seen), during
 
-        for name, (index, decisions, during) in judgement.ask(self.candidates, judged).items():
-            key = name, records.scenario.name, records.source
-            judgement.decisions[key] = [decisions]
-            if during is not None:
-                judgement.transitions[key] = [during]
-            if with_indices:
-                judgement.indices[key] = index
-
-    def _calibrate(self, judgement: Judgement, repeat: int, seeds: Sequence[int]) -> None:
-        """Add decisions on healthy records with noise of other seeds."""
+    def _calibrated(self, found: Evaluation, repeat: int, seeds: Sequence[int]) -> Evaluation:
+        """The evaluation with decisions on healthy records with noise of other seeds."""
         healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
+        if not healthy:
+            return found
         others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
-        for records in self.records(healthy, repeat, others) if healthy else ():
-            found = Judgement(errors=judgement.errors)
-            self.judge(records, found)
-            judgement.calibration.update({(key[0], key[2]): some for key, some in found.decisions.items()})
+        again = self.evaluate(self.records(healthy, repeat, others), found.errors)
+        calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
+        return replace(found, errors=again.errors, calibration=calibration)
+
+
+def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
+    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
+    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
+    return onsets if onsets.size else np.array([n_records // 2])
+
+
+def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
+    """Which records are damaged, a window after each of these onsets."""
+    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
+    return ((after >= 0) & (after < n_window)).any(axis=1)
+
+
+def transitions_of(decisions: Array, n_window: int) -> Array:
+    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
+    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
+    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
 
 
 def clean_frequencies(

@@ -4,34 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from functools import wraps
+from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo._estimators.arguments import check_jobs
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
-from skthermo._tables.arrays import Array, as_random_state, positive_integer
+from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
+from skthermo.exceptions import ResultWarning
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._judged import Judgement
-from skthermo.studies.detectability._pod_curve import PODCurve, check_probability
+from skthermo.studies.detectability._pod_curve import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
+    ask_each,
     clean_frequencies,
 )
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
+P, Answer = ParamSpec("P"), TypeVar("Answer")
 
 
 def _found_attribute(name: str) -> Any:
@@ -41,11 +44,21 @@ def _found_attribute(name: str) -> Any:
     )
 
 
+def _of_findings(method: Callable[Concatenate[StudyFindings, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
+    """A method of a study that its last run's findings answer, with their docstring and signature."""
+
+    @wraps(method)
+    def answer(study: Any, *args: P.args, **options: P.kwargs) -> Answer:
+        return method(study._found(), *args, **options)
+
+    return answer
+
+
 class DetectabilityStudy(BaseEstimator):
     """Simulated test of detectors: which damage each would find, and how often it would raise false alarms.
 
     A fitted chain simulates the structure in every scenario under the same weather, and detectors that have learned the
-    healthy structure judge the records, all of them the same.
+    healthy structure evaluate the records, all of them the same.
 
     Parameters
     ----------
@@ -98,7 +111,8 @@ class DetectabilityStudy(BaseEstimator):
     Attributes
     ----------
     findings_ : StudyFindings
-        All that the last `run` found, which nothing changes afterwards; the attributes and methods below read it.
+        All that the last `run` found, which nothing changes afterwards; the attributes below are its, and so are all
+        methods but `run`, which raise a ``NotFittedError`` before.
     results_ : DataFrame
         What `run` returned.
     detectors_ : dict of str to detector
@@ -116,7 +130,7 @@ class DetectabilityStudy(BaseEstimator):
         with two windows from one to the next, while a window still holds healthy records; for `time_to_detection`.
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
-        `ranking` moves thresholds by them; nothing else is judged by them. Measured records have none.
+        `ranking` moves thresholds by them; nothing else is evaluated by them. Measured records have none.
     arrangements_ : dict of str to object
         Columns that each detector sees, and the number of healthy records that it has learned.
     uncertainty_ : DataFrame or None
@@ -143,7 +157,7 @@ class DetectabilityStudy(BaseEstimator):
     Notes
     -----
     All scenarios and sources have the same weather, and repeat r has the same noise, gaps and outliers in all scenarios
-    (common random numbers), and all detectors judge the same records, so that differences between scenarios or
+    (common random numbers), and all detectors evaluate the same records, so that differences between scenarios or
     detectors are more certain than each rate. A detector's rates do not depend on which others are in the study.
 
     The bounds ``ci_low`` and ``ci_high`` are those of a rate over noise, for this weather, this baseline and this
@@ -235,6 +249,16 @@ class DetectabilityStudy(BaseEstimator):
     confidence_ = _found_attribute("confidence")
     warnings_ = _found_attribute("warnings")
 
+    pod_curve = _of_findings(StudyFindings.pod_curve)
+    minimum_detectable_damage = _of_findings(StudyFindings.minimum_detectable_damage)
+    time_to_detection = _of_findings(StudyFindings.time_to_detection)
+    is_undetected = _of_findings(StudyFindings.is_undetected)
+    ranking = _of_findings(StudyFindings.ranking)
+    labelled_scores = _of_findings(StudyFindings.labelled_scores)
+    summary = _of_findings(StudyFindings.summary)
+    uncertainty_summary = _of_findings(StudyFindings.uncertainty_summary)
+    detector_name = _of_findings(StudyFindings.detector_name)
+
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -281,8 +305,8 @@ class DetectabilityStudy(BaseEstimator):
               the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN). That of reference
               records holds their noise alone;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
-              detector can judge;
-            - ``n_not_evaluated``: number of records that it cannot judge, which count neither as healthy nor as alarms;
+              detector can evaluate;
+            - ``n_not_evaluated``: number of the other records, which count neither as healthy nor as alarms;
             - ``time_to_detection``: from the onset or the first record to the first alarm, in records or, for frames on
               a ``DatetimeIndex``, in time; the mean over those repeats that have an alarm;
             - ``error``: "" where all is well. A detector that fails has one row with its error, and NaN elsewhere.
@@ -290,9 +314,9 @@ class DetectabilityStudy(BaseEstimator):
         Raises
         ------
         ValueError
-            If names of scenarios repeat, a damage group is unknown, columns do not fit, or no record can be judged; if
-            most replicates fail, or "model" is asked for and no models can be drawn. An error of a detector is raised
-            if it is the only one, or if all fail.
+            If names of scenarios repeat, a damage group is unknown, columns do not fit, or no record can be evaluated;
+            if most replicates fail, or "model" is asked for and no models can be drawn. An error of a detector is
+            raised if it is the only one, or if all fail.
 
         Warns
         -----
@@ -311,11 +335,11 @@ class DetectabilityStudy(BaseEstimator):
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
-        judgement, stages = Judgement(), Stages(self, 4 + bool(replicates.parts))
+        stages = Stages(self, 4 + bool(replicates.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             parts = seeded(self.random_state)
-            candidates = judgement.ask(
-                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts)
+            candidates, errors = ask_each(
+                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts), {}
             )
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
@@ -323,419 +347,22 @@ class DetectabilityStudy(BaseEstimator):
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
-                simulation.first_repeat(judgement, measured, seeds[0])
+                first = simulation.first_repeat(measured, seeds[0], errors)
+        progress = max(self.verbose - 1, 0)
         with stages.stage(f"other {n_repeats - 1} repeats"):
-            simulation.other_repeats(judgement, seeds, self.n_jobs, verbose=max(self.verbose - 1, 0))
+            later = simulation.without(first.errors).other_repeats(seeds, self.n_jobs, progress)
+            evaluation = first.with_repeats(later)
         rates = None
         if replicates.parts:
             with stages.stage(f"{len(replicates.seeds)} replicates"):
-                left = simulation.without(judgement.errors)
-                rates = ReplicateRates.of(left, judgement, replicates, self.n_jobs, max(self.verbose - 1, 0))
-        self.findings_ = StudyFindings.of(judgement, candidates, scenarios, list(detectors), rates, confidence, texts)
-        doubt = self.findings_.many_false_alarms()
+                left = simulation.without(evaluation.errors)
+                rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, progress)
+        found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
+        doubt = found.many_false_alarms()
+        self.findings_ = replace(found, warnings=[*texts, doubt]) if doubt else found
         if doubt:
-            self.findings_ = replace(self.findings_, warnings=[*texts, doubt])
-            warn_user(doubt, "many false alarms")
+            warn_user(doubt, ResultWarning, "many false alarms")
         return self.findings_.table
-
-    def pod_curve(
-        self, family: str, source: str = "simulated", *, log: bool = False, detector: str | None = None
-    ) -> PODCurve:
-        """Probability of detection over severity for one family of scenarios.
-
-        Parameters
-        ----------
-        family : str
-            Of the scenarios.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        log : bool, default=False
-            Whether the logit is linear in the logarithm of the severity.
-        detector : str, optional
-            Name of the detector, where there are several.
-
-        Returns
-        -------
-        PODCurve
-            Records count as their effective numbers, so that serial correlation is in its bounds. Its `PODCurve.band`
-            and ``a90_band`` hold all that ``uncertainty`` names.
-
-        Raises
-        ------
-        ValueError
-            If there is no such family, the curve cannot be fitted, or there are several detectors and none is named.
-
-        Warns
-        -----
-        UserWarning
-            If the curve has no finite slope, or lies outside the bounds of some tested severities.
-        """
-        return self._found().pod_curve(family, source, log=log, detector=detector)
-
-    def minimum_detectable_damage(
-        self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
-    ) -> pd.DataFrame:
-        """Smallest severity that is detected reliably, for every family and source.
-
-        Parameters
-        ----------
-        level : float, default=0.9
-            Probability of detection that counts as reliable.
-        method : {"grid", "curve"}, default="grid"
-            Of the tested severities the smallest from which the rate stays at or above the level (bounds: the same for
-            the upper and the lower bounds of the rates); or where the fitted curve and its two-sided bounds reach it.
-        detector : str, optional
-            Name of one of several detectors; by default all.
-
-        Returns
-        -------
-        DataFrame
-            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``ci_low`` and
-            ``ci_high``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
-            not increase, or a family has one severity only, ``mdd`` is NaN and the bounds are the two tested severities
-            between which it lies. Detectors that failed are left out. With replicates, also ``pi_low`` and
-            ``pi_high``, between which that of a measured campaign should lie: quantiles over the replicates, infinite
-            if the level may not be reached.
-
-        Raises
-        ------
-        ValueError
-            If there is no family, the level is not between 0 and 1, a family has both damage and strengthening, or
-            there is no such detector.
-
-        Warns
-        -----
-        UserWarning
-            If a curve has no finite slope or lies outside the bounds of some tested severities, or there is none
-            because the POD does not increase. Of texts that differ in their numbers only, the first is given.
-        """
-        return self._found().minimum_detectable_damage(level, method, detector)
-
-    def time_to_detection(
-        self,
-        within: Sequence[str | int] | None = None,
-        level: float = 0.95,
-        *,
-        source: str = "simulated",
-        confidence: float | None = None,
-        detector: str | None = None,
-        smallest: bool = False,
-    ) -> pd.DataFrame:
-        """How soon damage is found: the chance to find it within some times, and the time within which it is found.
-
-        Damage may begin at any time of the records, so that each season counts with its own weather: all onsets count
-        alike, and after the last record comes the first one again. The damage of a scenario with an onset of its own
-        begins there. It is found with the first alarm.
-
-        Parameters
-        ----------
-        within : sequence of str or int, optional
-            Times such as "7D", or numbers of records where the weather has no ``DatetimeIndex``. By default a day, a
-            week and 30 days, or 1, 7 and 30 records.
-        level : float, default=0.95
-            Share of the cases in which damage is found reliably.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        confidence : float, optional
-            Of the bounds, two-sided; by default that of the study.
-        detector : str, optional
-            Name of one of several detectors; by default all.
-        smallest : bool, default=False
-            Whether to give only one row for each detector and family: the smallest severity that is found reliably
-            within the longest of the times, or the largest one where none is.
-
-        Returns
-        -------
-        DataFrame
-            One row for each detector and scenario:
-
-            - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
-            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D ci_low`` and
-              ``7D ci_high``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
-              within the same time, which would have come without damage, too (NaN without a healthy scenario). NaN
-              where the time is shorter than that between two records, or longer than all of them;
-            - ``median``: time within which half of the cases are found;
-            - ``reliable``: the same for the share ``level``, and ``reliable highest``: time from which the lower
-              bound of the probability is as high. NaT (NaN) where that takes longer than the records;
-            - ``not_judged``: share of the time without a record that is judged, which delays what is found;
-            - ``text``: in words, after the name of the scenario.
-
-            Times are counted in the usual time between records, from the one before the onset on. They are numbers of
-            records where there are no stamps.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If a time is none, the level is not between 0 and 1, or there is no such source or detector.
-
-        Notes
-        -----
-        A probability is the share of onsets in all repeats. Those next to each other wait for the same alarm: bounds
-        allow for this dependence as those of rates do. They hold the noise alone, as all of the study's.
-
-        An alarm within the time may be a false one: compare the two probabilities. With a probability h of the
-        healthy structure, damage that changes nothing is "found" in the share h of the cases.
-
-        Windows that begin before the damage and end in it are judged as such, at the onsets of ``transitions_``, which
-        are fewer.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.detection import MahalanobisDetector
-        >>> from skthermo.studies import DetectabilityStudy, sweep
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
-        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
-        >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
-        >>> results = study.run(weather)
-        >>> waits = study.time_to_detection(["1D", "7D"]).set_index("scenario")
-        >>> waits[["1D", "7D", "7D ci_low", "7D ci_high", "7D healthy"]].round(2)
-                       1D    7D  7D ci_low  7D ci_high  7D healthy
-        scenario
-        healthy      0.02  0.10       0.07        0.16         0.1
-        bottom 10 %  0.22  0.83       0.79        0.86         0.1
-        bottom 20 %  0.93  1.00       0.99        1.00         0.1
-        >>> waits[["median", "reliable"]]
-                     median reliable
-        scenario
-        healthy     50 days 274 days
-        bottom 10 %  3 days  13 days
-        bottom 20 %  1 days   2 days
-        """
-        return self._found().time_to_detection(
-            within, level, source=source, confidence=confidence, detector=detector, smallest=smallest
-        )
-
-    def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
-        """Whether no severity of a family raises clearly more alarms than the healthy structure does.
-
-        Parameters
-        ----------
-        family : str
-            Of the scenarios.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        detector : str, optional
-            Name of the detector, where there are several.
-
-        Returns
-        -------
-        bool
-            True if no rate is above the highest upper bound of the rates of false alarms.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If there is no such family or source, or there are several detectors and none is named.
-        """
-        return self._found().is_undetected(family, source, detector)
-
-    def ranking(
-        self,
-        max_false_alarms: float = 0.02,
-        source: str = "simulated",
-        confidence: float | None = None,
-        *,
-        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
-    ) -> pd.DataFrame:
-        """Detectors in the order of what they find, with what is not significant.
-
-        First stand those that keep the limit of false alarms, in the order of their probability of detection (POD),
-        then the others, those with the fewest false alarms first.
-
-        Parameters
-        ----------
-        max_false_alarms : float, default=0.02
-            Limit of the share of healthy records in alarm.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        confidence : float, optional
-            Of the bounds, two-sided; by default that of the study.
-        by : {"pod", "pod_at_equal_pfa"}, default="pod"
-            What is compared: detectors as they are, or with thresholds moved to equal false alarms.
-
-        Returns
-        -------
-        DataFrame
-            One row for each detector, indexed by ``detector``, best first, those that failed last:
-
-            - ``false_alarms``, ``false_alarms_ci_low``, ``false_alarms_ci_high``: rate and bounds, means over the
-              healthy scenarios;
-            - ``within_limit``: False only where the lower bound is above the limit;
-            - ``pod``, ``pod_ci_low``, ``pod_ci_high``: the same of the damaged scenarios;
-            - ``pod_at_equal_pfa``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the
-              limit
-              (less where indices are tied); NaN for measured records, which have no calibration;
-            - ``pod_deficit``, ``pod_deficit_ci_low``, ``pod_deficit_ci_high``: POD of the first row less that of this
-              one, by the
-              measure of the order; the bounds hold for all rows together, and are NaN where there is one repeat;
-            - ``significantly_worse``: whether the lower bound is above 0. The choice among the others is not
-              significant;
-            - ``auc``: area under the ROC curve, the mean over the damaged scenarios; 0.5 is chance;
-            - ``time_to_detection``: mean over the damaged scenarios; NaN where one of them raises no alarm;
-            - ``not_judged``: share of the records that the detector cannot judge, which count nowhere else;
-            - for each family ``pod FAMILY``, ``pod FAMILY ci_low``, ``pod FAMILY ci_high`` and ``mdd FAMILY``, the
-              minimum detectable damage at a POD of 0.9 (NaN: not reached, or the severities have no order);
-            - ``error``: "", or the error of a detector that failed.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If no scenario of this source is healthy, or none is damaged, or ``by="pod_at_equal_pfa"`` and there are no
-            healthy records to move thresholds by.
-
-        Notes
-        -----
-        The default order is by detectors as they will be used. On the truss, simulation and truth agree on it better
-        than on the order at equal false alarms: simulated noise is resampled from the records that the detectors have
-        learned, so that those that overfit them need too low a threshold in the simulation.
-
-        Differences are paired: all detectors judge the same records in every repeat (common random numbers). Their
-        bounds are t intervals of jackknife pseudo-values over the repeats, which hold the error of the moved threshold,
-        too, with Bonferroni's correction for all comparisons with the first row. They hold the noise alone: neither
-        another baseline nor an error of the model is in them. A threshold learned from n independent records at 2 %
-        has itself a true rate with a standard deviation of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
-
-        Examples
-        --------
-        >>> from sklearn.ensemble import IsolationForest
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.detection import MahalanobisDetector, OutlierDetector
-        >>> from skthermo.studies import DetectabilityStudy
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> detectors = {"forest": OutlierDetector(IsolationForest()), "Mahalanobis": MahalanobisDetector()}
-        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
-        >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
-        >>> results = study.run(weather)
-        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
-                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
-        detector
-        Mahalanobis          0.02  0.22              0.21                False
-        forest               0.02  0.18              0.17                False
-        >>> print(study.summary())
-        'Mahalanobis' finds 21.9% of the damaged records at 1.6% false alarms.
-        Not clearly worse: 'forest' (17.8% at 1.6%).
-        This holds the noise alone: other weather, another baseline or an error of the model may change the order.
-        'healthy' raises a false alarm within 1 day in 2, within 7 days in 10, within 30 days in 37 of 100 cases.
-        'bottom 10 %' is found within 13 days in 95 of 100 cases; a healthy structure alarms by then in 18 of 100.
-        """
-        return self._found().ranking(max_false_alarms, source, confidence, by=by)
-
-    def labelled_scores(
-        self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
-    ) -> tuple[NDArray[np.bool_], Array]:
-        """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
-
-        Parameters
-        ----------
-        detector : str, optional
-            Name of the detector, where there are several.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        scenarios : sequence of str, optional
-            Damaged states whose records are put together, from the onset of damage on; by default all.
-
-        Returns
-        -------
-        is_damaged : ndarray of shape (n_records,)
-            Records of all repeats; those that are not evaluated are left out.
-        scores : ndarray of shape (n_records,)
-            Minus the decision function: positive is an alarm.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If the detector is not known, or it has judged no healthy or no damaged records of these scenarios.
-
-        Examples
-        --------
-        Found damage over false alarms, for all thresholds, is ``RocCurveDisplay.from_predictions(
-        *study.labelled_scores("raw"), name="raw")`` of scikit-learn.
-        """
-        return self._found().labelled_scores(detector, source, scenarios)
-
-    def summary(self, max_false_alarms: float = 0.02, source: str = "simulated") -> str:
-        """Which detector finds most, and which are not clearly worse, in plain sentences.
-
-        Parameters
-        ----------
-        max_false_alarms : float, default=0.02
-            Limit of the share of healthy records in alarm.
-        source : str, default="simulated"
-            "simulated" or "reference".
-
-        Returns
-        -------
-        str
-            What `ranking` says, a line for each group of detectors, and what `time_to_detection` says of the first
-            one: of the healthy structure, and of each family the smallest severity that is found reliably.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            As `ranking`.
-        """
-        return self._found().summary(max_false_alarms, source)
-
-    def uncertainty_summary(self, detector: str | None = None) -> str:
-        """What the bands hold, and which part of the widest one is the largest, in plain sentences.
-
-        Parameters
-        ----------
-        detector : str, optional
-            Name of the detector, where there are several.
-
-        Returns
-        -------
-        str
-            A line on what the bands hold, one on the scenario with the widest band, and one on rates that are outside
-            their bands, as those of a model that the training records contradict are.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If there are several detectors and none is named, or the one that is named has no results.
-        """
-        return self._found().uncertainty_summary(detector)
-
-    def detector_name(self, detector: str | None = None) -> str:
-        """Name of the only detector, or a name that is known.
-
-        Parameters
-        ----------
-        detector : str, optional
-            Needed where there are several.
-
-        Returns
-        -------
-        str
-            Of a detector that has results.
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If there are several detectors and none is named, or the one that is named has no results.
-        """
-        return self._found().detector_name(detector)
 
     def _found(self) -> StudyFindings:
         if not hasattr(self, "findings_"):

@@ -12,7 +12,7 @@ from skthermo._tables.arrays import Array, is_real
 from skthermo._tables.text import counted, duration_text
 from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
-from skthermo.studies.detectability._judged import JudgedRecords
+from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_of
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
@@ -78,7 +78,7 @@ class Waits:
     whole_repeats: bool
 
     @classmethod
-    def of(cls, records: JudgedRecords, onset: Any = None, transitions: Array | None = None) -> "Waits":
+    def of(cls, records: EvaluatedRecords, onset: Any = None, transitions: Array | None = None) -> "Waits":
         """Waits from onsets in every step, or from the onset of the scenario or another one alone.
 
         After the last record comes the first one again, so that each season has as many onsets as it has steps.
@@ -87,18 +87,18 @@ class Waits:
         """
         clock = Clock.of(records.damage_index)
         alarms = clock.any_in_step(records.decisions < 0)
-        judged = clock.any_in_step(~np.isnan(records.decisions))
+        evaluated = clock.any_in_step(~np.isnan(records.decisions))
         onset = records.scenario.onset if onset is None else onset
         whole = records.scenario.n_draws > 1
         if onset is not None:
             times, start = row_times(records.damage_index), time_of(records.damage_index, onset, "onset")
             first = int(clock.steps[times >= start].min())
             steps = np.where(alarms[:, first:].any(axis=1), alarms[:, first:].argmax(axis=1) + 1.0, np.inf)
-            return cls(clock, steps[:, np.newaxis], float(1 - judged[:, first:].mean()), True)
+            return cls(clock, steps[:, np.newaxis], float(1 - evaluated[:, first:].mean()), True)
         steps = _until_next(alarms)
         if transitions is not None:
             steps = _after_transitions(clock, steps, transitions < 0)
-        return cls(clock, steps, float(1 - judged.mean()), whole)
+        return cls(clock, steps, float(1 - evaluated.mean()), whole)
 
     def found(self, number: int, confidence: float) -> tuple[float, float, float]:
         """Share of the onsets after which there is an alarm within a number of steps, and its bounds.
@@ -128,24 +128,6 @@ class Waits:
         return float(highest) if highest <= self.clock.n_steps else float("inf")
 
 
-def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
-    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
-    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
-    return onsets if onsets.size else np.array([n_records // 2])
-
-
-def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
-    """Which records are damaged, a window after each of these onsets."""
-    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
-    return ((after >= 0) & (after < n_window)).any(axis=1)
-
-
-def transitions_of(decisions: Array, n_window: int) -> Array:
-    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
-    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
-    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
-
-
 def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:
     """Times by their names in a table: durations, or numbers of records where there are no stamps."""
     if within is None:
@@ -170,7 +152,7 @@ def _time(one: Any, is_stamped: bool) -> Any:
 
 
 def waits_table(
-    records: Mapping[tuple[str, str, str], JudgedRecords],
+    records: Mapping[tuple[str, str, str], EvaluatedRecords],
     transitions: Mapping[tuple[str, str, str], Array],
     within: Any,
     level: float,
@@ -200,7 +182,7 @@ def waits_table(
         row["median"] = waits.clock.time(waits.within(0.5))
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
-        row["not_judged"] = waits.share_not_evaluated
+        row["not_evaluated"] = waits.share_not_evaluated
         text = false_alarms_told(waits, numbers) if scenario.is_healthy else waits_told(waits, false, level)
         rows.append(row | {"text": text})
     table = pd.DataFrame(rows)

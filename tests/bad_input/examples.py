@@ -1,4 +1,5 @@
-"""A valid call of every public function, class and method, with bad values of its arguments (`test_bad_input.py`)."""
+"""A valid call of every public function, class and method, with bad values of its arguments; and calls in which several
+arguments do not go together."""
 
 import importlib
 import inspect
@@ -11,356 +12,51 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import scipy.sparse
+from sklearn.covariance import EmpiricalCovariance
 from sklearn.ensemble import IsolationForest
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import ShuffleSplit
+from sklearn.neighbors import LocalOutlierFactor
 
 import skthermo
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, reporting, studies, surrogate, updating
+from skthermo._estimators.arguments import check_bounds, check_prior
+from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring
+from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
+from tests.bad_input.values import (
+    HUGE,
+    INF,
+    NAN,
+    STAMP,
+    bad,
+    by_key,
+    by_name,
+    choice,
+    count,
+    durations,
+    estimators,
+    flag,
+    instead,
+    integers,
+    jobs,
+    matrix,
+    models,
+    moments,
+    names,
+    number,
+    paths,
+    seed,
+    table,
+    texts,
+    vector,
+    weather,
+)
 
 mpl.use("Agg")
 np.seterr(all="ignore")
 ROOMS = (fem, preprocessing, surrogate, updating, detection, metrics, datasets, studies, plotting, reporting)
-NAN, INF, HUGE = float("nan"), float("inf"), 1e308
-STAMP = pd.Timestamp("2020-01-01")
 FOLDER = Path(tempfile.mkdtemp())
-
-# ------------------------------------------------------------------------------------------- bad values by kind
-
-
-def wrong_types(*but):
-    """Values that are no number."""
-    values = {
-        "true": True,
-        "text": "often",
-        "text of a number": "1",
-        "bytes": b"1",
-        "a time": STAMP,
-        "a duration": pd.Timedelta("1h"),
-        "complex": 1j,
-        "a class": float,
-        "None": None,
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def number(*wrong, but=()):
-    """One real number; ``wrong`` are those out of range."""
-    values = {"NaN": NAN, "infinite": INF, "1e308": HUGE, "several": [0.1, 0.2], "empty": []}
-    values |= {f"out of range: {value}": value for value in wrong}
-    return wrong_types() | {cause: value for cause, value in values.items() if cause not in but}
-
-
-def count(*wrong, but=()):
-    """One integer from 1 on."""
-    return number(1.5, -1, *(() if "zero" in but else (0,)), *wrong, but=but)
-
-
-def flag(*but):
-    """True or False."""
-    values = {"one": 1, "zero": 0, "text": "yes", "None": None, "a number": 0.5, "bytes": b"", "several": [True]}
-    return {cause: value for cause, value in (values | {"NaN": NAN, "a time": STAMP}).items() if cause not in but}
-
-
-def choice(*but):
-    """One of some texts."""
-    values = {"unknown": "else", "empty": "", "number": 3, "true": True, "several": ["a"], "a class": str, "NaN": NAN}
-    return {cause: value for cause, value in (values | {"bytes": b"a", "None": None}).items() if cause not in but}
-
-
-def seed():
-    return {
-        "true": True,
-        "text": "7",
-        "negative": -1,
-        "half": 1.5,
-        "too large": 2**40,
-        "NaN": NAN,
-        "a class": np.random.RandomState,
-        "a generator": np.random.default_rng(0),
-        "several": [1, 2],
-        "bytes": b"1",
-    }
-
-
-def jobs():
-    return {
-        "zero": 0,
-        "true": True,
-        "text": "2",
-        "half": 1.5,
-        "NaN": NAN,
-        "a class": int,
-        "several": [1],
-        "1e308": HUGE,
-    }
-
-
-def names(good, *but):
-    """Several names out of those that are known."""
-    values = {
-        "unknown": ["no such name"],
-        "one unknown": [*good, "no such name"],
-        "repeated": [*good, good[0]],
-        "empty": [],
-        "a number": 3,
-        "numbers": [0.5],
-        "true": True,
-        "bytes": [b"top"],
-        "text that is no name": "topbottom",
-        "None": None,
-        "NaN": [NAN],
-        "a class": str,
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def by_key(good, wrong=(), but=()):
-    """A mapping of names to numbers."""
-    first = next(iter(good))
-    values = {
-        "unknown": {"no such name": 0.1},
-        "a list": list(good),
-        "a number": 0.1,
-        "text": first,
-        "true": True,
-        "a class": dict,
-        "numbered series": pd.Series(list(good.values())),
-        **{f"{cause} inside": {first: value} for cause, value in wrong_types().items()},
-        **{f"{value} inside": {first: value} for value in (NAN, INF, HUGE, *wrong)},
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def vector(good, *, positive=True, size=None, wrong=(), but=()):
-    """Numbers in one row, or one number for all if ``good`` is a number."""
-    array = np.atleast_1d(np.asarray(good, dtype=float))
-
-    def with_first(value):
-        return [value, *array[1:].tolist()]
-
-    values = wrong_types() | {
-        "texts": array.astype(str),
-        "booleans": array > 0,
-        "bytes of numbers": array.astype(bytes),
-        "times": np.full(array.shape, np.datetime64("2020-01-01")),
-        "a category": pd.Series(array).astype("category"),
-        "objects": np.array([True] * len(array), dtype=object),
-        "true inside": with_first(True),
-        "NaN inside": with_first(NAN),
-        "infinite inside": with_first(INF),
-        "1e308 inside": with_first(HUGE),
-        "three axes": array[np.newaxis, np.newaxis],
-        "sparse": scipy.sparse.csr_array(np.atleast_2d(array)),
-        "empty": [],
-    }
-    if positive:
-        values |= {"negative inside": with_first(-0.1), "zero inside": with_first(0.0)}
-    if size:
-        values |= {
-            "too long": np.full(size + 1, array[0]),
-            "other names": pd.Series(array[0], list("abcdefghijk"[:size])),
-        }
-    values |= {f"out of range: {value}": value for value in wrong}
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def by_name(good, labels, **options):
-    """Numbers with names, which may come in another order."""
-    array = np.broadcast_to(np.asarray(good, dtype=float), len(labels)) * np.linspace(1, 1.05, len(labels))
-    series = pd.Series(array, labels)
-    unknown = pd.Series(array, [f"no {label}" for label in labels])
-    values = vector(good, size=len(labels), **options) | {
-        "one name missing": series[1:],
-        "unknown names": unknown,
-        "repeated names": pd.concat([series, series[:1]]),
-        "times as names": pd.Series(array, pd.date_range("2020", periods=len(labels))),
-    }
-    return {cause: value for cause, value in values.items() if cause not in options.get("but", ())}
-
-
-def table(good, *, nan=True, positive=False, fixed=True, rows=True, fitting=False, but=()):
-    """Rows and columns of numbers; ``fixed`` columns, ``rows`` that belong to those of another table."""
-    frame = good if isinstance(good, pd.DataFrame) else pd.DataFrame(good)
-    array, named = frame.to_numpy(), isinstance(good, pd.DataFrame)
-
-    def first(value, dtype=float):
-        changed = array.astype(dtype, copy=True)
-        changed[0, 0] = value
-        return pd.DataFrame(changed, frame.index, frame.columns) if named else changed
-
-    values = wrong_types() | {
-        "texts": frame.astype(str) if named else array.astype(str),
-        "booleans": frame > 0 if named else array > 0,
-        "bytes of numbers": array.astype(bytes),
-        "a column of bytes": first(b"1", object),
-        "times": np.full(array.shape, np.datetime64("2020-01-01")),
-        "objects with true": first(True, object),
-        "objects with text": first("1.0", object),
-        "objects with a time": first(STAMP, object),
-        "complex numbers": array + 1j,
-        "infinite inside": first(INF),
-        "1e308 inside": first(HUGE),
-        "three axes": np.stack([array, array]),
-        "a number": 0.5,
-        "sparse": scipy.sparse.csr_array(np.nan_to_num(array)),
-        "no rows": frame[:0] if named else array[:0],
-        "ragged": [[1.0, 2.0], [1.0]],
-    }
-    if named:
-        column = frame.columns[0]
-        values |= {
-            "a column of times": frame.assign(**{column: pd.date_range("2020", periods=len(frame))}),
-            "a column of durations": frame.assign(**{column: pd.to_timedelta(np.arange(len(frame)), "h")}),
-            "a category": frame.astype({column: "category"}),
-            "nullable booleans": frame.assign(**{column: pd.array([True] * len(frame), dtype="boolean")}),
-            "strings": frame.astype({column: "string"}),
-            "repeated columns": pd.concat([frame, frame.iloc[:, :1]], axis=1),
-            "repeated names": frame.set_axis([column] * frame.shape[1], axis=1) if frame.shape[1] > 1 else None,
-        }
-        if fixed:
-            values |= {
-                "unknown names": frame.add_prefix("no "),
-                "columns in another order": frame.iloc[:, ::-1] if frame.shape[1] > 1 else None,
-            }
-    if fixed:
-        values["a column too few"] = frame.iloc[:, :-1] if named else array[:, :-1]
-        values["a column too many"] = np.column_stack([array, array[:, :1]])
-    if rows:
-        values["a row too few"] = frame[:-1] if named else array[:-1]
-    if not nan:
-        values["NaN inside"] = first(NAN)
-    if fitting:
-        values["NaN throughout"] = frame * NAN if named else array * NAN
-        values["constant"] = frame * 0 + 7.0 if named else array * 0 + 7.0
-    if positive:
-        values |= {"negative inside": first(-1.0), "zero inside": first(0.0)}
-    return {cause: value for cause, value in values.items() if cause not in but and value is not None}
-
-
-def weather(good, **options):
-    """Temperatures in degrees Celsius."""
-    frame = pd.DataFrame(good)
-    values = {
-        "kelvin": good + 273.15,
-        "-999": frame.where(np.tile(np.arange(len(frame)) != 3, (frame.shape[1], 1)).T, -999.0),
-    }
-    return table(good, **options) | (values if isinstance(good, pd.DataFrame) else {"kelvin": good + 273.15})
-
-
-def matrix(good, but=()):
-    """A symmetric matrix."""
-    array = np.asarray(good, dtype=float)
-    skew = array.copy()
-    skew[0, 1] += 1.0
-    values = table(array, nan=False, rows=False, but=("sparse", "no rows")) | {"not symmetric": skew, "empty": []}
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def integers(most, *but):
-    """Different integers below some number."""
-    values = {
-        "too high": [0, most],
-        "negative": [-1],
-        "repeated": [0, 0],
-        "floats": [0.0],
-        "booleans": [True, False],
-        "true inside": [2, True],
-        "texts": ["0"],
-        "a text": "01",
-        "bytes": [b"0"],
-        "times": [STAMP],
-        "empty": [],
-        "a number": 1,
-        "a table": [[0, 1]],
-        "NaN": [NAN],
-        "None": None,
-        "None inside": [None],
-        "a class": int,
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def instead(*values, **more):
-    """Objects in place of an instance of the right class."""
-    found = {"None": None, "a number": 3, "text": "model", "true": True, "a class": AffineModel, "an array": np.ones(3)}
-    found |= {f"{type(value).__name__} or {value!r:.20}": value for value in values} | {"an empty list": []}
-    return found | more
-
-
-def models():
-    return instead(Ridge(), {"E": 1.0}, b"truss")
-
-
-def estimators(*but):
-    values = instead(b"mlp", LinearRegression().fit) | {"a class": Ridge, "no predict": np.random.RandomState(0)}
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def texts(*but):
-    values = {"a number": 3, "true": True, "None": None, "several": ["a"], "bytes": b"a", "empty": "", "NaN": NAN}
-    return {cause: value for cause, value in (values | {"a class": str}).items() if cause not in but}
-
-
-def moments(*but):
-    """A moment of records."""
-    values = {
-        "NaT": pd.NaT,
-        "NaN": NAN,
-        "text": "soon",
-        "half": 1.5,
-        "negative": -1,
-        "true": True,
-        "too late": 10**6,
-        "infinite": INF,
-        "several": [1, 2],
-        "a class": int,
-        "bytes": b"1",
-        "a duration": pd.Timedelta("1D"),
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def durations(*but):
-    values = {
-        "text": "often",
-        "negative": "-1h",
-        "zero": "0h",
-        "NaT": pd.NaT,
-        "months": "1M",
-        "true": True,
-        "NaN": NAN,
-        "a class": pd.Timedelta,
-        "a time": STAMP,
-        "several": ["1h"],
-        "bytes": b"1h",
-        "negative number": -1,
-        "half": 1.5,
-        "1e308": HUGE,
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-def paths(*but):
-    values = {
-        "no file": "no_such_file",
-        "None": None,
-        "a number": 3,
-        "true": True,
-        "bytes": b"file",
-        "a device": "/dev/zero",
-        "an empty device": "/dev/null",
-        "a text file": __file__,
-        "several": ["a"],
-        "a class": Path,
-        "NaN": NAN,
-        "a folder": "/proc/self/fdinfo",
-        "empty": "",
-    }
-    return {cause: value for cause, value in values.items() if cause not in but}
-
-
-# ------------------------------------------------------------------------------------------------- valid examples
 
 
 @dataclass
@@ -377,8 +73,9 @@ class Example:
 EXAMPLES: list[Example] = []
 
 
-def use(name, call=None, /, **arguments):
-    """Register an example: for every argument a good value and its bad ones."""
+def use(name, call=None, /, usual="", **arguments):
+    """Register an example: for every argument a good value and its bad ones, by default those of `USUAL`."""
+    arguments = {argument: USUAL[argument] for argument in usual.split()} | arguments
     of = skthermo
     for part in name.split("."):
         of = importlib.import_module(f"skthermo.{part}") if of is skthermo else getattr(of, part)
@@ -392,20 +89,17 @@ def method(name, owner, **arguments):
     use(name, getattr(owner, name.rpartition(".")[2]), **arguments)
 
 
-def fitted(cls, X, y=None, after=None, name=None, **arguments):
+def fitted(cls, X, y=None, after=None, usual="", **arguments):
     """Register an estimator: its parameters, and X and y of ``fit``."""
     if after is None:
         after = lambda estimator, X: estimator.transform(X)  # noqa: E731
-    room = cls.__module__.split(".")[1]
 
     def call(**values):
         given = [values.pop(part) for part in ("X", "y") if part in values]
         return after(cls(**values).fit(*given), X[0])
 
     data = {"X": X} | ({} if y is None else {"y": y})
-    good = {argument: pair[0] for argument, pair in (arguments | data).items()}
-    bad = {argument: pair[1] for argument, pair in (arguments | data).items()}
-    EXAMPLES.append(Example(name or f"{room}.{cls.__name__}", cls, call, good, bad))
+    use(f"{cls.__module__.split('.')[1]}.{cls.__name__}", call, usual=usual, **arguments, **data)
 
 
 TRUSS = datasets.make_truss()
@@ -431,6 +125,27 @@ BOUNDED = by_name(0.2, NAMES, wrong=(20, 1.0, 0, -0.2), but=("too long",)) | {
 }
 PRIOR = by_name(0.2, NAMES, wrong=(20, 30))
 NOISE = by_name(0.01, MODES, wrong=(0.5, 1.0, 5), but=("zero inside",))
+USUAL = {
+    "random_state": (0, seed()),
+    "model": (TRUSS, models()),
+    "dofs": (DOFS, integers(23)),
+    "noise": (0.01, NOISE),
+    "n_jobs": (1, jobs()),
+    "track": (False, flag()),
+    "lumped": (False, flag()),
+    "contamination": (0.05, number(0, -0.1, 0.6, 2)),
+    "source": ("simulated", texts() | bad("no")),
+    "family": ("top", texts() | bad("no")),
+    "log": (False, flag()),
+    "confidence": (0.9, number(0, 1, 90, -0.1)),
+    "threshold": ("conformal", choice()),
+    "return_std": (False, flag()),
+    "repeat": (0, number(0.5, -1)),
+    "tol": (0.01, number(0, -1, 1.0)),
+    "verbose": (False, flag("one", "zero")),
+    "max_false_alarms": (0.02, number(-0.1, 2)),
+}
+"""A good value and the bad ones of arguments that many callables have."""
 DAMAGE = by_key({"top": 0.1}, wrong=(20, 1.0, -15))
 PARAMETERS = by_key({"top": 1.02}, wrong=(0, -1))
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
@@ -452,11 +167,11 @@ CHAIN = surrogate.DataInformedFEM(
 ).fit(T, F)
 SURROGATE = surrogate.InverseSurrogate(TRUSS, **INVERSE).fit(F)
 MAPPER = surrogate.TemperatureMapper(Ridge()).fit(T, CHAIN.parameters_)
-DETECTOR = detection.MahalanobisDetector().fit(F)
+DETECTOR = MahalanobisDetector().fit(F)
 COMPENSATOR = detection.TemperatureCompensator(Ridge(), targets=MODES).fit(BOTH)
 SCENARIOS = studies.sweep(TRUSS, (0.1, 0.3), ["top"])
 STUDY = studies.DetectabilityStudy(
-    CHAIN, detection.MahalanobisDetector(), SCENARIOS, n_repeats=2, uncertainty="noise", random_state=0
+    CHAIN, MahalanobisDetector(), SCENARIOS, n_repeats=2, uncertainty="noise", random_state=0
 )
 STUDY.run(LATER.temperatures)
 CURVE = studies.pod_curve([0.1, 0.2, 0.3], [3, 10, 19], [20, 20, 20])
@@ -488,8 +203,7 @@ def structure(**given):
 AFFINE = {
     "stiffness": (
         {("k",): STIFF},
-        {c: {("k",): v} for c, v in matrix(STIFF).items()}
-        | {"None": None, "text": "K", "a key of numbers": {1: STIFF}, "no terms": {}, "true": True},
+        {c: {("k",): v} for c, v in matrix(STIFF).items()} | bad(None, "K", {1: STIFF}, {}, True),
     ),
     "mass": (EYE, matrix(EYE, ("a number",))),
     "n_modes": (1, count(3, 1000)),
@@ -509,16 +223,16 @@ AFFINE = {
         },
     ),
     "track": (False, flag()),
-    "dof_names": (["x", "y"], names(["x", "y"], "unknown", "one unknown", "text that is no name") | {"too few": ["x"]}),
+    "dof_names": (["x", "y"], names(["x", "y"], "unknown", "one unknown", "text that is no name") | bad(["x"])),
 }
-use("fem.AffineModel", lambda **a: fem.AffineModel(**a).frequencies([[1.0]]), **AFFINE)
+use("fem.AffineModel", lambda **a: AffineModel(**a).frequencies([[1.0]]), **AFFINE)
 for owner in (TRUSS, REDUCED):
     kind = type(owner).__name__
     rows = table(THETA, nan=False, positive=True, rows=False, but=("no rows",))
     one = table(ROW, nan=False, positive=True, rows=False, but=())
     for name in ("frequencies", "modes", "jacobian", "linearised"):
         method(f"fem.{kind}.{name}", owner, theta=(THETA, rows))
-    method(f"fem.{kind}.linearised_modes", owner, theta=(THETA, rows), dofs=(DOFS, integers(23)))
+    method(f"fem.{kind}.linearised_modes", owner, usual="dofs", theta=(THETA, rows))
     use(
         f"fem.{kind}.local_modes",
         lambda owner=owner, **a: owner.local_modes(**a).shapes(DOFS),
@@ -576,9 +290,8 @@ for owner in (TRUSS, REDUCED):
     use(
         f"fem.{kind}.reduced",
         lambda owner=owner, **a: owner.reduced(**a).frequencies(np.ones((1, 4))),
+        usual="tol random_state",
         bounds=(0.1, BOUNDED),
-        tol=(1e-2, number(0, -1, 1.0)),
-        random_state=(0, seed()),
     )
     method(
         f"fem.{kind}.nominal_mac",
@@ -600,14 +313,13 @@ for owner in (TRUSS, REDUCED):
 use(
     "fem.ReducedModel",
     lambda **a: fem.ReducedModel(**a).frequencies(np.ones((1, 4))),
+    usual="tol random_state",
     full=(TRUSS, models()),
     bounds=(0.1, BOUNDED),
-    tol=(1e-2, number(0, -1, 1.0)),
-    random_state=(0, seed()),
 )
 LOCAL = TRUSS.local_modes(ROW)
-method("fem.LocalModes.shapes", LOCAL, dofs=(DOFS, integers(23)))
-method("fem.LocalModes.derivatives", LOCAL, columns=([0, 1], integers(6)), dofs=(DOFS, integers(23)))
+method("fem.LocalModes.shapes", LOCAL, usual="dofs")
+method("fem.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
 
 
 def member(cls, **extra):
@@ -634,16 +346,7 @@ def member(cls, **extra):
 
 
 BEAM = {"E": 210e9, "G": 80e9, "A": 0.01, "I_yy": 1e-5, "I_zz": 1e-5, "J": 1e-5, "density": 7850.0}
-NODE = {
-    "unknown": "nowhere",
-    "None": None,
-    "true": True,
-    "a number": 0.5,
-    "several": ["left"],
-    "NaN": NAN,
-    "a class": str,
-    "bytes": b"left",
-}
+NODE = bad("nowhere", None, True, 0.5, ["left"], NAN, str, b"left")
 MAY_BE_0 = number(-1.0)
 VECTOR = {
     "text": "up",
@@ -660,35 +363,26 @@ VECTOR = {
     "a class": tuple,
     "bytes": b"001",
 }
-RELEASES = {
-    "unknown": ["rw"],
-    "a number": 3,
-    "true": True,
-    "None": None,
-    "NaN": [NAN],
-    "bytes": b"ry",
-    "numbers": [1],
-    "a class": str,
-}
+RELEASES = bad(["rw"], 3, True, None, [NAN], b"ry", [1], str)
 use(
     "fem.Bar",
     member(Bar),
+    usual="lumped",
     start=("left", NODE),
     end=("right", NODE),
     E=(210e9, PHYSICAL),
     A=(0.01, PHYSICAL),
     density=(7850.0, MAY_BE_0),
-    lumped=(False, flag()),
 )
 use(
     "fem.Beam",
     member(Beam),
+    usual="lumped",
     start=("a", NODE),
     end=("b", NODE),
     **{name: (value, MAY_BE_0 if name == "density" else PHYSICAL) for name, value in BEAM.items()},
     I_p=(2e-5, number(-1.0)),
-    orientation=((0.0, 0.0, 1.0), VECTOR | {"zero": (0.0, 0.0, 0.0), "along the beam": (1.0, 0.0, 0.0)}),
-    lumped=(False, flag()),
+    orientation=((0.0, 0.0, 1.0), VECTOR | bad((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
     release_start=((), RELEASES),
     release_end=((), RELEASES),
     offset_start=((0.0, 0.0, 0.1), VECTOR),
@@ -697,6 +391,7 @@ use(
 use(
     "fem.Membrane",
     member(Membrane),
+    usual="lumped",
     corners=(
         tuple("abcd"),
         {
@@ -715,7 +410,6 @@ use(
     t=(0.1, PHYSICAL),
     nu=(0.3, number(-2, 0.6, 30)),
     density=(2500.0, MAY_BE_0),
-    lumped=(False, flag()),
 )
 use("fem.PointMass", member(PointMass), node=("apex", NODE), m=(5.0, PHYSICAL))
 use(
@@ -724,17 +418,7 @@ use(
     node=("apex", NODE),
     direction=(
         "y",
-        {
-            "unknown": "w",
-            "two": "xy",
-            "None": None,
-            "a number": 1,
-            "true": True,
-            "bytes": b"y",
-            "a class": str,
-            "NaN": NAN,
-            "several": ["y"],
-        },
+        bad("w", "xy", None, 1, True, b"y", str, NAN, ["y"]),
     ),
     k=(1e6, PHYSICAL),
 )
@@ -743,7 +427,7 @@ use(
     lambda **a: fem.Structure(**a).assemble(["rafters"], n_modes=1).frequencies([[1.0]]),
     nodes=(
         NODES,
-        {"None": None, "a list": [(0, 0)], "text": "xy", "true": True, "a number": 3, "empty": {}}
+        bad(None, [(0, 0)], "xy", True, 3, {})
         | {c: NODES | {"apex": v} for c, v in (VECTOR | {"three": (1.0, 2.0, 3.0)}).items() if c != "two"},
     ),
     members=(
@@ -806,10 +490,10 @@ TARGETS = names(["rafters"], "a number") | {
 use(
     "fem.Structure.assemble",
     lambda **a: FRAME.assemble(**a).frequencies([[1.0]]),
+    usual="track",
     parameters=(["rafters"], TARGETS),
     groups=(["rafters"], TARGETS),
     n_modes=(2, count(50)),
-    track=(False, flag()),
 )
 use(
     "fem.CallableModel",
@@ -819,15 +503,7 @@ use(
     vectorized=(False, flag()),
     cache=(
         None,
-        {
-            "true": True,
-            "a number": 3,
-            "bytes": b"c",
-            "a folder": str(FOLDER),
-            "a text file": __file__,
-            "a class": Path,
-            "NaN": NAN,
-        },
+        bad(True, 3, b"c", str(FOLDER), __file__, Path, NAN),
     ),
 )
 PROGRAMMED = fem.CallableModel(lambda theta: [theta[0] ** 0.5], ["k"], 1)
@@ -847,9 +523,8 @@ method(
 )
 use(
     "fem.add_noise",
+    usual="noise random_state",
     frequencies=(F, table(F, fixed=False, rows=False, but=("no rows", "repeated names", "repeated columns"))),
-    noise=(0.01, NOISE),
-    random_state=(0, seed()),
 )
 for name in ("evaluate", "linearise"):
     more = (
@@ -859,19 +534,16 @@ for name in ("evaluate", "linearise"):
     )
     use(
         f"fem.{name}",
-        model=(TRUSS, models()),
+        usual="model n_jobs",
         theta=(THETA, table(THETA, positive=True, rows=False, but=("no rows",))),
-        n_jobs=(1, jobs()),
         **more,
     )
 for name in ("evaluate_modes", "linearise_modes"):
     more = {"step": (1e-3, number(0, -1, 1.0, 10))} if name == "linearise_modes" else {}
     use(
         f"fem.{name}",
-        model=(TRUSS, models()),
+        usual="model dofs n_jobs",
         theta=(THETA, table(THETA, positive=True, rows=False, but=("no rows",))),
-        dofs=(DOFS, integers(23)),
-        n_jobs=(1, jobs()),
         **more,
     )
 use(
@@ -887,14 +559,14 @@ use(
 )
 use(
     "fem.match_modes",
-    model=(TRUSS, models()),
+    usual="model dofs",
     frequencies=(F, table(F, positive=True, rows=False, fixed=False)),
     shapes=(SHAPES, table(SHAPES, rows=True, but=("complex numbers",))),
-    dofs=(DOFS, integers(23)),
 )
 use(
     "fem.probe",
     lambda **a: fem.probe(**a).frequencies([[1.0]]),
+    usual="track random_state",
     assemble=(
         matrices,
         instead(b"x")
@@ -907,20 +579,15 @@ use(
     ),
     parameter_names=(["k"], names(["k"], "unknown", "text that is no name")),
     n_modes=(1, count(3)),
-    track=(False, flag()),
     n_checks=(1, count(but=("zero",))),
-    random_state=(0, seed()),
 )
 use(
     "fem.sample",
-    model=(TRUSS, models()),
+    usual="model dofs n_jobs random_state",
     bounds=(0.2, BOUNDED),
     n_samples=(4, count()),
     method=("lhs", choice()),
-    dofs=(DOFS, integers(23)),
-    n_jobs=(1, jobs()),
     progress=(False, flag("None")),
-    random_state=(0, seed()),
 )
 use(
     "fem.shape_components",
@@ -943,29 +610,24 @@ use(
     ),
     reference=(SHAPES, table(SHAPES, nan=False, rows=True, fixed=True)),
 )
-use(
-    "fem.shape_jacobian",
-    model=(TRUSS, models()),
-    theta=(ROW, table(ROW, nan=False, positive=True, rows=False)),
-    dofs=(DOFS, integers(23)),
-)
+use("fem.shape_jacobian", usual="model dofs", theta=(ROW, table(ROW, nan=False, positive=True, rows=False)))
 use(
     "fem.share_reordered",
-    model=(TRUSS, models()),
+    usual="model",
     theta=(THETA, table(THETA, nan=False, positive=True, rows=False, but=("no rows",))),
 )
 np.savez(FOLDER / "model.npz", E=STIFF, M=EYE)
 use(
     "fem.load_affine",
     lambda **a: fem.load_affine(**a).frequencies([[1.0]]),
+    usual="track",
     path=(FOLDER / "model.npz", paths()),
     stiffness=(["E"], names(["E"])),
-    mass=("M", texts() | {"unknown": "X"}),
-    total=(None, texts() | {"unknown": "X"}),
+    mass=("M", texts() | bad("X")),
+    total=(None, texts() | bad("X")),
     n_modes=(1, count(3)),
     parameter_names=(["E"], names(["E"])),
     groups=({"all": ["E"]}, AFFINE["groups"][1]),
-    track=(False, flag()),
 )
 (FOLDER / "tower.sti").write_text("1 1 800.0\n1 2 -400.0\n2 2 400.0\n")
 for cause, text in {
@@ -988,12 +650,12 @@ use(
 # preprocessing
 PLAIN = table(F, fixed=False, rows=False, fitting=True, but=("constant",))
 fitted(
-    preprocessing.BiasAligner,
+    BiasAligner,
     (F, PLAIN),
     reference=(NOMINAL[0], by_name(NOMINAL[0], MODES, but=("negative inside",))),
     method=("shift", choice()),
 )
-ALIGNED = preprocessing.BiasAligner(TRUSS).fit(F)
+ALIGNED = BiasAligner(TRUSS).fit(F)
 SAME = table(F, rows=False)
 method("preprocessing.BiasAligner.transform", ALIGNED, X=(F, SAME))
 method("preprocessing.BiasAligner.inverse_transform", ALIGNED, X=(F, SAME))
@@ -1006,7 +668,7 @@ use(
 method(
     "preprocessing.BlockedKFold.fold_of",
     preprocessing.BlockedKFold(3),
-    X=(F, {"None": None, "a number": 3, "true": True, "two rows": F[:2], "no rows": F[:0], "a class": pd.DataFrame}),
+    X=(F, bad(None, 3, True, F[:2], F[:0], pd.DataFrame)),
 )
 fitted(
     preprocessing.HingeFeatures,
@@ -1019,14 +681,13 @@ use(
     X=(T, table(T, fixed=False)),
     sample_weight=(
         pd.Series(1.0, T.index),
-        vector(np.ones(len(T)), size=None, but=("zero inside",))
-        | {"other rows": pd.Series(1.0, T.index.shift(1)), "too few": np.ones(3)},
+        vector(np.ones(len(T)), size=None, but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
 method("preprocessing.HingeFeatures.transform", preprocessing.HingeFeatures().fit(T), X=(T, table(T, rows=False)))
 GAPPY = F.mask(np.arange(len(F))[:, np.newaxis] % 7 == np.arange(6))
 fitted(
-    preprocessing.KNNGapImputer,
+    KNNGapImputer,
     (GAPPY, table(GAPPY, fixed=False, rows=False, fitting=True, but=("constant",))),
     n_neighbors=(3, count()),
     weights=("uniform", choice()),
@@ -1036,16 +697,16 @@ fitted(
     keep_empty_features=(False, flag()),
     missing_values=(
         NAN,
-        {"text": "missing", "several": [NAN], "a class": float, "a time": STAMP, "true": True, "bytes": b"x"},
+        bad("missing", [NAN], float, STAMP, True, b"x"),
     ),
 )
 method(
     "preprocessing.KNNGapImputer.transform",
-    preprocessing.KNNGapImputer().fit(GAPPY),
+    KNNGapImputer().fit(GAPPY),
     X=(GAPPY, table(GAPPY, rows=False)),
 )
 fitted(
-    preprocessing.LagFeatures,
+    LagFeatures,
     (
         HOURLY,
         table(HOURLY, fixed=False, rows=False, but=("repeated columns",))
@@ -1057,16 +718,7 @@ fitted(
     ),
     lags=(
         2,
-        count()
-        | {
-            "texts": ["1"],
-            "true inside": [0, True],
-            "negative inside": [-1],
-            "repeated": [1, 1],
-            "NaN inside": [0, NAN],
-            "times": [STAMP],
-            "several": [0.5, 1.5],
-        },
+        count() | bad(["1"], [0, True], [-1], [1, 1], [0, NAN], [STAMP], [0.5, 1.5]),
     ),
     freq=("1h", durations()),
     tolerance=("3h", durations()),
@@ -1074,7 +726,7 @@ fitted(
 )
 method(
     "preprocessing.LagFeatures.transform",
-    preprocessing.LagFeatures(2).fit(HOURLY),
+    LagFeatures(2).fit(HOURLY),
     X=(HOURLY, table(HOURLY, rows=False)),
 )
 POLES = {"frequencies": np.array([[2.0, 2.2], [2.1, 2.15]]), "shapes": np.array([[[1, 2.0, 1], [1, 0, -1]]] * 2)}
@@ -1113,11 +765,11 @@ use(
     lambda **a: (
         preprocessing.ModeTracker(**{k: v for k, v in a.items() if k != "X"}).fit().transform(a["X"]).frequencies
     ),
-    X=(POLES, POLED | {"None": None, "text": "poles", "a number": 3, "true": True, "empty": {}, "a class": dict}),
+    X=(POLES, POLED | bad(None, "poles", 3, True, {}, dict)),
     reference=(REFERENCE, REFERRED),
     max_shift=(0.15, number(0, 1, 15, -0.1)),
     min_mac=(0.8, number(1, 80, -0.1)),
-    follow=(10, durations("negative number", "half") | {"zero number": 0, "negative number": -1}),
+    follow=(10, durations("negative number", "half") | bad(0, -1)),
     max_drift=(0.3, number(1, 30, -0.1)),
     close=(0.02, number(1, 2, -0.1)),
 )
@@ -1137,14 +789,12 @@ PARTS = {"inverse": surrogate.InverseSurrogate(**INVERSE), "mapper": surrogate.T
 use(
     "surrogate.DataInformedFEM",
     chain_of,
-    model=(TRUSS, models()),
+    usual="model n_jobs random_state",
     inverse=(PARTS["inverse"], estimators()),
     mapper=(PARTS["mapper"], estimators()),
     aligner=("passthrough", estimators()),
     imputer=("passthrough", estimators()),
-    reduce=(False, number(0, 1.0, -1, but=()) | {"one": 1}),
-    n_jobs=(1, jobs()),
-    random_state=(0, seed()),
+    reduce=(False, number(0, 1.0, -1, but=()) | bad(1)),
     X=(T, WEATHER),
     y=(F, MEASURED),
 )
@@ -1155,21 +805,13 @@ use(
     y=(F, MEASURED),
     shapes=(
         None,
-        {
-            "text": "x",
-            "a number": 3,
-            "true": True,
-            "two axes": SHAPES,
-            "times": np.full((120, 6, 3), STAMP),
-            "without dofs": np.ones((120, 6, 3)),
-        },
+        bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3))),
     ),
 )
-for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "expected_residuals"):
+for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
     more = {
         "predict": {"return_std": (False, flag())},
         "predict_interval": {"confidence": (0.9, number(0, 1, 90, -0.1))},
-        "expected_residuals": {"return_number": (False, flag())},
     }.get(name, {})
     method(f"surrogate.DataInformedFEM.{name}", CHAIN, X=(T, PREDICTING), **more)
 method(
@@ -1179,7 +821,7 @@ use(
     "surrogate.DataInformedFEM.estimate_parameters",
     CHAIN.estimate_parameters,
     F=(F, table(F, rows=False, positive=True)),
-    shapes=(None, {"text": "x", "a number": 3, "true": True, "two axes": SHAPES}),
+    shapes=(None, bad("x", 3, True, SHAPES)),
 )
 CHANGES = {
     "damage": (
@@ -1197,28 +839,10 @@ CHANGES = {
 }
 SHARE_OF_VALUES = number(-0.1, 1.0, 90, but=("None", "several", "empty"))
 FAULTS = {
-    "gaps": (0.1, SHARE_OF_VALUES | {"unknown": "often"}),
-    "outliers": (0.01, SHARE_OF_VALUES | {"unknown": "often", "rows too few": np.full((3, 6), 5.0)}),
+    "gaps": (0.1, SHARE_OF_VALUES | bad("often")),
+    "outliers": (0.01, SHARE_OF_VALUES | bad("often", np.full((3, 6), 5.0))),
 }
-method(
-    "surrogate.DataInformedFEM.simulate",
-    CHAIN,
-    X=(T, PREDICTING),
-    **CHANGES,
-    **FAULTS,
-    noise=(0.01, NOISE),
-    random_state=(0, seed()),
-)
-method("surrogate.DataInformedFEM.simulate_modes", CHAIN, X=(T, PREDICTING), modes=([0, 6], integers(23)), **CHANGES)
-method(
-    "surrogate.DataInformedFEM.draw_noise",
-    CHAIN,
-    X=(T, PREDICTING),
-    noise=(0.01, NOISE),
-    **FAULTS,
-    random_state=(0, seed()),
-)
-method("surrogate.DataInformedFEM.draw_gaps", CHAIN, X=(T, PREDICTING), **FAULTS, random_state=(0, seed()))
+method("surrogate.DataInformedFEM.simulate", CHAIN, usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),
@@ -1228,18 +852,10 @@ INVERTING = {
     "dofs": (None, integers(23)),
     "refine": (2, number(0.5, -1)),
     "prior": (0.2, PRIOR),
-    "reduce": (False, number(0, 1.0, -1) | {"one": 1}),
+    "reduce": (False, number(0, 1.0, -1) | bad(1)),
     "memory": (
         None,
-        {
-            "true": True,
-            "a number": 3,
-            "bytes": b"m",
-            "a text file": __file__,
-            "a class": Path,
-            "NaN": NAN,
-            "several": ["m"],
-        },
+        bad(True, 3, b"m", __file__, Path, NAN, ["m"]),
     ),
     "n_jobs": (1, jobs()),
     "random_state": (0, seed()),
@@ -1250,7 +866,7 @@ use(
     lambda **a: (
         surrogate.InverseSurrogate(**{k: v for k, v in a.items() if k not in "Xy"}).fit(a["X"], a["y"]).transform(F)
     ),
-    model=(TRUSS, models()),
+    usual="model",
     **INVERTING,
     X=(F, INVERTED),
     y=(None, {}),
@@ -1289,20 +905,19 @@ fitted(
     surrogate.TemperatureMapper,
     (T, WEATHER),
     (CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, fitting=True, but=("a number", "constant"))),
+    usual="random_state",
     after=lambda estimator, X: estimator.predict(X),
     regressor=(Ridge(), estimators("None")),
-    random_state=(0, seed()),
 )
 use(
     "surrogate.TemperatureMapper.fit",
     lambda **a: surrogate.TemperatureMapper(Ridge()).fit(T, CHAIN.parameters_, **a).predict(T),
     sample_weight=(
         pd.Series(1.0, T.index),
-        vector(np.ones(len(T)), but=("zero inside",))
-        | {"other rows": pd.Series(1.0, T.index.shift(1)), "too few": np.ones(3)},
+        vector(np.ones(len(T)), but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
-method("surrogate.TemperatureMapper.predict", MAPPER, X=(T, table(T, rows=False)), return_std=(False, flag()))
+method("surrogate.TemperatureMapper.predict", MAPPER, usual="return_std", X=(T, table(T, rows=False)))
 method(
     "surrogate.TemperatureMapper.score",
     MAPPER,
@@ -1330,19 +945,17 @@ use("updating.ModelUpdater", lambda **a: updating.ModelUpdater(**a).fit(F, shape
 use(
     "updating.ModelUpdater.fit",
     lambda **a: updating.ModelUpdater(TRUSS, shape_weight=1.0, bounds=0.2).fit(**a).theta_,
+    usual="dofs",
     F=(F, UPDATED),
     shapes=(SHAPES, table(SHAPES, rows=True, but=("complex numbers",))),
-    dofs=(DOFS, integers(23)),
     frequency_std=(0.1, by_name(0.1, MODES)),
 )
 use("updating.cramer_rao", information=(STIFF, matrix(STIFF)))
 use(
     "updating.identifiability",
     lambda **a: updating.identifiability(**a).deviations,
-    model=(TRUSS, models()),
+    usual="model noise dofs",
     theta=(ROW, table(ROW, nan=False, positive=True, rows=False)),
-    noise=(0.01, NOISE),
-    dofs=(DOFS, integers(23)),
     shape_noise=(0.01, number(0, -0.1, 5)),
 )
 SENSITIVITY = updating.sensitivity(TRUSS)
@@ -1353,47 +966,46 @@ use(
 )
 use(
     "updating.sensitivity",
-    model=(TRUSS, models()),
+    usual="model",
     theta=(ROW, table(ROW, nan=False, positive=True, rows=False)),
     method=("central", choice()),
     step=(0.01, number(0, -1, 1.0)),
 )
 
 # detection
-CONTAMINATED = number(0, -0.1, 0.6, 2)
 WATCHED = table(F, fixed=False, rows=False, fitting=True)
 DAMAGE_INDEX = lambda detector, X: detector.damage_index(X)  # noqa: E731
 fitted(
-    detection.MahalanobisDetector,
+    MahalanobisDetector,
     (F, WATCHED),
+    usual="contamination threshold",
     after=DAMAGE_INDEX,
-    contamination=(0.05, CONTAMINATED),
     covariance=(None, estimators("None")),
-    threshold=("conformal", choice()),
 )
 fitted(
-    detection.OutlierDetector,
+    OutlierDetector,
     (F, WATCHED),
+    usual="contamination",
     after=DAMAGE_INDEX,
     estimator=(IsolationForest(n_estimators=5, random_state=0), estimators()),
-    contamination=(0.05, CONTAMINATED),
 )
 fitted(
-    detection.WindowedAlarm,
+    WindowedAlarm,
     (F, WATCHED),
+    usual="contamination",
     after=DAMAGE_INDEX,
-    window=(3, durations("negative", "zero") | {"zero": 0, "negative": "-1h", "None": None}),
+    window=(3, durations("negative", "zero") | bad(0, "-1h", None)),
     rule=("m-of-n", choice()),
     m=(2, count(9)),
-    contamination=(0.05, CONTAMINATED),
 )
 PAIR = [
-    ("a", detection.MahalanobisDetector()),
-    ("b", detection.OutlierDetector(IsolationForest(n_estimators=5, random_state=0))),
+    ("a", MahalanobisDetector()),
+    ("b", OutlierDetector(IsolationForest(n_estimators=5, random_state=0))),
 ]
 fitted(
     detection.FusedDetector,
     (F, WATCHED),
+    usual="contamination",
     after=DAMAGE_INDEX,
     detectors=(
         PAIR,
@@ -1405,19 +1017,18 @@ fitted(
             "empty": [],
             "repeated": [PAIR[0], PAIR[0]],
             "without names": [PAIR[0][1]],
-            "a class": [("a", detection.MahalanobisDetector)],
+            "a class": [("a", MahalanobisDetector)],
             "None inside": [("a", None)],
             "text inside": [("a", "b")],
             "a number as name": [(3, PAIR[0][1])],
         },
     ),
-    contamination=(0.05, CONTAMINATED),
 )
 for name in ("damage_index", "decision_function", "predict", "score_samples"):
     for owner in (
         DETECTOR,
-        detection.OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F),
-        detection.WindowedAlarm(3).fit(F),
+        OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F),
+        WindowedAlarm(3).fit(F),
         detection.FusedDetector(PAIR).fit(F),
     ):
         method(f"detection.{type(owner).__name__}.{name}", owner, X=(F, table(F, rows=False)))
@@ -1433,11 +1044,10 @@ fitted(
         ),
     ),
     estimator=(Ridge(), estimators()),
-    targets=(MODES, names(MODES) | {"too high": [9], "booleans": [True] * 9, "floats": [1.5], "all": list(BOTH)}),
+    targets=(MODES, names(MODES) | bad([9], [True] * 9, [1.5], list(BOTH))),
     cv=(
         3,
-        count(1, 10**6)
-        | {"several": [1, 2], "text": "5", "a class": preprocessing.BlockedKFold, "ragged": [([0], [1]), ([1],)]},
+        count(1, 10**6) | bad([1, 2], "5", preprocessing.BlockedKFold, [([0], [1]), ([1],)]),
     ),
     whiten=("global", choice("None")),
 )
@@ -1493,8 +1103,7 @@ use(
     ),
     pod=(
         [0.1, 0.5, 1.0],
-        vector([0.1, 0.5, 1.0], but=("zero inside", "NaN inside"))
-        | {"percent": [10, 50, 100], "too long": [0.1, 0.2, 0.3, 0.4]},
+        vector([0.1, 0.5, 1.0], but=("zero inside", "NaN inside")) | bad([10, 50, 100], [0.1, 0.2, 0.3, 0.4]),
     ),
     level=(0.9, number(-0.1, 90, but=())),
 )
@@ -1515,28 +1124,26 @@ use(
 )
 use(
     "datasets.make_truss_campaign",
+    usual="noise random_state",
     n_years=(1, count()),
     samples_per_year=(12, count()),
     samples_per_day=(1, count()),
-    noise=(0.01, NOISE),
     damage=({"top": 0.1}, DAMAGE),
-    random_state=(0, seed()),
 )
 GROUP = next(iter(datasets.make_kw51_campaign(n_hours=24, random_state=0).model.groups))
 use(
     "datasets.make_kw51_campaign",
+    usual="noise random_state",
     n_hours=(48, count()),
-    noise=(0.01, NOISE),
     gaps=(False, flag()),
     retrofit=(False, flag()),
     drift=({GROUP: 0.01}, by_key({GROUP: 0.01}, wrong=(1000,))),
     damage=({GROUP: 0.1}, by_key({GROUP: 0.1}, wrong=(20, 1.0))),
     damage_from=(
         "2018-10-02",
-        moments("half", "too late", "negative") | {"too late": "2030-01-01", "too early": "2000-01-01", "a number": 5},
+        moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5),
     ),
     shapes=(False, flag()),
-    random_state=(0, seed()),
 )
 use(
     "datasets.steel_modulus",
@@ -1556,7 +1163,7 @@ use(
                 "zero inside",
             ),
         )
-        | {"kelvin": T + 273.15},
+        | bad(T + 273.15),
     ),
 )
 
@@ -1577,45 +1184,45 @@ use(
     lambda **a: CHAIN.simulate(LATER.temperatures, **studies.ProgressiveDamage(**a).changes(LATER.temperatures)),
     name=("a", texts()),
     damage=({"top": 0.1}, by_key({"top": 0.1}, wrong=(20, 1.0, -15), but=("unknown",))),
-    onset=(2, moments() | {"None": None}),
-    end=(10, moments() | {"before the onset": 1}),
+    onset=(2, moments() | bad(None)),
+    end=(10, moments() | bad(1)),
 )
 DRAWS = pd.DataFrame({"top": [0.1, 0.2], "bottom": [0.0, 0.1]})
 use(
     "studies.UncertainDamage",
     lambda **a: CHAIN.simulate(LATER.temperatures, **studies.UncertainDamage(**a).changes(T)),
     name=("a", texts()),
-    draws=(DRAWS, table(DRAWS, nan=False, rows=False, fixed=False) | {"percent": DRAWS * 100}),
+    draws=(DRAWS, table(DRAWS, nan=False, rows=False, fixed=False) | bad(DRAWS * 100)),
 )
-method("studies.Scenario.changes", studies.Scenario("a", {"top": 0.1}), T=(T, {}), repeat=(0, number(0.5, -1)))
+method("studies.Scenario.changes", studies.Scenario("a", {"top": 0.1}), usual="repeat", T=(T, {}))
 method(
     "studies.ProgressiveDamage.changes",
     studies.ProgressiveDamage("a", {"top": 0.1}, 2),
-    T=(T, {"None": None, "a number": 3, "true": True, "text": "T", "a class": pd.DataFrame}),
-    repeat=(0, number(0.5, -1)),
+    usual="repeat",
+    T=(T, bad(None, 3, True, "T", pd.DataFrame)),
 )
-method("studies.UncertainDamage.changes", studies.UncertainDamage("a", DRAWS), T=(T, {}), repeat=(0, number(0.5, -1)))
+method("studies.UncertainDamage.changes", studies.UncertainDamage("a", DRAWS), usual="repeat", T=(T, {}))
 use(
     "studies.sweep",
     lambda **a: [one.severity for one in studies.sweep(**a)],
-    model=(TRUSS, models()),
+    usual="model",
     severities=(
         [0.1, 0.2],
-        vector([0.1, 0.2], but=("negative inside",))
-        | {"percent": [10, 20], "a text": ".1", "whole": [1.0], "repeated": [0.1, 0.1], "a number": 0.1},
+        vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1),
     ),
-    groups=(["top"], names(["top"]) | {"a known text": "top"}),
+    groups=(["top"], names(["top"]) | bad("top")),
 )
-ARGUMENTS = {"fem": (CHAIN, models() | {"not fitted": surrogate.DataInformedFEM(TRUSS)})}
+ARGUMENTS = {"fem": (CHAIN, models() | bad(surrogate.DataInformedFEM(TRUSS)))}
 use(
     "studies.DetectabilityStudy",
     lambda **a: studies.DetectabilityStudy(
         **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}, uncertainty="noise"
     ).run(a["T"], a["baseline"], reference=a["reference"], confidence=a["confidence"])["rate"],
+    usual="noise n_jobs random_state confidence",
     **ARGUMENTS,
     detectors=(
-        detection.MahalanobisDetector(),
-        estimators() | {"empty": {}, "no name": {"": detection.MahalanobisDetector()}, "a number": {3: None}},
+        MahalanobisDetector(),
+        estimators() | bad({}, {"": MahalanobisDetector()}, {3: None}),
     ),
     scenarios=(
         SCENARIOS,
@@ -1634,31 +1241,16 @@ use(
         },
     ),
     n_repeats=(1, count()),
-    noise=(0.01, NOISE),
-    n_jobs=(1, jobs()),
-    random_state=(0, seed()),
     T=(LATER.temperatures, weather(LATER.temperatures, rows=False)),
     baseline=(F, table(F, rows=False, fitting=True)),
     reference=(
         {"healthy": LATER.frequencies},
-        {"text": "F", "a number": 3, "true": True, "unknown": {"no": F}, "None inside": {"healthy": None}}
+        bad("F", 3, True, {"no": F}, {"healthy": None})
         | {f"inside: {c}": {"healthy": v} for c, v in table(LATER.frequencies, rows=False).items()},
     ),
-    confidence=(0.9, number(0, 1, 90, -0.1)),
 )
-method(
-    "studies.DetectabilityStudy.pod_curve",
-    STUDY,
-    family=("top", texts() | {"unknown": "no"}),
-    source=("simulated", texts() | {"unknown": "no"}),
-    log=(False, flag()),
-)
-method(
-    "studies.DetectabilityStudy.is_undetected",
-    STUDY,
-    family=("top", texts() | {"unknown": "no"}),
-    source=("simulated", texts() | {"unknown": "no"}),
-)
+method("studies.DetectabilityStudy.pod_curve", STUDY, usual="family source log")
+method("studies.DetectabilityStudy.is_undetected", STUDY, usual="family source")
 method(
     "studies.DetectabilityStudy.minimum_detectable_damage",
     STUDY,
@@ -1668,54 +1260,47 @@ method(
 method(
     "studies.DetectabilityStudy.ranking",
     STUDY,
-    max_false_alarms=(0.02, number(-0.1, 2)),
-    source=("simulated", texts() | {"unknown": "no"}),
+    usual="max_false_alarms source",
     confidence=(0.9, number(0, 1, 90)),
     by=("pod", choice()),
 )
 method(
     "studies.DetectabilityStudy.time_to_detection",
     STUDY,
-    within=(["7D"], {"a number": [7], "texts": ["soon"], "negative": ["-1D"], "a time": STAMP, "true": [True]}),
+    usual="source",
+    within=(["7D"], bad([7], ["soon"], ["-1D"], STAMP, [True])),
     level=(0.9, number(0, 1, 90)),
-    source=("simulated", texts() | {"unknown": "no"}),
     confidence=(0.9, number(0, 1, 90, but=("None",))),
     smallest=(False, flag()),
 )
 method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
-COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | {
-    "too long": [1, 2, 3, 4],
-    "more than records": [30, 10, 19],
-}
+COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | bad([1, 2, 3, 4], [30, 10, 19])
 use(
     "studies.pod_curve",
     lambda **a: studies.pod_curve(**a).slope,
-    severities=([0.1, 0.2, 0.3], vector([0.1, 0.2, 0.3]) | {"percent": [10, 20, 30], "too long": [0.1, 0.2, 0.3, 0.4]}),
+    usual="log confidence",
+    severities=([0.1, 0.2, 0.3], vector([0.1, 0.2, 0.3]) | bad([10, 20, 30], [0.1, 0.2, 0.3, 0.4])),
     n_detected=([3, 10, 19], COUNTED),
-    n_records=([20, 20, 20], vector([20.0, 20.0, 20.0], but=("zero inside",)) | {"too long": [20] * 4}),
-    log=(False, flag()),
-    confidence=(0.9, number(0, 1, 90, -0.1)),
+    n_records=([20, 20, 20], vector([20.0, 20.0, 20.0], but=("zero inside",)) | bad([20] * 4)),
 )
 method(
     "studies.PODCurve.predict",
     CURVE,
     severity=(0.2, vector(0.2, wrong=(20,), but=("zero inside", "empty", "three axes"))),
 )
-method(
-    "studies.PODCurve.severity_at", CURVE, pod=(0.9, number(0, 1, 90, -0.1)), confidence=(0.9, number(0, 1, 90, -0.1))
-)
+method("studies.PODCurve.severity_at", CURVE, usual="confidence", pod=(0.9, number(0, 1, 90, -0.1)))
 use(
     "studies.identify_damage",
     lambda **a: studies.identify_damage(**a).severities,
+    usual="noise dofs random_state",
     **ARGUMENTS,
     T=(LATER.temperatures, weather(LATER.temperatures, rows=True)),
     F=(LATER.frequencies, table(LATER.frequencies, rows=True, positive=True)),
-    groups=(["top"], names(["top"]) | {"unknown inside": {"a": ["no"]}, "empty inside": {"a": []}}),
-    noise=(0.01, NOISE),
+    groups=(["top"], names(["top"]) | bad({"a": ["no"]}, {"a": []})),
     prior=(None, instead({"severity": 0.2}, (0.5, 0.5), studies.DamagePrior)),
-    stiffening=(["top"], names(["top"]) | {"a number": 1}),
+    stiffening=(["top"], names(["top"]) | bad(1)),
     parameters=(["top"], names(["top"])),
-    added_mass=({"ballast": np.ones(23)}, {"text": "x", "a number": 5.0, "other length": {"ballast": np.ones(4)}}),
+    added_mass=({"ballast": np.ones(23)}, bad("x", 5.0, {"ballast": np.ones(4)})),
     shapes=(
         (SHAPES, SHAPES * 1.01),
         {
@@ -1729,17 +1314,15 @@ use(
             "infinite": (SHAPES * INF, SHAPES),
         },
     ),
-    dofs=(DOFS, integers(23)),
     shape_noise=(0.01, by_name(0.01, MODES, wrong=(5,))),
     models=(None, instead([], [1.0], TRUSS)),
-    random_state=(0, seed()),
 )
 use(
     "studies.DamagePrior",
     lambda **a: studies.DamagePrior(**a),
     numbers=(
         (0.5, 0.5),
-        {"text": "x", "too many": (0.2,) * 5, "negative": (1.5, -0.5), "one": (1.0,), "sum": (0.5, 0.4)},
+        bad("x", (0.2,) * 5, (1.5, -0.5), (1.0,), (0.5, 0.4)),
     ),
     severity=(0.2, number(0, 2, -0.1)),
     law=("uniform", choice()),
@@ -1752,9 +1335,9 @@ use(
     lambda **a: studies.compare_extensions(**a)["gain"],
     study=(STUDY, instead(studies.DetectabilityStudy(CHAIN, DETECTOR, SCENARIOS))),
     T=(LATER.temperatures, weather(LATER.temperatures, rows=False)),
-    modes=([6], integers(23) | {"measured": [0]}),
+    modes=([6], integers(23) | bad([0])),
     noise=(0.01, by_name(0.01, ["mode 7"], wrong=(0.5, 5), but=("zero inside", "other names"))),
-    baseline_factors=([2.0], vector([2.0]) | {"one": [1.0], "a number": 2.0, "text": "2"}),
+    baseline_factors=([2.0], vector([2.0]) | bad([1.0], 2.0, "2")),
     sensors=(None, {}),
 )
 
@@ -1764,19 +1347,9 @@ use(
     subject=(STUDY, instead(studies.DetectabilityStudy(CHAIN, DETECTOR, SCENARIOS))),
     path=(
         FOLDER / "report.html",
-        {
-            "None": None,
-            "a number": 3,
-            "true": True,
-            "a folder": str(FOLDER),
-            "bytes": b"r",
-            "several": ["a"],
-            "a class": Path,
-            "NaN": NAN,
-            "no folder": FOLDER / "no" / "report.html",
-        },
+        bad(None, 3, True, str(FOLDER), b"r", ["a"], Path, NAN, FOLDER / "no" / "report.html"),
     ),
-    identified=(FOUND, instead() | {"a list": [FOUND]}),
+    identified=(FOUND, instead() | bad([FOUND])),
     title=("Bridge", texts("empty")),
     structure=(None, instead()),
 )
@@ -1790,7 +1363,7 @@ use(
 # newer arguments
 CLOCKED = F.set_axis(pd.date_range("2020-01-01", periods=len(F), freq="h"))
 fitted(
-    preprocessing.HampelFilter,
+    HampelFilter,
     (BOTH, table(BOTH, fixed=False, rows=False, but=("repeated columns",))),
     window=(5, number(-1, 0, 0.5, but=("several", "empty"))),
     n_deviations=(6.0, number(-1.0, 0.0)),
@@ -1799,11 +1372,11 @@ fitted(
 use("preprocessing.check_records", temperatures=(T, table(T, fixed=False)), frequencies=(F, table(F, fixed=False)))
 use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
 fitted(
-    detection.OutlierDetector,
+    OutlierDetector,
     (F, {}),
+    usual="threshold",
     after=DAMAGE_INDEX,
     estimator=(IsolationForest(n_estimators=5, random_state=0), {}),
-    threshold=("conformal", choice()),
 )
 use(
     "metrics.complete_r2",
@@ -1814,19 +1387,19 @@ use(
 use(
     "surrogate.InverseSurrogate",
     lambda **a: surrogate.InverseSurrogate(TRUSS, **INVERSE, **a).fit().transform(F),
-    verbose=(False, flag("one", "zero")),
+    usual="verbose",
 )
 use(
     "surrogate.DataInformedFEM",
     lambda **a: surrogate.DataInformedFEM(TRUSS, **PARTS, random_state=0, **a).fit(T, F).predict(T),
-    verbose=(False, flag("one", "zero")),
+    usual="verbose",
 )
 use(
     "studies.DetectabilityStudy",
     lambda **a: studies.DetectabilityStudy(
-        CHAIN, detection.MahalanobisDetector(), SCENARIOS[:1], n_repeats=1, **({"uncertainty": "noise"} | a)
+        CHAIN, MahalanobisDetector(), SCENARIOS[:1], n_repeats=1, **({"uncertainty": "noise"} | a)
     ).run(LATER.temperatures, F)["rate"],
-    verbose=(False, flag("one", "zero")),
+    usual="verbose",
     gaps=("fitted", choice("None")),
     outliers=("fitted", choice("None")),
     uncertainty=("noise", choice()),
@@ -1834,15 +1407,13 @@ use(
 use(
     "studies.detection_task",
     lambda **a: studies.detection_task(**a).y,
+    usual="noise max_false_alarms random_state",
     **ARGUMENTS,
     T=(LATER.temperatures, weather(LATER.temperatures, rows=False)),
-    scenarios=(SCENARIOS, {"None": None, "text": "healthy", "a number": 3, "empty": [], "texts": ["a"]}),
+    scenarios=(SCENARIOS, bad(None, "healthy", 3, [], ["a"])),
     baseline=(F, table(F, rows=False)),
     n_repeats=(2, count()),
     n_splits=(2, count(1)),
-    noise=(0.01, NOISE),
-    max_false_alarms=(0.02, number(-0.1, 2)),
-    random_state=(0, seed()),
 )
 use("fem.add_noise", frequencies=(F, {}), noise=(0.01, {}), correlation=(0.5, number(-1.0, 1.0)))
 for name in ("make_truss_campaign", "make_kw51_campaign"):
@@ -1850,19 +1421,298 @@ for name in ("make_truss_campaign", "make_kw51_campaign"):
         {"samples_per_year": (12, {})} if name == "make_truss_campaign" else {"n_hours": (48, {}), "gaps": (False, {})}
     )
     use(f"datasets.{name}", **size, correlation=(0.5, number(-1.0, 1.0)), random_state=(0, {}))
-use(
-    "datasets.make_fleet",
-    lambda **a: list(datasets.make_fleet(**a)),
-    n_bridges=(3, count()),
-    random_state=(0, seed()),
-)
-fitted(preprocessing.SensorMeans, (T, {}), roles=(None, {"a number": 3, "text": "air", "true": True}))
+use("datasets.make_fleet", lambda **a: list(datasets.make_fleet(**a)), usual="random_state", n_bridges=(3, count()))
+fitted(preprocessing.SensorMeans, (T, {}), roles=(None, bad(3, "air", True)))
 use("preprocessing.find_memory", temperatures=(T, table(T, fixed=False)), frequencies=(F, table(F, fixed=False)))
 
 
-IGNORED = {"y", "input_features", "groups of split"}
+# --------------------------------------------------------------------------- what depends on several arguments
+
+LATE = F.set_axis(F.index + pd.Timedelta("1h"))
+DATED = F["f1"]
+ONE_MODE = fem.CallableModel(lambda theta: [7.5 * theta[0] ** 0.5], ["k"], 1)
+LAGS = LagFeatures(2).fit(HOURLY)
+OFFSETS = [stamp.tz_localize("UTC" if i % 2 else "Asia/Tokyo") for i, stamp in enumerate(HOURLY.index)]
+LINES = detection.TemperatureCompensator(Ridge(), targets=MODES)
+DIAGONAL = F.mask(np.eye(6, dtype=bool)[np.arange(len(F)) % 6])
+SPACE_BEAM = Beam("left", "apex", **BEAM)
+
+
+def changed(frame, row, column, value):
+    """A copy of a frame with other values at some place."""
+    copy = frame.copy()
+    copy.iloc[row, column] = value
+    return copy
+
+
+def indexed(index):
+    return HOURLY.set_axis(index, axis=0)
+
+
+def masked(frame):
+    """A frame as an array whose first value is masked."""
+    values = np.ma.array(frame.to_numpy())
+    values[0, 0] = np.ma.masked
+    return values
+
+
+def truss_of(members=BARS, supports=SUPPORTS, nodes=NODES):
+    return fem.Structure(nodes, members, supports)
+
+
+def affine(stiffness, mass=EYE):
+    return AffineModel({("k",): stiffness}, mass, n_modes=1)
+
+
+def updated(F=NOMINAL, *, model=TRUSS, shapes=None, dofs=None, frequency_std=None, **options):
+    return updating.ModelUpdater(model, **options).fit(F, shapes=shapes, dofs=dofs, frequency_std=frequency_std)
+
+
+def chain(model=TRUSS, **parts):
+    return surrogate.DataInformedFEM(model, **(PARTS | {"random_state": 0} | parts))
+
+
+def means(time_constants, **options):
+    return preprocessing.ExponentialMeans(time_constants, **options)
+
+
+def folded(cv):
+    return detection.TemperatureCompensator(Ridge(), targets=MODES, cv=cv)
+
+
+def bare():
+    return surrogate.InverseSurrogate(TRUSS, **INVERSE, refine=0).fit(F)
+
+
+def detected(index, onset):
+    return metrics.time_to_detection(index, 3.0, onset)
+
+
+REFUSED = [  # what is called, what is wrong, the call, and a word of the error
+    ("fem.AffineModel", "a bare matrix", lambda: AffineModel(EYE, EYE, n_modes=1), "parameter"),
+    ("fem.AffineModel", "a mechanism", lambda: affine([[1.0, -1.0], [-1.0, 1.0]]), "mechanism"),
+    ("fem.AffineModel", "mass of another size", lambda: affine(STIFF, np.eye(3)), "mass"),
+    ("fem.AffineModel", "negative mass", lambda: affine(STIFF, -EYE), "negative"),
+    ("fem.Structure", "two nodes at one place", lambda: truss_of(nodes=NODES | {"b": (3, 2)}), "duplicates"),
+    ("fem.Structure", "a node without member", lambda: truss_of(nodes=NODES | {"b": (9, 9)}), "'b'"),
+    ("fem.Structure", "length zero", lambda: truss_of(BARS | {"b": Bar("left", "left", **STEEL)}), "'b'"),
+    ("fem.Structure", "nothing free", lambda: truss_of(supports=dict.fromkeys(NODES, "xy")), "every node"),
+    ("fem.Structure", "a beam in the plane", lambda: truss_of(BARS | {"b": SPACE_BEAM}), "three coordinates"),
+    (
+        "fem.Structure",
+        "damage to mass",
+        lambda: FRAME.assemble(["rafters"], groups={"d": ("density", "rafters")}),
+        "'d'",
+    ),
+    ("fem.Structure", "neither matrix", lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}), "stiffness"),
+    ("fem.CallableModel", "text", lambda: fem.CallableModel(lambda t: "no", ["k"], 1).frequencies([[1]]), "expected"),
+    ("fem.shape_jacobian", "a program", lambda: fem.shape_jacobian(ONE_MODE, [1.0]), "'local_modes'"),
+    ("fem.share_reordered", "a program", lambda: fem.share_reordered(ONE_MODE, [[1.0]]), "'modes'"),
+    ("fem.share_reordered", "no rows", lambda: fem.share_reordered(TRUSS, np.ones((0, 4))), "theta"),
+    ("fem.match_modes", "too many modes", lambda: fem.match_modes(TRUSS, np.ones((1, 50))), "50"),
+    ("fem.match_modes", "no dofs", lambda: fem.match_modes(TRUSS, NOMINAL, shapes=np.ones((2, 6))), "dofs"),
+    ("LagFeatures", "a table of lags", lambda: LagFeatures([[1, 2]]).fit(HOURLY), "lags"),
+    ("LagFeatures", "a billion lags", lambda: LagFeatures(10**9).fit(HOURLY), "1000000000"),
+    ("LagFeatures", "one huge lag", lambda: LagFeatures([10**30]).fit(HOURLY), "lag"),
+    ("LagFeatures", "lags of ages", lambda: LagFeatures([0, 10**6]).fit(HOURLY), "years"),
+    ("LagFeatures", "freq, no stamps", lambda: LagFeatures(freq="1h").fit([[1.0]] * 9), "Datetime"),
+    ("LagFeatures", "tolerance, no stamps", lambda: LagFeatures(tolerance="1h").fit([[1.0]] * 9), "'1h'"),
+    ("LagFeatures", "months", lambda: LagFeatures(freq="MS").fit(HOURLY), "fixed length"),
+    ("LagFeatures", "unit of months", lambda: LagFeatures(freq=np.timedelta64(1, "M")).fit(HOURLY), "freq|fixed"),
+    ("LagFeatures", "business days", lambda: LagFeatures(freq=pd.offsets.BDay()).fit(HOURLY), "freq"),
+    ("LagFeatures", "no unit", lambda: LagFeatures(freq="24").fit(HOURLY), "unit"),
+    ("LagFeatures", "one stamp", lambda: LagFeatures(2).fit(HOURLY[:1]), "freq"),
+    ("LagFeatures", "a stamp twice", lambda: LagFeatures().fit(pd.concat([HOURLY, HOURLY[3:4]])), "03:00"),
+    ("LagFeatures", "durations", lambda: LagFeatures().fit(indexed(HOURLY.index - STAMP)), "durations"),
+    ("LagFeatures", "text", lambda: LagFeatures().fit(indexed(HOURLY.index.astype(str))), "text"),
+    ("LagFeatures", "a missing stamp", lambda: LagFeatures().fit(indexed([None, *HOURLY.index[1:]])), "row 0"),
+    ("LagFeatures", "levels", lambda: LagFeatures().fit(HOURLY.set_index([np.ones(20), HOURLY.index])), "levels"),
+    ("LagFeatures", "offsets", lambda: LagFeatures().fit(indexed(OFFSETS)), "UTC"),
+    ("LagFeatures", "another time zone", lambda: LAGS.transform(HOURLY.tz_localize("UTC")), "UTC"),
+    ("LagFeatures", "stamps lost", lambda: LAGS.transform(HOURLY.reset_index(drop=True)), "Datetime"),
+    ("LagFeatures", "stamps found", lambda: LagFeatures().fit([[1.0]] * 9).transform(HOURLY), "without"),
+    ("ExponentialMeans", "a duration, no stamps", lambda: means(["30D"]).fit([[1.0]] * 9), "'30D'"),
+    ("ExponentialMeans", "rows, stamps", lambda: means([3]).fit(HOURLY), "3"),
+    ("ExponentialMeans", "months", lambda: means(["1M"]).fit(HOURLY), "fixed length"),
+    ("ExponentialMeans", "negative", lambda: means(["-1h"]).fit(HOURLY), "'-1h'"),
+    ("ExponentialMeans", "thirty years", lambda: means(["11000D"]).fit(HOURLY), "years"),
+    ("ExponentialMeans", "the same twice", lambda: means(["24h", "1D"]).fit(HOURLY), "different"),
+    ("ExponentialMeans", "none", lambda: means([]).fit(HOURLY), "time_constants"),
+    ("ExponentialMeans", "no rows", lambda: means([0]).fit([[1.0]] * 9), "positive"),
+    ("ExponentialMeans", "unknown sensor", lambda: means(["1D"], sensors=["soil"]).fit(HOURLY), "'soil'"),
+    ("ExponentialMeans", "no sensor", lambda: means(["1D"], sensors=[]).fit(HOURLY), "sensors"),
+    ("ExponentialMeans", "a stamp twice", lambda: means(["1D"]).fit(pd.concat([HOURLY, HOURLY[:1]])), "duplicate"),
+    ("HampelFilter", "a time, no stamps", lambda: HampelFilter("1D").fit(F.to_numpy()), "Datetime"),
+    ("HampelFilter", "no unit", lambda: HampelFilter("7").fit(F), "unit"),
+    ("HampelFilter", "months", lambda: HampelFilter("1M").fit(F), "fixed length"),
+    ("HampelFilter", "all targets", lambda: HampelFilter(targets=MODES).fit(F), "6"),
+    ("BiasAligner", "scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "zero"),
+    ("BiasAligner", "a mode of NaN", lambda: BiasAligner().fit(F.assign(f3=NAN)), "'f3'"),
+    ("BiasAligner", "a model of more modes", lambda: BiasAligner(TRUSS).fit(F[["f1", "f2"]]), "6"),
+    ("KNNGapImputer", "an empty column", lambda: KNNGapImputer().fit(F.assign(f2=NAN)), "'f2'"),
+    ("MahalanobisDetector", "a column of NaN", lambda: MahalanobisDetector().fit(F.assign(f1=NAN)), "'f1'"),
+    (
+        "MahalanobisDetector",
+        "gaps",
+        lambda: MahalanobisDetector(covariance=EmpiricalCovariance()).fit(DIAGONAL),
+        "0 of",
+    ),
+    ("WindowedAlarm", "a time, no stamps", lambda: WindowedAlarm("7D").fit(F.to_numpy()), "'7D'"),
+    ("WindowedAlarm", "unsorted", lambda: WindowedAlarm("7D").fit(F[::-1]), "order"),
+    ("WindowedAlarm", "too few rows", lambda: WindowedAlarm(7).fit(F[:13]), "13"),
+    ("OutlierDetector", "no scores", lambda: OutlierDetector(LocalOutlierFactor()).fit(F), "score_samples"),
+    ("TemperatureCompensator", "names for an array", lambda: LINES.fit(BOTH.to_numpy()), "targets"),
+    ("TemperatureCompensator", "folds that overlap", lambda: folded(ShuffleSplit(3)).fit_transform(BOTH), "cv|fold"),
+    ("TemperatureCompensator", "more folds than rows", lambda: folded(9).fit_transform(BOTH[:5]), "9"),
+    ("metrics.time_to_detection", "unsorted", lambda: detected(DATED[::-1], DATED.index[0]), "order"),
+    ("metrics.time_to_detection", "an onset beyond", lambda: detected(DATED, "2030"), "2030"),
+    ("metrics.time_to_detection", "another time zone", lambda: detected(DATED.tz_localize("UTC"), "2025"), "UTC"),
+    ("metrics.time_to_detection", "no records", lambda: detected([], None), "0 records"),
+    ("minimum_detectable_damage", "signs", lambda: metrics.minimum_detectable_damage([0.1, -0.1], [0, 1]), "-0.1"),
+    ("metrics.mape", "another index", lambda: metrics.mape(F, LATE), "indices"),
+    ("metrics.mape", "other columns", lambda: metrics.mape(F, F.rename(columns={"f1": "g1"})), "'g1'"),
+    ("metrics.mape", "more columns", lambda: metrics.mape(F, F.assign(f7=1.0)), "'f7'"),
+    ("metrics.mape", "-999 predicted", lambda: metrics.mape(F, changed(F, 0, 0, -999.0)), "-999"),
+    ("metrics.mape", "-999 measured", lambda: metrics.mape(changed(F, 7, 1, -999.0), F), "row 7"),
+    ("error_table", "a scenario Average", lambda: metrics.error_table(F, F, scenarios=["Average"] * 120), "Average"),
+    ("error_table", "no scenario", lambda: metrics.error_table([1, 2], [1, 2], scenarios=["a", None]), "row 1"),
+    ("updating.sensitivity", "no Jacobian", lambda: updating.sensitivity(ONE_MODE), "'jacobian'"),
+    ("updating.select_parameters", "text", lambda: updating.select_parameters(pd.DataFrame({"top": ["a"]})), "S"),
+    ("identifiability", "some noise", lambda: updating.identifiability(TRUSS, noise=[0] + [1e-3] * 5), "noise"),
+    ("identifiability", "dofs alone", lambda: updating.identifiability(TRUSS, noise=0.01, dofs=[0]), "shape_noise"),
+    ("updating.cramer_rao", "negative information", lambda: updating.cramer_rao([[-1.0]]), "negative"),
+    ("ModelUpdater", "bounds without 1", lambda: updated(bounds=[[1.1, 1.3]] * 4), "contain 1"),
+    ("ModelUpdater", "F of NaN", lambda: updated(NOMINAL * NAN), "NaN"),
+    ("ModelUpdater", "three axes", lambda: updated(NOMINAL[np.newaxis]), "dim"),
+    ("ModelUpdater", "shapes without dofs", lambda: updated(shapes=np.ones((2, 6))), "dofs"),
+    ("ModelUpdater", "dofs without shapes", lambda: updated(dofs=[0]), "shapes"),
+    ("ModelUpdater", "weight without shapes", lambda: updated(shape_weight=1.0), "shapes"),
+    ("ModelUpdater", "shapes half NaN", lambda: updated(shapes=[[NAN] * 6, [1] * 6], dofs=[0, 1]), "row 0"),
+    ("ModelUpdater", "a program", lambda: updated([[1.0]], model=ONE_MODE, shapes=[[1.0]], dofs=[0]), "'local_modes'"),
+    ("InverseSurrogate", "neither model nor theta", lambda: surrogate.InverseSurrogate().fit(), "theta"),
+    ("InverseSurrogate", "steps without a model", lambda: surrogate.InverseSurrogate(refine=5).fit(F, F), "refine"),
+    ("InverseSurrogate", "inverted without steps", lambda: bare().invert(F), "refine is 0"),
+    ("InverseSurrogate", "no deviations", lambda: bare().predict(F, return_std=True), "standard deviations"),
+    ("DataInformedFEM", "another index", lambda: chain().fit(T, LATE), "indices"),
+    ("DataInformedFEM", "scored on another index", lambda: CHAIN.score(T, LATE), "indices"),
+    (
+        "DataInformedFEM",
+        "no damage",
+        lambda: chain(ONE_MODE).fit(T, F[["f1"]]).simulate(T, damage={"k": 0.1}),
+        "'damaged'",
+    ),
+    ("datasets.load_z24", "not that file", lambda: datasets.load_z24(__file__), "header"),
+    ("fem.read_triplets", "infinite values", lambda: fem.read_triplets(FOLDER / "infinite.sti"), "finite"),
+    ("preprocessing.check_records", "other rows", lambda: preprocessing.check_records(T, F[1:]), "119"),
+    ("fem.AffineModel.frequencies", "1e308", lambda: TRUSS.frequencies([[1e308, 1, 1, 1]]), "theta"),
+    ("fem.Structure", "1e308", lambda: truss_of(BARS | {"tie": Bar("left", "right", 1e308, 1.0)}), "E"),
+]
+PERCENT = [  # shares in percent are refused with a hint
+    ("InverseSurrogate", "noise", lambda: surrogate.InverseSurrogate(TRUSS, noise=0.5).fit(), "percent"),
+    ("fem.add_noise", "noise by mode", lambda: fem.add_noise(F, [0.5, 0.4, 0.5, 0.6, 0.7, 0.5]), "40 %"),
+    ("ModelUpdater", "prior", lambda: updated(prior=30), "0.3 means 30 %"),
+    ("studies.Scenario", "severity", lambda: studies.Scenario("a", {"top": 20}), "percent"),
+    ("studies.Scenario", "position on a curve", lambda: studies.Scenario("a", {"top": 0.2}, severity=20), "percent"),
+    ("studies.Scenario", "strengthening", lambda: studies.Scenario("a", {"top": -15}), "-10"),
+    ("studies.sweep", "severities", lambda: studies.sweep(TRUSS, [10, 20]), "percent"),
+    ("studies.PODCurve", "severity", lambda: CURVE.predict(20), "shares"),
+    ("with_damage_parameters", "range", lambda: TRUSS.with_damage_parameters(["top"], severities=(0, 60)), "below 1"),
+]
+WARNED_OF = [
+    ("reduced model", "outside its box", lambda: REDUCED.frequencies(np.full((3, 4), 2.0)), "3 of 3"),
+    (
+        "fem.CallableModel",
+        "it fails",
+        lambda: fem.CallableModel(lambda t: 1 / 0, ["k"], 1).frequencies([[1]]),
+        "ZeroDivision",
+    ),
+    ("KNNGapImputer", "-999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "-999"),
+    ("BiasAligner", "-999", lambda: BiasAligner().fit(changed(F, 3, 1, -999.0)), "'f2'"),
+    ("MahalanobisDetector", "-999", lambda: MahalanobisDetector().fit(changed(F, 3, 1, -999.0)), "-999"),
+    ("MahalanobisDetector", "few records", lambda: MahalanobisDetector().fit(F[:20]), "49"),
+    ("MahalanobisDetector", "rows lost", lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)), "7 of 120"),
+    ("MahalanobisDetector", "all lost", lambda: DETECTOR.predict(F * NAN), "120 of 120"),
+    (
+        "MahalanobisDetector",
+        "masked",
+        lambda: MahalanobisDetector().fit(F.to_numpy()[:, :1]).predict(masked(F)[:, :1]),
+        "1 of 120",
+    ),
+    ("WindowedAlarm", "few windows", lambda: WindowedAlarm(2).fit(F[:40]), "49"),
+    ("TemperatureCompensator", "-999", lambda: LINES.fit(changed(BOTH, 0, 0, -999.0)), "-999"),
+    ("TemperatureCompensator", "kelvin", lambda: LINES.fit((T + 273.15).join(F)), "kelvin"),
+    ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "above 150"),
+    ("TemperatureCompensator", "hot", lambda: WHITENER.transform((T + 60).join(F)), "far outside"),
+    ("ModelUpdater", "rad/s", lambda: updated(NOMINAL * 2 * np.pi), "rad/s"),
+    ("ModelUpdater", "far off", lambda: updated(NOMINAL * 1.5), "15 %"),
+    ("ModelUpdater", "one mode", lambda: updated([[7.4]], model=datasets.make_truss(1)), "4 parameters"),
+    ("ModelUpdater", "modes swapped", lambda: updated(NOMINAL[:, [0, 1, 3, 2, 4, 5]]), "order"),
+    ("ModelUpdater", "at the bounds", lambda: updated(NOMINAL * 1.1, bounds=0.1), "'bottom'"),
+    (
+        "ModelUpdater",
+        "little noise",
+        lambda: updated(NOMINAL * 1.04 + 1, bounds=0.1, frequency_std=1e-4),
+        "frequency_std",
+    ),
+    ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
+    ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "far outside"),
+    ("DataInformedFEM", "rad/s", lambda: chain().fit(T, F * 2 * np.pi), "rad/s"),
+    ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
+    ("DataInformedFEM", "modes swapped", lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]), "0, 1, 3, 2"),
+    ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "20 complete rows"),
+    ("DataInformedFEM", "kelvin", lambda: CHAIN.predict(T + 273.15), "far outside"),
+    ("DataInformedFEM", "Fahrenheit", lambda: CHAIN.predict(T * 1.8 + 32), "far outside"),
+]
+
+
+def with_a_column(bad):
+    """Calls with a table that has a bad column, c."""
+    return {
+        "MahalanobisDetector": lambda: MahalanobisDetector().fit(F.assign(c=bad)),
+        "LagFeatures": lambda: LagFeatures(2).fit(T.assign(c=bad)),
+        "KNNGapImputer": lambda: KNNGapImputer().fit(F.assign(c=bad)),
+        "DataInformedFEM, X": lambda: chain().fit(T.assign(c=bad), F),
+        "DataInformedFEM, y": lambda: chain().fit(T, F.assign(c=bad)),
+        "TemperatureCompensator": lambda: LINES.fit(BOTH.assign(c=bad)),
+        "TemperatureMapper": lambda: surrogate.TemperatureMapper(Ridge()).fit(T, F.assign(c=bad)),
+        "metrics.error_table": lambda: metrics.error_table(F.assign(c=1.0), F.assign(c=bad)),
+    }
+
+
+SHARES = pd.Series([0.1, 0.2, 0.3, 0.15], NAMES)
+BOX = pd.DataFrame({"lowest": 1 - SHARES, "highest": 1 + SHARES})
+STEPS = pd.Series([1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3], MODES)
+WEIGHTS = pd.Series(np.linspace(1, 2, len(T)), T.index)
+BY_NAME = {  # values with names, and a call that reads them by name
+    "theta, a series": (1 + SHARES, TRUSS.frequencies),
+    "theta, a frame": ((1 + SHARES).to_frame().T, lambda theta: fem.evaluate(TRUSS, theta).ravel()),
+    "half-widths": (SHARES, lambda bounds: fem.sample(TRUSS, bounds, 4, random_state=0).theta),
+    "box": (BOX, lambda bounds: check_bounds(bounds, NAMES)),
+    "prior": (SHARES, lambda prior: check_prior(prior, NAMES)),
+    "severities": (SHARES, lambda damage: TRUSS.damaged(damage).frequencies(np.ones((1, 4)))),
+    "severities of a scenario": (
+        SHARES,
+        lambda damage: CHAIN.simulate(T[:2], damage=studies.Scenario("a", damage).damage),
+    ),
+    "noise": (STEPS, lambda noise: fem.add_noise(F, noise, random_state=0)),
+    "noise of a chain": (STEPS, lambda noise: CHAIN.simulate(T[:5], noise=noise, random_state=0)),
+    "noise of an inverse": (
+        STEPS,
+        lambda noise: surrogate.InverseSurrogate(TRUSS, **INVERSE | {"noise": noise}).fit().transform(NOMINAL),
+    ),
+    "noise of a campaign": (STEPS, lambda noise: datasets.make_truss_campaign(noise=noise, random_state=0).frequencies),
+    "noise of what is identified": (STEPS, lambda noise: updating.identifiability(TRUSS, noise=noise).deviations),
+    "deviations": (100 * STEPS, lambda std: updated(F[:9], bounds=0.9, frequency_std=std).theta_),
+    "reference": (F.mean(), lambda reference: BiasAligner(reference).fit_transform(F)),
+    "weights": (
+        WEIGHTS,
+        lambda weights: surrogate.TemperatureMapper(Ridge()).fit(T, F / 10, sample_weight=weights).predict(T),
+    ),
+}
+
 
 NOT_CALLED = {
+    "detection.DamageDetector": "abstract",
     "fem.BatchModel": "a protocol",
     "fem.DamageableModel": "a protocol",
     "fem.DifferentiableModel": "a protocol",
