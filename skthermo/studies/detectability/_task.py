@@ -419,24 +419,20 @@ def detection_task(
     Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
     among them. ``task.refit(search)`` fits it to the baseline.
 
-    The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
+    The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
+    from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
-    until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
-    scenarios, which count alike. A damaged record that is not evaluated is not found. Where false alarms by the own
-    threshold exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound.
-
-    All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
-    settings are compared more certainly than each is known.
+    until no more do. A damaged record that is not evaluated is not found. Where false alarms by the own threshold
+    exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound. All
+    scenarios have the same weather, and a repeat the same noise in all of them (common random numbers).
 
     Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
-    into another. Its first records, for which lags and windows lack records before, may not be evaluated: T should be
-    long beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days,
-    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart
-    in a single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+    into another. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
+    so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
+    records, and lags of rows without stamps, do so only in ``scoring``.
 
-    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
-    regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
-    records.
+    A compensator of the kind that the chain is looks better in its simulations than it is: choose the kind of
+    regression by measured records.
 
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
     with noise that took no part.
