@@ -338,10 +338,7 @@ class TemperatureMapper(MultiplierRegressor):
     }
 
     def __init__(
-        self,
-        regressor: BaseEstimator | None = None,
-        *,
-        random_state: int | np.random.RandomState | None = None,
+        self, regressor: BaseEstimator | None = None, *, random_state: int | np.random.RandomState | None = None
     ):
         self.regressor = regressor
         self.random_state = random_state

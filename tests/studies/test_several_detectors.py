@@ -157,10 +157,7 @@ def test_the_truth_is_asked_once_for_all_detectors(fem):
 
 def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
     for name in detectors():
-        calibration, healthy = (
-            study.calibration_[name, "simulated"],
-            study.decisions_[name, "healthy", "simulated"],
-        )
+        calibration, healthy = (study.calibration_[name, "simulated"], study.decisions_[name, "healthy", "simulated"])
         assert calibration.shape == healthy.shape
         assert (calibration == healthy).mean() < 0.05
         assert np.median(calibration) == pytest.approx(np.median(healthy), abs=0.1 * float(np.std(healthy)))

@@ -280,10 +280,7 @@ def test_an_inverse_within_a_pipeline_gets_the_model_too():
 
 @pytest.mark.parametrize(
     ("X", "y", "message"),
-    [
-        (T, None, "requires y"),
-        (pd.concat([T, T.iloc[:1]]), pd.concat([F, F.iloc[:1]]), "duplicate stamps"),
-    ],
+    [(T, None, "requires y"), (pd.concat([T, T.iloc[:1]]), pd.concat([F, F.iloc[:1]]), "duplicate stamps")],
 )
 def test_bad_input_is_named(X, y, message):
     with pytest.raises(ValueError, match=message):

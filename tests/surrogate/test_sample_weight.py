@@ -101,11 +101,7 @@ def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
         (np.zeros(120), None, "sample_weight is zero in all 120 rows"),
         (pd.Series(WEIGHTS), None, "120 of them unknown to X, and lacks 120 of its 120; expected the index of X"),
         (pd.Series(WEIGHTS[:50], T.index[:50]), None, "has 50 rows, 0 of them unknown to X, and lacks 70 of its 120"),
-        (
-            WEIGHTS,
-            TemperatureMapper(KNeighborsRegressor()),
-            r"fit of TemperatureMapper\(regressor=.* takes no",
-        ),
+        (WEIGHTS, TemperatureMapper(KNeighborsRegressor()), r"fit of TemperatureMapper\(regressor=.* takes no"),
         (WEIGHTS, make_pipeline(LagFeatures(2), KNeighborsRegressor()), r"(?s)fit of Pipeline.* takes no weights"),
     ],
 )

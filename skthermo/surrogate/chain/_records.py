@@ -108,11 +108,7 @@ class TrainingRecords(SavesFrames):
             weights = np.zeros(len(targets))
             weights[order] = self.weights[residuals.rows[taken]]
         return replace(
-            self,
-            frequencies=frame_like(self.frequencies, measured),
-            usable=measured,
-            targets=targets,
-            weights=weights,
+            self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
         )
 
     def out_of_fold(

@@ -590,11 +590,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             self._learn_inverse(inputs, theta, seed)
 
     def _learn_simulations(
-        self,
-        X: ArrayLike | None,
-        random: np.random.RandomState,
-        seed: np.random.RandomState | None,
-        stages: Stages,
+        self, X: ArrayLike | None, random: np.random.RandomState, seed: np.random.RandomState | None, stages: Stages
     ) -> None:
         """Learn from simulations, and once more from a narrower box if that is asked for."""
         check_model(self.model)
