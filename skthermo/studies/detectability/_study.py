@@ -19,6 +19,7 @@ from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
 from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
+from skthermo.fem import FEModel
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._pod_curve import check_probability
@@ -32,6 +33,7 @@ from skthermo.studies.detectability._simulation import (
 )
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.surrogate import FittedChain
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 P, Answer = ParamSpec("P"), TypeVar("Answer")
@@ -202,7 +204,7 @@ class DetectabilityStudy(BaseEstimator):
 
     def __init__(
         self,
-        fem: Any,
+        fem: FittedChain,
         detectors: Any,
         scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,
@@ -211,7 +213,7 @@ class DetectabilityStudy(BaseEstimator):
         gaps: float | Literal["fitted"] | None = "fitted",
         outliers: ArrayLike | Literal["fitted"] | None = "fitted",
         uncertainty: Literal["all"] | Sequence[str] = "all",
-        models: Sequence[Any] | None = None,
+        models: Sequence[FEModel] | None = None,
         n_replicates: int = 20,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -398,7 +400,7 @@ class DetectabilityStudy(BaseEstimator):
         return type(self)(**self.get_params(deep=False) | {"detectors": twins})  # the chain is fitted, and shared
 
 
-def check_detector(detector: Any, what: str) -> None:
+def check_detector(detector: BaseEstimator, what: str) -> None:
     """Raise an error for what is not an outlier detector."""
     needed = ("get_params", "fit", "decision_function", "score_samples")
     lacking = [name for name in needed if not hasattr(detector, name)]

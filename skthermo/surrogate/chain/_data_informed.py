@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypeAlias, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,7 @@ from skthermo._estimators.regressors import (
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, is_real
 from skthermo._tables.frames import (
+    Table,
     check_columns,
     check_same_rows,
     check_temperatures,
@@ -78,8 +79,6 @@ from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3
 """Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
-
-Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
 
 
 class Simulated(TypedDict, total=False):
@@ -871,7 +870,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 seed_parts(part, random_state)
         return inverse, mapper, aligner, imputer
 
-    def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
+    def _read_records(self, X: Table, y: Any) -> tuple[Any, Any]:
         """Copies of temperatures and frequencies, checked; frames stay frames."""
         check_model(self.model)
         if y is None:
@@ -888,11 +887,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_columns(T, "temperature", varying=True)
         return T, F
 
-    def _findings(self, T: Any, F: Any) -> Any:
+    def _findings(self, T: Table, F: Table) -> Any:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
 
-    def _fit_inverse(self, inverse: ChainInverse, T: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Any:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
@@ -914,12 +913,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.parameters_ = frame_like(self.records_.temperatures, self.records_.targets, self.parameter_names_)
         return self
 
-    def _as_targets(self, X: Any, frequencies: Array) -> Any:
+    def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
 
-def named(T: Any, theta: Array, names: Sequence[str]) -> pd.DataFrame:
+def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
 
