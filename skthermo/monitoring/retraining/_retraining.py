@@ -310,7 +310,8 @@ class Harvest:
         masked = records.copy()
         told = faults if faults is not None else pd.DataFrame()
         for fault in told.itertuples():
-            if fault.kind == "disagree" or (are_put_back and fault.kind == "swapped"):  # nothing is left out
+            is_kept = fault.kind == "disagree" or (are_put_back and fault.kind == "swapped")
+            if is_kept or fault.column not in records:  # nothing is left out, or the sensor is a reference
                 continue
             inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
             masked.loc[inside, fault.column] = np.nan
