@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import joblib
 import numpy as np
@@ -26,9 +26,6 @@ from skthermo.surrogate._memory import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
 from skthermo.surrogate.refinement import Refinement, ResponseSurface, ShapeInputs
 
-if TYPE_CHECKING:
-    from skthermo.surrogate.inverse._inverse import InverseSurrogate
-
 
 @dataclass(frozen=True)
 class InverseColumns:
@@ -39,7 +36,7 @@ class InverseColumns:
     n_jobs: int | None
 
     @classmethod
-    def of(cls, inverse: InverseSurrogate) -> InverseColumns:
+    def of(cls, inverse: Any) -> InverseColumns:
         """The columns that the parameters of an `InverseSurrogate` ask for."""
         if inverse.dofs is None:
             return cls(inverse.model, None, inverse.n_jobs)
@@ -53,7 +50,7 @@ class InverseColumns:
         dofs = () if self.shapes is None else self.shapes.dofs
         return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
 
-    def check(self, inverse: InverseSurrogate, X: Table) -> None:
+    def check(self, inverse: Any, X: Table) -> None:
         """Check number and names of the columns; without X, they are those of an array."""
         n_columns = len(self.names())
         names_only = np.ones((1, n_columns)) if X is None else X
@@ -62,7 +59,7 @@ class InverseColumns:
             more = f" and their shapes at {self.shapes.n_sensors} sensors, {n_columns} columns" if self.shapes else ""
             raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}{more}")
 
-    def read(self, inverse: InverseSurrogate, X: ArrayLike) -> Array:
+    def read(self, inverse: Any, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
         has_names = hasattr(inverse, "feature_names_in_") or not hasattr(X, "columns")
         values = X if has_names else as_floats(X)
@@ -136,7 +133,7 @@ class SimulatedTraining:
     simulator: Simulator
 
     @classmethod
-    def of(cls, inverse: InverseSurrogate, random: np.random.RandomState, n_refined: int) -> SimulatedTraining:
+    def of(cls, inverse: Any, random: np.random.RandomState, n_refined: int) -> SimulatedTraining:
         """Samples within the bounds of an `InverseSurrogate`, with warnings about modes that cannot be told apart.
 
         ``n_refined`` records are expected to be refined afterwards.
@@ -165,7 +162,7 @@ class SimulatedTraining:
             return cls(box, samples, Simulator(model, reason=reason))
         return cls(box, samples, Simulator(model, reduced, box.bounds, tol))
 
-    def narrower(self, inverse: InverseSurrogate, random: np.random.RandomState, estimates: Array) -> SimulatedTraining:
+    def narrower(self, inverse: Any, random: np.random.RandomState, estimates: Array) -> SimulatedTraining:
         """As many samples from the part of the box where records have their parameters, as far as estimates tell."""
         n_known = np.count_nonzero(~np.isnan(estimates).any(axis=1))
         if n_known < 2:
@@ -179,7 +176,7 @@ class SimulatedTraining:
         return SimulatedTraining(box, samples, self.simulator)
 
 
-def held_out(inverse: InverseSurrogate, noise: ArrayLike) -> tuple[Array, Array]:
+def held_out(inverse: Any, noise: ArrayLike) -> tuple[Array, Array]:
     """Noisy columns and parameters of simulations in the box of a fitted inverse that it has not learned from."""
     random, simulator = np.random.RandomState(HELD_OUT_SEED), inverse.simulator_
     model = simulator.reduced or simulator.model
@@ -196,7 +193,7 @@ def narrower(bounds: Array, theta: Array) -> Array:
 
 
 def _draw(
-    inverse: InverseSurrogate,
+    inverse: Any,
     model: FEModel,
     box: Box,
     random: np.random.RandomState,
