@@ -233,7 +233,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes = slopes",
         ),
     ],
-    ("surrogate/inverse/_inversions.py", "surrogate/test_memory.py"): [
+    ("surrogate/inverse/_training.py", "surrogate/test_memory.py"): [
         (
             "stale inversions in memory",
             "content_of(replace(refinement, n_jobs=None), inputs, guess)",
@@ -465,7 +465,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "known = self.calibration",
         ),
     ],
-    ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
+    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
         ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
         ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
@@ -474,8 +474,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "np.mean(self.values[rows] < raised)",
             "np.mean(~(self.values[rows] >= raised))",
         ),
-    ],
-    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
     ],
@@ -483,7 +481,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
         ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
     ],
-    ("surrogate/chain/_record_simulator.py", "surrogate/test_service_records.py"): [
+    ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [

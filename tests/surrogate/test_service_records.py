@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from skthermo.preprocessing import HampelFilter
-from skthermo.surrogate.chain import _record_simulator
-from skthermo.surrogate.chain._record_simulator import ServiceRecords
+from skthermo.surrogate.chain import _records
+from skthermo.surrogate.chain._records import ServiceRecords
 from tests.surrogate.chains import F, T, chain
 
 
@@ -67,7 +67,7 @@ def test_trees_find_the_same_records_of_similar_weather(monkeypatch):
             assert found[0] == found[1]
     drawn = []
     for few in (0, 10**6):
-        monkeypatch.setattr(_record_simulator, "FEW", few)
+        monkeypatch.setattr(_records, "FEW", few)
         taken = [records.draw(records.places, np.random.RandomState(seed)) for seed in range(15)]
         drawn.append(missing[np.concatenate(taken)].mean(axis=0))
     np.testing.assert_allclose(drawn[0], drawn[1], atol=0.05)  # some four standard deviations

@@ -11,10 +11,8 @@ from skthermo.fem import FEModel
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._simulator import Box, Simulator
-from skthermo.surrogate.chain._discrepancy import Discrepancy
-from skthermo.surrogate.chain._record_simulator import RecordSimulator
-from skthermo.surrogate.chain._records import TrainingRecords
-from skthermo.surrogate.chain._thermal_model import ThermalModel, Weather
+from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
+from skthermo.surrogate.chain._thermal_model import Discrepancy, ThermalModel, Weather
 
 
 class FittedChain(Protocol):
