@@ -73,9 +73,7 @@ class Thermometers:
     records: Gaussian
 
     @classmethod
-    def of(
-        cls, stamps: pd.DatetimeIndex, temperatures: Array, per_year: float, is_reference: NDArray[np.bool_]
-    ) -> Thermometers | None:
+    def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, per_year: float) -> Thermometers | None:
         """Learn from the baseline; None where it has too few days, or fewer than two thermometers."""
         n_sensors = temperatures.shape[1]
         every_day = local_days(stamps)

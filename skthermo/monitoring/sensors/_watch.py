@@ -32,6 +32,7 @@ TIMES_LONGEST = (1.7, 4.0)  # times the longest run of the baseline that faults 
 TIMES_USUAL = (3.0, 4.0)  # times its usual run
 KINDS_OF_RUNS = {"implausible": IMPLAUSIBLE, "stuck": REPEATED, "dead": MISSING}
 HELD = ("stuck", "implausible")  # faults of a response that may be a change of the structure
+RARER = 3.0  # times, a healthy thermometer is called faulty where a reference alone can say so
 REFERENCE = 2.0  # times `CLEAR`, the logarithm of the odds that a thermometer is at fault and not a reference
 
 
@@ -170,7 +171,8 @@ class SensorWatch:
         """Learn from the baseline; lags of a sensor may have columns of their own.
 
         ``reference`` names columns of T, ``units`` are texts by column. ``per_year`` offsets and drifts of healthy
-        thermometers may be reported in a year, over all of them.
+        thermometers may be reported in a year, over all of them, and a
+        third of it with references.
         """
         by_sensor = columns_by_sensor(T)
         order = np.argsort(T.index.asi8, kind="stable")
@@ -190,7 +192,7 @@ class SensorWatch:
             "" if stamps.tz is None else str(stamps.tz),
             Plausible.of_weather(temperatures),
             RunLimits.of(np.hstack([temperatures, responses]), per_day),
-            Thermometers.of(stamps, temperatures, per_year, is_reference),
+            Thermometers.of(stamps, temperatures, per_year / (RARER if is_reference.any() else 1.0)),
             Responses.of(temperatures, responses, stamps, texts[len(by_sensor) :]),
         )
 
