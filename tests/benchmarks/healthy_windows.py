@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/healthy_windows.py
 
-A chain without settings learns a year of records of a structure of known truth: the truss by its thermo-mechanical law, a
-cable-stayed footbridge, and a girder of four spans of which two parameters follow the weather slowly. Noise is
+A chain without settings learns a year of records of a structure of known truth: the truss by its thermo-mechanical
+law, a cable-stayed footbridge, and a girder of four spans of which two parameters follow the weather slowly. Noise is
 independent or correlated by .5 from record to record. Windows of 15, 60 and 365 days of the three years that follow,
 all healthy, give the share of p values of .05 or less, which should be 4 to 7 %. Beside it stands the power: the share
 of windows of 60 days with damage of 5, 10 and 20 % in one group in which this group alone is the most probable
