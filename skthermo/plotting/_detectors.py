@@ -302,7 +302,7 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     unknown = tested.get("not_evaluated", pd.Series(dtype=float))
     notes = {name: f"{share_text(share)} not evaluated" for name, share in unknown.items() if share > 0}
     label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
-    false, found = "healthy records in alarm (%, square-root scale)", "damaged records in alarm (%)"
+    false, found = "healthy in alarm (%, square-root scale)", "damaged in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
         "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
