@@ -101,9 +101,6 @@ def test_failures_and_records_that_are_not_evaluated_are_told():
     assert rows_named(display.axes_[0])[-1] == "cointegration"
     assert texts(display.axes_[0]) == ["20\N{NO-BREAK SPACE}% not evaluated", "failed: LinAlgError: singular"]
     assert texts(display.axes_[1]) == ["20\N{NO-BREAK SPACE}% not evaluated"]
-
-
-def test_a_detector_that_failed_in_one_of_two_studies_is_told_there():
     results = BOTH[(BOTH["detector"] != "linear") | (BOTH["scenario"] == "healthy")]
     results = pd.concat([results, pd.DataFrame([{"detector": "linear", "error": "ValueError: no"}])])
     healthy, damaged = DetectorsDisplay.from_predictions(results).axes_
