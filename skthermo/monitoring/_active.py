@@ -20,7 +20,7 @@ from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompen
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
+from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
 
@@ -100,7 +100,7 @@ class ActiveDetector(SavesFrames):
     plausible: Plausible
     corrections: Corrections
     direction: Direction | None
-    promises: dict[str, Promise]
+    promises: dict[str, FalseAlarmEstimate]
 
     @classmethod
     def of(
@@ -114,6 +114,7 @@ class ActiveDetector(SavesFrames):
         *,
         by_direction: bool,
         per_year: float,
+        persistence: int = 1,
     ) -> ActiveDetector:
         """Learned from what the detector was fitted on; ``by_direction`` tells softening from stiffening."""
         temperatures = [name for name in trained.columns if name not in targets]
@@ -122,14 +123,15 @@ class ActiveDetector(SavesFrames):
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind = None, {"damage": index}
+        direction, by_kind, release = None, {"damage": index}, release_level(index, DAY, persistence)
         if by_direction:
             direction = Direction.of(detector, trained[columns], targets)
-            stiffer = direction.of_rows(trained[columns]) < 0
-            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
-            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        release = release_level(index, DAY)
-        promises = {kind: promised_rule(one, per_year, hold=DAY, release=release) for kind, one in by_kind.items()}
+            is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
+            by_kind = {"damage": index.mask(is_high & stiffer), "stiffening": index.mask(is_high & ~stiffer)}
+        promises = {
+            kind: estimate_false_alarms(one, per_year, hold=DAY, persistence=persistence, release=release)
+            for kind, one in by_kind.items()
+        }
         plausible = Plausible.of(trained, targets)
         parts = (memory, columns, temperatures, targets, usual, weather, plausible, corrections, direction, promises)
         return cls(detector, trained, *parts)

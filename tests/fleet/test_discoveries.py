@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import kstest, norm
 
 from skthermo.fleet._discoveries import _limits
-from skthermo.monitoring._promise import Tail
+from skthermo.monitoring._false_alarms import Tail
 
 N_PEAKS, RATIO = 60, 0.7
 
@@ -25,7 +25,7 @@ def healthy(random, n=1, common=0.0, is_exponential=False):
         highest = 3.0 * -np.log(-np.expm1(norm.logcdf(z) / max(number, 1)))  # of so many exponential peaks
         tail = Tail.of(base, 1.0)
         tail = Tail(tail.k, tail.base, tail.excess) if is_exponential else tail
-        chances.append(tail.chance(highest, RATIO) if number else 1.0)
+        chances.append(tail.p_value(highest, RATIO) if number else 1.0)
     return np.array(chances)
 
 
@@ -43,12 +43,12 @@ def test_small_chances_are_those_of_a_long_simulation(x):
     rate, scale = random.gamma(5, size=n), 8.0 / random.gamma(4, size=n)
     expected = -np.expm1(-2.0 * rate * np.exp(-8.0 * x / scale))
     deviation = expected.std() / np.sqrt(n)
-    assert tail.chance(10.0 + 8.0 * x, 2.0) == pytest.approx(expected.mean(), abs=4 * deviation)
+    assert tail.p_value(10.0 + 8.0 * x, 2.0) == pytest.approx(expected.mean(), abs=4 * deviation)
 
 
 def test_chances_fall_with_height_and_grow_with_time():
     tail = Tail(20, 10.0, 40.0)
-    chances = np.array([[tail.chance(square, years) for square in (9, 11, 30, 200, 1e4)] for years in (0.1, 1, 10)])
+    chances = np.array([[tail.p_value(square, years) for square in (9, 11, 30, 200, 1e4)] for years in (0.1, 1, 10)])
     assert (np.diff(chances, axis=1) <= 0).all()
     assert (np.diff(chances[:, 1:], axis=0) > 0).all()
     assert (chances[:, 0] == 1).all()
@@ -82,4 +82,4 @@ def test_a_baseline_with_an_outlier_makes_chances_larger():
     odd = Tail.of(np.r_[200.0, squares[1:]], 1.0)
     plain = Tail(odd.k, odd.base, odd.excess)
     for height in (200.0, 400.0, 2000.0):
-        assert odd.chance(height, 1.0) > 10 * plain.chance(height, 1.0)
+        assert odd.p_value(height, 1.0) > 10 * plain.p_value(height, 1.0)

@@ -7,52 +7,65 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
-from skthermo._tables.times import DAY, YEAR
+from skthermo._tables.times import DAY, YEAR, correlation_time
 
-N_PEAKS = 20  # highest excursions of the baseline from which the tail is learned
+N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
+N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
 NEAR = 15  # days of the year, up to which a record stands for the season around it
+SEASON = 30  # days of the year, before and after each, whose records give its scale
+LEAST_INDEX = 0.1  # share of the median index, as which smaller ones count for the scale of a season
 FEWEST_PEAKS = 3
 DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
-HEAVY = 0.2  # the same share, from which on chances are those of a heavier tail
+HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
 
 
 @dataclass(frozen=True)
 class EventState:
-    """Whether an event is open, and since when all judged records have stayed at or below the release level."""
+    """Whether an event is open, since when all levels have stayed at or below the clear threshold, and the last indices.
+
+    ``quiet_since`` is in nanoseconds, None if the last level was above it, or there was none.
+    """
 
     is_open: bool = False
-    quiet_since: int | None = None  # nanoseconds; None if the last judged record was above, or there was none
+    quiet_since: int | None = None
+    recent: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class EventRule(SavesFrames):
-    """An event opens with a record above ``threshold`` and closes when those of ``hold`` stayed within ``release``.
+    """An event opens when ``persistence`` evaluated records in a row exceed ``threshold``.
 
-    Records that are not evaluated (NaN) neither open nor close it: the time of silence counts only between judged
-    records.
+    That is when their level, the lowest index of the last ``persistence`` evaluated records, exceeds it; before there
+    are so many, it is 0. An event closes when the levels of ``hold`` have stayed within ``release``. Records that are
+    not evaluated (NaN) neither open nor close it: the time of quiet counts only between evaluated records.
     """
 
     threshold: float
     release: float
     hold: pd.Timedelta
+    persistence: int = 1
 
-    def follow(self, state: EventState, index: Array, times: NDArray[np.int64]) -> tuple[NDArray[np.bool_], EventState]:
-        """Whether an event is open after each record, in order of time (nanoseconds), and the state after the last."""
-        after = np.full(len(index), state.is_open)
+    def follow(
+        self, state: EventState, index: Array, times: NDArray[np.int64]
+    ) -> tuple[NDArray[np.bool_], Array, EventState]:
+        """Whether an event is open after each record, in order of time (nanoseconds), levels, and the last state."""
+        after, level, recent = np.full(len(index), state.is_open), *levels(index, self.persistence, state.recent)
         places = np.flatnonzero(~np.isnan(index))
         if not len(places):
-            return after, state
-        values, at, order = index[places], times[places], np.arange(len(places))
+            return after, level, state
+        values, at, order = level[places], times[places], np.arange(len(places))
         quiet = values <= self.release
         begins = quiet & ~np.append(state.quiet_since is not None, quiet[:-1])
         last_begin = np.maximum.accumulate(np.where(begins, order, -1))
@@ -61,15 +74,23 @@ class EventRule(SavesFrames):
         opens = values > self.threshold
         last_change = np.maximum.accumulate(np.where(opens | closes, order, -1))
         is_open = np.where(last_change >= 0, opens[last_change], state.is_open)
-        last_judged = np.searchsorted(places, np.arange(len(index)), side="right") - 1
-        after = np.where(last_judged >= 0, is_open[last_judged], state.is_open)
-        return after, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None)
+        last_evaluated = np.searchsorted(places, np.arange(len(index)), side="right") - 1
+        after = np.where(last_evaluated >= 0, is_open[last_evaluated], state.is_open)
+        return after, level, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None, recent)
+
+
+def levels(index: Array, persistence: int, recent: tuple[float, ...] = ()) -> tuple[Array, tuple[float, ...]]:
+    """The lowest index of the last evaluated records at each of them, and the indices that the next ones need."""
+    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), persistence - 1
+    values = np.append([*np.zeros(n), *recent][len(recent) :], index[known])
+    if known.any():
+        level[known] = sliding_window_view(values, persistence).min(axis=1)
+    return level, tuple(values[len(values) - n :].tolist())
 
 
 def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.DataFrame:
-    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` and ``peak_time``."""
-    values = np.asarray(index, dtype=float)
-    is_open = rule.follow(EventState(), values, times.as_unit("ns").asi8)[0]
+    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` (level), ``peak_time``."""
+    is_open, values, _ = rule.follow(EventState(), np.asarray(index, dtype=float), times.as_unit("ns").asi8)
     change = np.diff(is_open.astype(np.int8), prepend=0)
     starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
     bounds = np.append(stops, len(values))[: len(starts)]
@@ -90,7 +111,8 @@ class Tail:
 
         base + excess (((k + 1) / n)^(1 / k) - 1),
 
-    on average over baselines: exact for an exponential tail, however few peaks there are.
+    on average over baselines: exact for an exponential tail, however few peaks there are. Squares are over their scale
+    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says.
     """
 
     k: int
@@ -98,39 +120,50 @@ class Tail:
     excess: float
     largest: float = 0.0  # the highest excess
     logs: float = np.nan  # the sum of ln(square / base)
+    scales: tuple[float, ...] = (1.0,)
 
     @classmethod
-    def of(cls, squares: Array, asked: float) -> Tail:
+    def of(cls, squares: Array, asked: float, scales: tuple[float, ...] = (1.0,)) -> Tail:
         """That of squared peaks, highest first, from which as many as are asked for are to be exceeded."""
         k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
         excesses, logs = squares[:k] - squares[k], np.log(squares[:k] / squares[k])
-        return cls(k, float(squares[k]), float(excesses.sum()), float(excesses[0]), float(logs.sum()))
+        return cls(k, float(squares[k]), float(excesses.sum()), float(excesses[0]), float(logs.sum()), scales)
 
     def factor(self, asked: float) -> float:
         """The excess that so many peaks exceed, in sums of all excesses."""
         return ((self.k + 1) / asked) ** (1 / self.k) - 1
 
+    def height(self, square: float) -> float:
+        """The excess over its scale that is exceeded as often as a square, in sums of all excesses; 0 below all."""
+        excess = np.maximum(square / np.array(self.scales) - self.base, 0.0) / self.excess
+        return float(((1 + excess) ** -self.k).mean() ** (-1 / self.k) - 1)
+
     def threshold(self, asked: float) -> float:
         """The index that so many peaks exceed."""
-        return float(np.sqrt(self.base + self.factor(asked) * self.excess))
+        height = self.factor(asked)
+        square = self.base + height * self.excess
+        if len(self.scales) > 1:
+            ends = square * min(self.scales) * (1 - 1e-9), square * max(self.scales) * (1 + 1e-9)
+            square = brentq(lambda one: self.height(one) - height, *ends)
+        return float(np.sqrt(square))
 
-    def chance(self, square: float, ratio: float) -> float:
+    def p_value(self, square: float, ratio: float) -> float:
         """Probability that a time so many times as long as the baseline has a squared peak as high.
 
         The number of peaks above the base in that time is negative binomial, as is that of the baseline's own; each
         exceeds the square with the probability exp(-x g), where x is its height above the base in sums of excesses, and
-        g what these leave open of the tail, gamma distributed: so that the chance of a healthy structure is uniformly
+        g what these leave open of the tail, gamma distributed: so that p values of a healthy structure are uniformly
         distributed. Integrated at the quantiles of g where exp(-x g) counts.
 
         Outliers make tails that are not exponential. Where the highest excess of the baseline is as far beyond the
         others as in one healthy baseline of five, their logarithms are taken in their place: a Pareto tail, by which
-        chances are larger.
+        probabilities are larger.
         """
-        if square <= self.base:
+        x = self.height(square)
+        if x <= 0:
             return 1.0
-        x = (square - self.base) / self.excess
         if self.largest > _largest_share(self.k, HEAVY) * self.excess:
-            x = min(x, np.log(square / self.base) / self.logs)
+            x = min(x, np.log1p(x * self.excess / self.base) / self.logs)
         g = _quantiles(self.k) / (1 + x)
         some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
         return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
@@ -148,14 +181,14 @@ class Tail:
 
 
 @dataclass(frozen=True)
-class Promise:
-    """A rule for events, and how many of them a healthy structure has in a year.
+class FalseAlarmEstimate:
+    """A rule for events, and how many of them a healthy structure is expected to have in a year.
 
     ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
-    ``highest`` of them with a probability of 90 %, by chance and because one baseline does not tell the rate.
-    ``n_years`` is the time that the baseline's judged records cover, ``n_peaks`` the number of its highest excursions
-    that the threshold comes from, ``unseen`` the seasons that the baseline does not show, for which nothing is promised
-    ("" if there is none), ``method`` what the threshold stands on in words.
+    ``highest`` of them with a probability of 90 %, by chance and because one baseline leaves the rate uncertain.
+    ``n_years`` is the time that the baseline's evaluated records cover, ``n_peaks`` the number of its highest
+    excursions that the threshold comes from, ``unseen`` the seasons without baseline records, for which there is no
+    estimate ("" if there is none), ``method`` how the threshold was found, in words.
     """
 
     rule: EventRule
@@ -172,12 +205,12 @@ class Promise:
         expected = counted_number(self.expected, "false alarm")
         return (
             f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
-            + (f"; not promised for {self.unseen}" if self.unseen else "")
+            + (f"; no estimate for {self.unseen}" if self.unseen else "")
         )
 
-    def chance(self, peak: float, n_years: float) -> float:
+    def p_value(self, peak: float, n_years: float) -> float:
         """Probability that a healthy structure has an event as high in so many years."""
-        return self.tail.chance(peak**2, n_years / self.n_years)
+        return self.tail.p_value(peak**2, n_years / self.n_years)
 
 
 @cache
@@ -186,24 +219,48 @@ def _quantiles(k: int) -> Array:
     return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
 
 
-def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D") -> float:
+def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1) -> float:
     """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
     hold, known = pd.Timedelta(hold), index.dropna()
     stamps = known.index.as_unit("ns").asi8
     whole = stamps - stamps[:1] >= hold.value
-    highest = known.rolling(hold, closed="both").max().to_numpy()
+    level = pd.Series(levels(known.to_numpy(), persistence)[0], known.index)
+    highest = level.rolling(hold, closed="both").max().to_numpy()
     return float(np.median(highest[whole] if whole.any() else highest))
 
 
-def promised_rule(
-    index: pd.Series, per_year: float = 1.0, *, hold: str | pd.Timedelta = "1D", release: float | None = None
-) -> Promise:
+def seasonal_scale(index: pd.Series) -> pd.Series:
+    """Scale of the squared indices in the season of each record, from the mean of their logarithms around it.
+
+    It is drawn to 1, the scale of the whole baseline, by as much of its variance as independent seasons would have by
+    chance, which the correlation time of what it leaves tells.
+    """
+    logs = 2 * np.log(index.clip(lower=LEAST_INDEX * index.median()))
+    logs -= logs.mean()
+    day = np.minimum(index.index.day_of_year, 365) - 1
+    around = (np.arange(365)[:, np.newaxis] + np.arange(-SEASON, SEASON + 1)) % 365
+    sums, numbers = (np.bincount(day, weights, 365)[around].sum(axis=1) for weights in (logs, None))
+    season = (sums / np.maximum(numbers, 1))[day]
+    rest = logs - season
+    noise = rest.var() * correlation_time(rest.to_numpy()) / numbers[day].mean()
+    share = max(1 - noise / season.var(), 0.0) if season.var() > 0 else 0.0
+    return pd.Series(np.exp(share * season), index.index)
+
+
+def estimate_false_alarms(
+    index: pd.Series,
+    per_year: float = 1.0,
+    *,
+    hold: str | pd.Timedelta = "1D",
+    persistence: int = 1,
+    release: float | None = None,
+) -> FalseAlarmEstimate:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
-    An excursion lasts from the first record above the release level until all records of ``hold`` have stayed within
+    An excursion lasts from the first level above the release level until all levels of ``hold`` have stayed within
     it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
-    it, and the threshold comes from the `Tail` of the squared peaks. Where only departures of one kind count and
-    others have an index of 0, ``release`` should be the `release_level` of all.
+    it, and the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only
+    departures of one kind count, ``release`` should be the `release_level` of all.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     n_years = _years(known.index, hold)
@@ -212,8 +269,11 @@ def promised_rule(
             f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
             "expected at least 2, all of them finite"
         )
-    release = release_level(known, hold) if release is None else release
-    excursions = find_events(known.to_numpy(), known.index, EventRule(release, release, hold))
+    scale = seasonal_scale(known)
+    standard = known / np.sqrt(scale)
+    quiet = release_level(standard, hold, persistence)
+    excursions = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
+    excursions["index"] = excursions["peak"] * np.sqrt(scale[excursions["peak_time"]].to_numpy())
     excursions = excursions.sort_values("peak", ascending=False)
     squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
     years = counted_number(n_years, "year", 2)
@@ -224,25 +284,27 @@ def promised_rule(
             f"{counted_number(hold / DAY, 'day')} of quiet; expected at "
             f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
-    tail = Tail.of(squares, asked)
-    rule, unseen = EventRule(tail.threshold(asked), release, hold), _unseen_season(known.index)
+    scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
+    tail = Tail.of(squares, asked, tuple(scales.tolist()))
+    release = release_level(known, hold, persistence) if release is None else release
+    rule, unseen = EventRule(max(tail.threshold(asked), release), release, hold, persistence), _unseen_season(known.index)
     lowest, highest = tail.numbers(asked, n_years)
     method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
         ", extrapolated" if asked < FAR else ""
     )
     _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen)
-    return Promise(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
+    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
 
 
 def _warn_of_baseline(
     excursions: pd.DataFrame, tail: Tail, rule: EventRule, asked: float, per_year: float, years: str, unseen: str
 ) -> None:
-    """Warn of a threshold that stands on seasons not seen, on too little time, or on a single excursion."""
-    highest, second = excursions["peak"].iloc[:2]
+    """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
+    highest, second = excursions["index"].iloc[:2]
     if unseen:
         warn_user(
-            f"the baseline has no record of {unseen}: the number of false alarms a year is that of the seasons that it "
-            "shows, and nothing is promised for the others; expected a whole year",
+            f"the baseline has no record of {unseen}: the number of false alarms a year is that of the other seasons, "
+            "and there is no estimate for these; expected a whole year",
             "seasons without baseline",
         )
     if asked < FAR:
@@ -252,8 +314,8 @@ def _warn_of_baseline(
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
-    if (highest**2 - tail.base) / tail.excess > _largest_share(tail.k, DOUBTFUL):
-        others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked).threshold(asked)
+    if tail.largest > _largest_share(tail.k, DOUBTFUL) * tail.excess:
+        others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
         warn_user(
             f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
             f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
