@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import pandas as pd
@@ -104,30 +104,42 @@ def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.Da
 
 @dataclass(frozen=True)
 class Tail:
-    """The highest excursions of a baseline: ``k`` squared peaks above a ``base``, with excesses of ``excess`` in all.
+    """The highest excursions of a baseline: k squared peaks above a ``base``, the (k + 1)-th, and their ``excesses``.
 
-    A time as long as the baseline has k + 1 peaks above the (k + 1)-th highest of the baseline, on average. Taken as
-    exponential, n of them exceed the square
+    A time as long as the baseline has k + 1 peaks above the base, on average. Taken as exponential, n of them exceed
+    the square
 
-        base + excess (((k + 1) / n)^(1 / k) - 1),
+        base + sum of excesses (((k + 1) / n)^(1 / k) - 1),
 
     on average over baselines: exact for an exponential tail, however few peaks there are. Squares are over their scale
-    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says.
+    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says. ``shape`` is that of
+    a generalised Pareto tail, by which p values are; 0 is an exponential one, and None the one of these excesses.
     """
 
-    k: int
     base: float
-    excess: float
-    largest: float = 0.0  # the highest excess
-    logs: float = np.nan  # the sum of ln(square / base)
+    excesses: tuple[float, ...]
     scales: tuple[float, ...] = (1.0,)
+    shape: float | None = None
 
     @classmethod
     def of(cls, squares: Array, asked: float, scales: tuple[float, ...] = (1.0,)) -> Tail:
         """That of squared peaks, highest first, from which as many as are asked for are to be exceeded."""
         k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
-        excesses, logs = squares[:k] - squares[k], np.log(squares[:k] / squares[k])
-        return cls(k, float(squares[k]), float(excesses.sum()), float(excesses[0]), float(logs.sum()), scales)
+        return cls(float(squares[k]), tuple((squares[:k] - squares[k]).tolist()), scales)
+
+    @property
+    def k(self) -> int:
+        """Number of peaks above the base."""
+        return len(self.excesses)
+
+    @cached_property
+    def excess(self) -> float:
+        """Sum of the excesses."""
+        return sum(self.excesses)
+
+    def has_outlier(self, probability: float) -> bool:
+        """Whether the highest excess is as large beside the others as that of so few healthy baselines."""
+        return max(self.excesses) > _largest_share(self.k, probability) * self.excess
 
     def factor(self, asked: float) -> float:
         """The excess that so many peaks exceed, in sums of all excesses."""
@@ -156,14 +168,17 @@ class Tail:
         distributed. Integrated at the quantiles of g where exp(-x g) counts.
 
         Outliers make tails that are not exponential. Where the highest excess of the baseline is as far beyond the
-        others as in one healthy baseline of five, their logarithms are taken in their place: a Pareto tail, by which
-        probabilities are larger.
+        others as in one healthy baseline of five, and there is no ``shape``, the logarithms of the squares over the base
+        are taken in place of the excesses: a Pareto tail, by which probabilities are larger.
         """
         x = self.height(square)
         if x <= 0:
             return 1.0
-        if self.largest > _largest_share(self.k, HEAVY) * self.excess:
-            x = min(x, np.log1p(x * self.excess / self.base) / self.logs)
+        if self.shape:
+            x = np.log1p(self.shape / (1 - self.shape) * self.k * x) / (self.shape * self.k)
+        elif self.shape is None and self.has_outlier(HEAVY):
+            logs = np.log1p(np.array(self.excesses) / self.base).sum()
+            x = min(x, np.log1p(x * self.excess / self.base) / logs)
         g = _quantiles(self.k) / (1 + x)
         some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
         return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
@@ -314,7 +329,7 @@ def _warn_of_baseline(
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
             "threshold beyond the baseline",
         )
-    if tail.largest > _largest_share(tail.k, DOUBTFUL) * tail.excess:
+    if tail.has_outlier(DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
         warn_user(
             f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "

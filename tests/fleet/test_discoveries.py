@@ -1,5 +1,7 @@
 """Events of many bridges: chances are p values, and of those that are called no more are false than asked for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -23,8 +25,7 @@ def healthy(random, n=1, common=0.0, is_exponential=False):
         number = random.poisson(RATIO * N_PEAKS)
         z = np.sqrt(common) * shared + np.sqrt(1 - common) * random.normal()
         highest = 3.0 * -np.log(-np.expm1(norm.logcdf(z) / max(number, 1)))  # of so many exponential peaks
-        tail = Tail.of(base, 1.0)
-        tail = Tail(tail.k, tail.base, tail.excess) if is_exponential else tail
+        tail = replace(Tail.of(base, 1.0), shape=0.0 if is_exponential else None)
         chances.append(tail.p_value(highest, RATIO) if number else 1.0)
     return np.array(chances)
 
@@ -39,7 +40,7 @@ def test_chances_of_healthy_bridges_are_p_values():
 
 @pytest.mark.parametrize("x", [0.3, 1.0, 3.0])
 def test_small_chances_are_those_of_a_long_simulation(x):
-    random, tail, n = np.random.default_rng(1), Tail(4, 10.0, 8.0), 400_000
+    random, tail, n = np.random.default_rng(1), Tail(10.0, (2.0,) * 4), 400_000
     rate, scale = random.gamma(5, size=n), 8.0 / random.gamma(4, size=n)
     expected = -np.expm1(-2.0 * rate * np.exp(-8.0 * x / scale))
     deviation = expected.std() / np.sqrt(n)
@@ -47,7 +48,7 @@ def test_small_chances_are_those_of_a_long_simulation(x):
 
 
 def test_chances_fall_with_height_and_grow_with_time():
-    tail = Tail(20, 10.0, 40.0)
+    tail = Tail(10.0, (2.0,) * 20)
     chances = np.array([[tail.p_value(square, years) for square in (9, 11, 30, 200, 1e4)] for years in (0.1, 1, 10)])
     assert (np.diff(chances, axis=1) <= 0).all()
     assert (np.diff(chances[:, 1:], axis=0) > 0).all()
@@ -80,6 +81,6 @@ def test_a_fleet_of_one_is_called_by_its_p_value():
 def test_a_baseline_with_an_outlier_makes_chances_larger():
     squares = np.sort(np.random.default_rng(3).exponential(3.0, 60))[::-1]
     odd = Tail.of(np.r_[200.0, squares[1:]], 1.0)
-    plain = Tail(odd.k, odd.base, odd.excess)
+    plain = replace(odd, shape=0.0)
     for height in (200.0, 400.0, 2000.0):
         assert odd.p_value(height, 1.0) > 10 * plain.p_value(height, 1.0)
