@@ -18,7 +18,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor, load_monitor, track_parameters
-from skthermo.plotting import MonitorDisplay, ParameterHistoryDisplay
+from skthermo.plotting import MonitorDisplay, PredictionDisplay
 from skthermo.preprocessing import HingeFeatures
 from skthermo.reporting import owner_report
 from skthermo.surrogate import DataInformedFEM
@@ -112,6 +112,11 @@ for _, fault in monitor.faults_.iterrows():
 history = track_parameters(fem, trusted[list(campaign.temperatures)], trusted[modes], random_state=0)
 print(history.summary())
 print(history.rates[["per_year", "standard_error", "drifts"]].round(4).to_string())
-ParameterHistoryDisplay.from_history(history)
+change = 100 * (history.table - 1)
+estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "lower", "upper"))
+labels = {"labels": ("estimate", ""), "interval_label": "band of 95 %"}
+PredictionDisplay.from_predictions(
+    estimate, None, *band, kind="lines", quantity="change of stiffness", unit="%", **labels
+)
 
 save_figures(options.figures)

@@ -65,9 +65,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes[:, :, np.newaxis] * jacobian",
             "slopes[:, :1, np.newaxis] ** 0 * jacobian",
         ),
-    ],
-    ("surrogate/chain/_intervals.py", "surrogate/test_predicted_covariance.py"): [
-        ("intervals of a certain mapper", "np.hypot(np.sqrt(fills), np.sqrt(stated))", "np.sqrt(fills)"),
+        (
+            "intervals of a certain mapper",
+            "self.covariances_of_fills(weather), self.covariances_of_mapper(weather)",
+            "self.covariances_of_fills(weather), 0 * self.covariances_of_fills(weather)",
+        ),
     ],
     ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
@@ -231,7 +233,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes = slopes",
         ),
     ],
-    ("surrogate/inverse/_inversions.py", "surrogate/test_memory.py"): [
+    ("surrogate/inverse/_training.py", "surrogate/test_memory.py"): [
         (
             "stale inversions in memory",
             "content_of(replace(refinement, n_jobs=None), inputs, guess)",
@@ -463,7 +465,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "known = self.calibration",
         ),
     ],
-    ("studies/detectability/_task_scorer.py", "studies/test_detection_task.py"): [
+    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
         ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
         ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
@@ -472,8 +474,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "np.mean(self.values[rows] < raised)",
             "np.mean(~(self.values[rows] >= raised))",
         ),
-    ],
-    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
     ],
@@ -481,7 +481,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
         ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
     ],
-    ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
+    ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [

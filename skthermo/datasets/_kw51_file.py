@@ -17,6 +17,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_matlab
 from skthermo._tables.arrays import Array
 from skthermo.datasets._results import KW51Monitoring
+from skthermo.exceptions import RecordsWarning
 
 MOST_LABELS = 1000
 UNIX_EPOCH = 719529  # as a MATLAB date number
@@ -123,7 +124,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
         warn_user(
             f"{file} has the MD5 checksum {md5}; expected {PUBLISHED_MD5}, that of the published trackedmodes.zip: its "
             "content may differ from what was published",
-            kind="another KW51 file",
+            RecordsWarning,
+            "another KW51 file",
         )
     return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
 
@@ -158,7 +160,8 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
         warn_user(
             f"{file}: field 'env' has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, "
             f"column {channels[column]!r}: {env[row, column]:g}; expected measured values, or NaN",
-            kind="stand-ins",
+            RecordsWarning,
+            "stand-ins",
         )
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):

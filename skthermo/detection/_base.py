@@ -18,6 +18,7 @@ from skthermo._tables.frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._tables.times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
+from skthermo.exceptions import UnevaluatedRowsWarning
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -260,5 +261,6 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         warn_user(
             f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
             f"{self._cause(X, rows)}",
+            UnevaluatedRowsWarning,
             "rows not evaluated",
         )

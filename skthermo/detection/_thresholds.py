@@ -4,6 +4,7 @@ import numpy as np
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import FewRecordsWarning
 
 
 def quantile_threshold(index: Array, contamination: float) -> float:
@@ -37,6 +38,7 @@ def conformal_threshold(
             f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a rate of false alarms of "
             f"{contamination:.2g}: the threshold is the largest index, which later ones exceed at a rate of about "
             f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
+            FewRecordsWarning,
             "few records for a threshold",
         )
     elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
@@ -44,6 +46,7 @@ def conformal_threshold(
             f"the {len(ordered)} baseline {what} depend on each other in time and count as {n_independent:.0f} "
             f"independent ones: false alarms are {contamination:.2g} of the records on the mean over such baselines, "
             f"but may be far more or fewer after this one; expected {FEWEST_INDEPENDENT} independent ones or more",
+            FewRecordsWarning,
             "few records for a threshold",
         )
     return threshold

@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator
 from skthermo._estimators.arguments import check_jobs, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
+from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of, unpickled
 from skthermo.fleet._crew import work_off
 from skthermo.fleet._fleet import Fleet, named, warn_of_bridges
@@ -148,6 +149,7 @@ def fit_fleet(
             f"monitor have changed ({named(begun_again)}): their monitors begin again, without the records that they "
             "had judged and their events; files ending in .replaced hold these: expected Fleet(folder) to go on with "
             "them as they were",
+            SkthermoWarning,
             "monitors that begin again",
         )
     return fleet

@@ -15,6 +15,7 @@ from skthermo._estimators.arguments import check_jobs, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
 from skthermo._tables.text import counted
+from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, pickled, unpickled
 from skthermo.fleet._crew import work_off
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
@@ -402,6 +403,7 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
         warn_user(
             f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}; "
             "expected none: see fleet.errors",
+            SkthermoWarning,
             "bridges that failed",
         )
     warned = fleet.warnings
@@ -409,5 +411,6 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
     if len(warned):
         warn_user(
             f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}; see fleet.warnings",
+            SkthermoWarning,
             "warnings of bridges",
         )

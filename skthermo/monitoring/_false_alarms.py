@@ -17,6 +17,7 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
 from skthermo._tables.times import DAY, YEAR, correlation_time
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
 
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
 N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
@@ -320,6 +321,7 @@ def _warn_of_baseline(
         warn_user(
             f"the baseline has no record of {unseen}: the number of false alarms a year is that of the other seasons, "
             "and there is no estimate for these; expected a whole year",
+            WeatherWarning,
             "seasons without baseline",
         )
     if asked < FAR:
@@ -327,6 +329,7 @@ def _warn_of_baseline(
             f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
             f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
             f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
+            FewRecordsWarning,
             "threshold beyond the baseline",
         )
     if tail.has_outlier(DOUBTFUL):
@@ -336,6 +339,7 @@ def _warn_of_baseline(
             f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
             f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
             "without records of a fault or of another state",
+            RecordsWarning,
             "excursion of the baseline",
         )
 

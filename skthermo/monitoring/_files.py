@@ -20,6 +20,7 @@ from skthermo._estimators.arguments import check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import write_when_complete
 from skthermo._validation import import_optional
+from skthermo.exceptions import SkthermoWarning
 
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
@@ -109,6 +110,7 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
         warn_user(
             f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}: its decisions "
             "may differ from those of the monitor that was fitted",
+            SkthermoWarning,
             "versions of a monitor",
         )
     return monitor

@@ -28,6 +28,7 @@ from skthermo._validation import (
     seeded,
 )
 from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._course import Course, no_evaluations
@@ -255,6 +256,7 @@ class Monitor(SavesFrames, Estimator):
             warn_user(
                 f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
+                RecordsWarning,
                 "markers",
             )
         corrections = Corrections.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
@@ -696,6 +698,7 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     warn_user(
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
+        UnevaluatedRowsWarning,
         "records not evaluated",
     )
 

@@ -45,7 +45,7 @@ class PredictionDisplay(Display):
     predicted : dict of str to DataFrame of shape (n_samples, n_columns), optional
         By label; there may be several, or none.
     lowest, highest : DataFrame of shape (n_samples, n_columns), optional
-        Intervals of the first of them.
+        Intervals of the first of them, or of what is measured if nothing is predicted.
     temperature : Series of shape (n_samples,), optional
         In degrees Celsius; what is drawn then goes over it. Its name becomes part of the label.
     label : str, default="measured"
@@ -304,7 +304,7 @@ class PredictionDisplay(Display):
             x = with_breaks(*in_time(self.lowest))[0]
             ends = [with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest)]
             is_known = np.isfinite(ends).all(axis=0)
-            style = {"color": ORANGE, "alpha": 0.25, "linewidth": 0, "zorder": 1}
+            style = {"color": ORANGE if self.predicted else BLUE, "alpha": 0.25, "linewidth": 0, "zorder": 1}
             style["label"] = shortened(self.interval_label)
             for column, one in enumerate(self.axes_):
                 both = [end[:, column] for end in ends]

@@ -88,8 +88,11 @@ class HingeFeatures(RecordTransformer):
             If a column is NaN in every row, or in every row that has a weight; if weights are negative, NaN or
             infinite, all 0, or not one for each row.
         """
-        values = as_floats(self._validated(X, reset=True))
-        weights = row_weights(sample_weight, X)
+        self._learn(X, self._validated(X, reset=True), row_weights(sample_weight, X))
+        return self
+
+    def _learn(self, X: Any, values: NDArray, weights: NDArray | None = None) -> None:
+        values = as_floats(values)
         if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
         empty = np.isnan(values).all(axis=0)
@@ -101,7 +104,6 @@ class HingeFeatures(RecordTransformer):
             self.knots_ = np.nanquantile(values, shares, axis=0)
         else:
             self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
-        return self
 
     def _transformed(self, X: Any, values: NDArray) -> Any:
         return frame_like(X, broken_lines(as_floats(values), self.knots_), self.get_feature_names_out())

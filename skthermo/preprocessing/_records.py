@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, overload
+from typing import Any, Self, overload
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from skthermo._validation import (
     Estimator,
     TransformerMixin,
     _check_feature_names_in,
+    _fit_context,
     check_is_fitted,
 )
 from skthermo.preprocessing._stamps import as_stamps
@@ -25,6 +26,31 @@ EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
 
 class RecordTransformer(TransformerMixin, Estimator):
     """A transformer that gives a row for every record, and a frame on the same index for a frame."""
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: None = None) -> Self:
+        """Learn from records what `transform` needs of them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures in degrees Celsius, frequencies in Hz or other columns, as the class says; NaN is ignored.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        Self
+            The fitted transformer.
+
+        Raises
+        ------
+        ValueError
+            If X holds what is no number, or has not what a parameter asks for, such as stamps, each once, for a
+            duration.
+        """
+        self._learn(X, self._validated(X, reset=True))
+        return self
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -66,6 +92,10 @@ class RecordTransformer(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
+
+    @abstractmethod
+    def _learn(self, X: Any, values: NDArray) -> None:
+        """What `fit` learns from X and its checked values."""
 
     @abstractmethod
     def _transformed(self, X: Any, values: NDArray) -> Any:

@@ -211,7 +211,7 @@ def study_page(
     findings = findings_of(study)
     parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()], "study": study}
     warned = [*getattr(study, "warnings_", [])]
-    warned += [f"Identified damage: {text}" for _, text in ([] if identified is None else identified.warnings())]
+    warned += [f"Identified damage: {text}" for text in ([] if identified is None else identified.warnings())]
     caption = "Settings of the model, of the alarm system and of the study."
     sections = [
         answer(study, findings, [] if identified is None else identified.answer()),

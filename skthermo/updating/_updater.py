@@ -34,6 +34,7 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (
     doubtful_frequencies,
@@ -265,6 +266,7 @@ class ModelUpdater(Estimator):
             warn_user(
                 f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
                 "equally well; expected fewer parameters, shapes, or a prior",
+                FewRecordsWarning,
                 "few residuals",
             )
         model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
@@ -292,7 +294,7 @@ class ModelUpdater(Estimator):
         else:
             doubts.append(unfinished(best, residuals))
         for message in doubts:
-            warn_user(message, f"doubtful optimum: {message}")
+            warn_user(message, ModelWarning, f"doubtful optimum: {message}")
         if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
             self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
         return self

@@ -808,11 +808,10 @@ use(
         bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3))),
     ),
 )
-for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "expected_residuals"):
+for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
     more = {
         "predict": {"return_std": (False, flag())},
         "predict_interval": {"confidence": (0.9, number(0, 1, 90, -0.1))},
-        "expected_residuals": {"return_number": (False, flag())},
     }.get(name, {})
     method(f"surrogate.DataInformedFEM.{name}", CHAIN, X=(T, PREDICTING), **more)
 method(
@@ -844,9 +843,6 @@ FAULTS = {
     "outliers": (0.01, SHARE_OF_VALUES | bad("often", np.full((3, 6), 5.0))),
 }
 method("surrogate.DataInformedFEM.simulate", CHAIN, usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
-method("surrogate.DataInformedFEM.simulate_modes", CHAIN, X=(T, PREDICTING), modes=([0, 6], integers(23)), **CHANGES)
-method("surrogate.DataInformedFEM.draw_noise", CHAIN, usual="noise random_state", X=(T, PREDICTING), **FAULTS)
-method("surrogate.DataInformedFEM.draw_gaps", CHAIN, usual="random_state", X=(T, PREDICTING), **FAULTS)
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),

@@ -20,7 +20,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo._estimators.warnings import warn_user
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.exceptions import SkthermoWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fleet import Fleet, fit_fleet
 from skthermo.fleet._bridge import by_value
 from skthermo.monitoring import Monitor
@@ -50,7 +50,7 @@ class Warns(LinearRegression):
     def fit(self, X, y):
         self.process_ = os.getpid()
         for _ in range(2):
-            warn_user(f"{len(X)} records look odd", "odd records")
+            warn_user(f"{len(X)} records look odd", RecordsWarning, "odd records")
         warnings.warn("slow", RuntimeWarning, stacklevel=1)
         return super().fit(X, y)
 

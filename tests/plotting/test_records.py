@@ -5,6 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 from sklearn.linear_model import LinearRegression
 
 from skthermo.plotting import PredictionDisplay
@@ -136,6 +137,8 @@ def test_bands_break_where_an_end_is_unknown():
     lowest[7] = -np.inf
     display = PredictionDisplay.from_predictions(np.ones(10), np.ones(10), lowest, highest)
     assert len(display.bands_[0].get_paths()) == 3
+    alone = PredictionDisplay.from_predictions(np.ones(10), None, np.zeros(10), np.full(10, 2.0), kind="lines")
+    assert alone.bands_[0].get_facecolor()[0, :3] == pytest.approx(to_rgb(alone.lines_["measured"][0].get_color()))
 
 
 def test_predicted_over_measured(fem, later):

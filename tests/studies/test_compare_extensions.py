@@ -12,7 +12,7 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, pod_curve, sweep
 from skthermo.studies.detectability import Arrangement, Measurement
-from skthermo.studies.extension._campaign import CampaignSimulator
+from skthermo.studies.extension._compare_extensions import CampaignSimulator
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))

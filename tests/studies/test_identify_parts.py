@@ -59,7 +59,8 @@ def test_default_groups_are_the_smallest():
 
 
 def test_shift_of_known_records(fem):
-    residuals, number = fem.expected_residuals(WEATHER, return_number=True)
+    inputs = fem.weather(WEATHER).inputs
+    residuals, number = fem.residuals().expected(inputs), fem.residuals().n_expected(inputs)
     F = (fem.predict(WEATHER) * (1 + residuals) * np.linspace(0.97, 1.02, 6)).to_numpy(copy=True)
     F[::2, 3] = np.nan
     theta = fem.predict_parameters(WEATHER).to_numpy()
@@ -80,7 +81,7 @@ def test_shift_of_known_records(fem):
 
 def test_as_many_records_as_the_weights_say(fem):
     """Expected residuals of unit noise: their mean over rows varies as that of the number of records returned."""
-    residuals = fem.residuals_
+    residuals = fem.residuals()
     inputs = residuals.weather[::9]
     number = residuals.n_expected(inputs)
     noise = np.random.RandomState(0).standard_normal((len(residuals.own), 600))

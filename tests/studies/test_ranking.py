@@ -13,8 +13,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
-from skthermo.studies.detectability._evaluation import EvaluatedRecords
 from skthermo.studies.detectability._ranking import rank
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER = LATER.temperatures

@@ -14,7 +14,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
 from skthermo.studies.replicates import PARTS, Replicates
-from skthermo.studies.replicates._weather import other_years, resampled_days
+from skthermo.studies.replicates._replicates import other_years, resampled_days
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -226,7 +226,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
     def fails(*args, **options):
         raise ValueError("no derivative")
 
-    monkeypatch.setattr("skthermo.studies.replicates._models.ModelUpdater.fit", fails)
+    monkeypatch.setattr("skthermo.studies.replicates._replicates.ModelUpdater.fit", fails)
     with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
         Replicates.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
     with pytest.warns(UserWarning, match="bands hold no error of the model: other models like"):
@@ -302,7 +302,7 @@ def test_other_training_records_change_a_chain_as_its_error(fem):
     refitted = (again.predict(year) / predicted - 1).to_numpy()
     ratio = np.sqrt((changes**2).mean() / (refitted**2).mean())
     assert 0.75 < ratio < 1.33
-    spread = [np.nanstd(chain.residuals_.values, axis=0).mean() for chain in (fem, *chains)]
+    spread = [np.nanstd(chain.residuals().values, axis=0).mean() for chain in (fem, *chains)]
     np.testing.assert_allclose(spread[1:], spread[0], rtol=0.06)
     pd.testing.assert_frame_equal(fem.resampled(3).predict(year), chains[3].predict(year))
     pd.testing.assert_frame_equal(fem.predict(year), predicted)

@@ -129,7 +129,7 @@ def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
 
         monkeypatch.setattr(owner, name, count)
 
-    for owner, name in ((DataInformedFEM, "simulate"), (DataInformedFEM, "draw_noise"), (AffineModel, "frequencies")):
+    for owner, name in ((DataInformedFEM, "simulate"), (DataInformedFEM, "weather"), (AffineModel, "frequencies")):
         counted(owner, name)
     found = []
     for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):

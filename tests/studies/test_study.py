@@ -428,7 +428,9 @@ def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_othe
     assert (healthy[0] != healthy[1]).any()
     assert healthy.any()
     seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(3, 2))[:, 0]
-    outages = [in_service.draw_gaps(WEATHER, random_state=int(seed))[1].all(axis=1) for seed in seeds]
+    outages = [
+        in_service.recorder_.gaps(in_service.weather(WEATHER), random_state=int(seed))[1].all(axis=1) for seed in seeds
+    ]
     np.testing.assert_array_equal(healthy, outages)
 
 

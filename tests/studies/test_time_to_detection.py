@@ -13,7 +13,7 @@ from scipy.stats import norm
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario
-from skthermo.studies.detectability._evaluation import EvaluatedRecords
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 from skthermo.studies.detectability._waits import Waits
 from tests.surrogate.chains import F, T, chain, mapper
 

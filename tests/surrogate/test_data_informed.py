@@ -19,7 +19,6 @@ from skthermo.fem import CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate.chain._parts import clone_parts
 from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse, mapper
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
@@ -294,6 +293,7 @@ def test_bad_input_is_named(X, y, message):
 def test_an_aligner_without_a_reference_gets_the_models():
     named, bare = (DataInformedFEM(TRUSS, aligner=aligner) for aligner in (BiasAligner(TRUSS), BiasAligner()))
     inside = DataInformedFEM(TRUSS, aligner=make_pipeline(FunctionTransformer(check_inverse=False), BiasAligner()))
-    aligners = [clone_parts(chain)[2] for chain in (named, bare)] + [clone_parts(inside)[2][-1]]
+    fits = [one.fit(T, F) for one in (named, bare, inside)]
+    aligners = [fits[0].aligner_, fits[1].aligner_, fits[2].aligner_[-1]]
     assert all(aligner.reference is TRUSS for aligner in aligners)
     assert bare.aligner.reference is None

@@ -87,7 +87,7 @@ def test_labels_that_have_no_order():
     labels = [f"r{row}" if row % 2 else row for row in range(365)]
     inverse = InverseSurrogate(regressor=Ridge(), n_samples=100, bounds=0.2, noise=0.01)
     fem = DataInformedFEM(TRUSS, inverse=inverse, mapper=PLAIN, random_state=0)
-    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).residuals_.values) == 365
+    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).residuals().values) == 365
 
 
 @pytest.mark.filterwarnings("ignore:the aligner hides offsets")

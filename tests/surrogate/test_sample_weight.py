@@ -72,7 +72,7 @@ def test_a_record_of_weight_0_counts_as_left_out():
     ((reason, count),) = fit.report_.left_out.items()
     assert reason.startswith("their weight is 0, in ")
     assert count == (~kept).sum()
-    assert len(fit.residuals_.values) == kept.sum()
+    assert len(fit.residuals().values) == kept.sum()
     assert fit.training_range_.excess(T[kept]).max() == 0
     coldest = T["T1"].argsort().to_numpy()[0]
     warm = chain().fit(T, F, sample_weight=np.arange(len(T)) != coldest)

@@ -45,7 +45,7 @@ def test_a_retrofit_changes_stiffness_and_mass(fem, weather):
 def test_noise_is_what_draw_noise_gives(fem, weather, noise):
     clean = fem.simulate(weather, damage={"top": 0.2})
     found = fem.simulate(weather, damage={"top": 0.2}, noise=noise, random_state=3)
-    np.testing.assert_allclose(found, clean * (1 + fem.draw_noise(weather, noise, random_state=3)))
+    np.testing.assert_allclose(found, clean * (1 + fem.recorder_.noise(fem.weather(weather), noise, random_state=3)))
 
 
 @pytest.mark.parametrize(
@@ -74,8 +74,8 @@ def test_a_factor_in_percent_is_doubted(fem, weather):
 
 def test_other_modes_are_those_of_the_model_at_the_same_parameters(fem, weather):
     seven = make_truss(7).damaged({"top": 0.3}).frequencies(fem.predict_parameters(weather))
-    found = fem.simulate_modes(weather, [6, 1], damage={"top": 0.3})
+    found = fem.thermal_.simulated(fem.weather(weather), [6, 1], damage={"top": 0.3})
     np.testing.assert_allclose(found, seven[:, [6, 1]], rtol=2e-5)
     assert fem.model.with_modes([6, 1]).mode_ranks == (6, 1)
     with pytest.raises(ValueError, match="is none of the model's"):
-        fem.simulate_modes(weather, [fem.model.n_available])
+        fem.thermal_.simulated(fem.weather(weather), [fem.model.n_available])

@@ -16,6 +16,7 @@ from skthermo._estimators.arguments import check_dofs, check_flag, check_theta
 from skthermo._estimators.threads import map_on_blas_threads
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, MatrixLike, real_array, shape_array
+from skthermo.exceptions import ModelWarning
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
@@ -503,7 +504,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
     def _warn_of_bounds(self, theta: Array) -> None:
         message = "" if self._is_quiet else self._bounds_warning(theta)
         if message:
-            warn_user(message, "outside the reduced box")
+            warn_user(message, ModelWarning, "outside the reduced box")
 
     def _in_chunks(self, solve: Callable[[Array], tuple[Array, ...]], theta: ArrayLike) -> tuple[Array, ...]:
         rows = check_theta(theta, self.parameter_names)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from skthermo._estimators.arguments import check_flag, check_theta
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, real_array
+from skthermo.exceptions import ModelWarning
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different, check_n_modes
 from skthermo.fem.external._cache import SampleCache
@@ -156,7 +157,7 @@ class CallableModel:
             if len(failures) > 1 and everywhere and not self._is_quiet:
                 raise first
             if not self._is_quiet:
-                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", "failing program")
+                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", ModelWarning, "failing program")
             solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
         found = [solved[key] if key in solved else known[key] for key in keys]
         return np.array(found).reshape(len(rows), self.n_modes)

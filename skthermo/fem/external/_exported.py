@@ -16,6 +16,7 @@ from skthermo._estimators.arguments import check_names, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_named_matrices
 from skthermo._tables.arrays import Matrix
+from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
 
 Key = tuple[str, ...]
@@ -217,6 +218,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
             warn_user(
                 f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
                 f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
+                ModelWarning,
                 "doubtful matrices",
             )
     if len(springs) > 1 and has_pattern:
@@ -227,6 +229,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
     for name, what in similar.items():
         warn_user(
             f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
+            ModelWarning,
             "doubtful matrices",
         )
     return list(found)
@@ -301,6 +304,7 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
         warn_user(
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
             "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
+            ModelWarning,
             "doubtful matrices",
         )
     return rest

@@ -14,6 +14,7 @@ from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, 
 from skthermo._tables.frames import MARKERS, check_same_rows, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import row_times
+from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._exponential import trailing_means
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
@@ -103,16 +104,16 @@ class RecordFindings(SavesFrames):
     def __repr__(self) -> str:
         return self.summary()
 
-    def warnings(self) -> Iterator[tuple[str, str]]:
+    def warnings(self) -> Iterator[RecordsWarning]:
         """One warning for each kind of finding.
 
         Yields
         ------
-        kind, text : str
-            What the warning is about, and what it says.
+        RecordsWarning
+            Its ``kind`` is what was found.
         """
         for kind, rows in self.table.groupby("what", sort=False):
-            yield kind, WARNINGS[kind].format("; ".join(rows["detail"]))
+            yield RecordsWarning(WARNINGS[kind].format("; ".join(rows["detail"])), kind)
 
 
 def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str = "Hz") -> RecordFindings:

@@ -9,8 +9,8 @@ import pandas as pd
 from scipy.stats import t
 
 from skthermo._tables.arrays import Array
-from skthermo.studies.detectability._evaluation import EvaluatedRecords
-from skthermo.studies.detectability._families import families_of
+from skthermo.studies.detectability._pod_curve import families_of
+from skthermo.studies.detectability._simulation import EvaluatedRecords
 
 LEVEL = 0.9  # probability of detection that counts as reliable
 

@@ -17,11 +17,18 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import ModelWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._evaluation import SIMULATED, EvaluatedRecords, Evaluation, Key
-from skthermo.studies.detectability._families import FamilyRates
-from skthermo.studies.detectability._pod_curve import PODCurve, pod_curve
-from skthermo.studies.detectability._simulation import LARGEST_SEED, Simulation, clean_frequencies
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod_curve
+from skthermo.studies.detectability._simulation import (
+    LARGEST_SEED,
+    SIMULATED,
+    EvaluatedRecords,
+    Evaluation,
+    Key,
+    Simulation,
+    clean_frequencies,
+)
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario
 
@@ -72,6 +79,7 @@ class ReplicateRates:
             warn_user(
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
+                ModelWarning,
                 "failed replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)

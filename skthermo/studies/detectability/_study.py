@@ -18,8 +18,8 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
 from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
+from skthermo.exceptions import ResultWarning
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._evaluation import ask_each
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._pod_curve import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
@@ -27,6 +27,7 @@ from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
     Simulation,
+    ask_each,
     clean_frequencies,
 )
 from skthermo.studies.replicates import Replicates
@@ -360,7 +361,7 @@ class DetectabilityStudy(BaseEstimator):
         doubt = found.many_false_alarms()
         self.findings_ = replace(found, warnings=[*texts, doubt]) if doubt else found
         if doubt:
-            warn_user(doubt, "many false alarms")
+            warn_user(doubt, ResultWarning, "many false alarms")
         return self.findings_.table
 
     def _found(self) -> StudyFindings:

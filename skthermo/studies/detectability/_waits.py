@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array, is_real
 from skthermo._tables.text import counted, duration_text
 from skthermo._tables.times import has_stamps, row_times, time_of
-from skthermo.studies.detectability._evaluation import EvaluatedRecords
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
+from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_of
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
@@ -126,24 +126,6 @@ class Waits:
             is_enough = self.found(middle, confidence)[1] >= probability
             lowest, highest = (lowest, middle) if is_enough else (middle, highest)
         return float(highest) if highest <= self.clock.n_steps else float("inf")
-
-
-def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
-    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
-    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
-    return onsets if onsets.size else np.array([n_records // 2])
-
-
-def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
-    """Which records are damaged, a window after each of these onsets."""
-    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
-    return ((after >= 0) & (after < n_window)).any(axis=1)
-
-
-def transitions_of(decisions: Array, n_window: int) -> Array:
-    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
-    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
-    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
 
 
 def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:

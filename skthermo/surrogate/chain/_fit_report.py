@@ -18,12 +18,13 @@ from skthermo._tables.frames import column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import last_step
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.weather import SensorRegression
-from skthermo.surrogate._fitted_chain import FittedChain
-from skthermo.surrogate.chain._parts import Estimates
+from skthermo.surrogate.chain._fitted_chain import FittedChain
+from skthermo.surrogate.chain._inverse_of_chain import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
@@ -165,7 +166,7 @@ class FitReport(SavesFrames):
             f"{when}."
             for name, rows, deviation, when in self.filled.itertuples()
         ]
-        lines += [f"{text[0].upper()}{text[1:]}." for _, text in self.warnings()]
+        lines += [f"{text[0].upper()}{text[1:]}." for text in map(str, self.warnings())]
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
             lines.append(
@@ -224,13 +225,13 @@ class FitReport(SavesFrames):
             percent["rows outside (%)"] = (100 * self.outside).round(1)
         return percent
 
-    def warnings(self) -> Iterator[tuple[str, str]]:
+    def warnings(self) -> Iterator[SkthermoWarning]:
         """Warnings about the rows.
 
         Yields
         ------
-        kind, text : str
-            What the warning is about, and what it says; the report has the same sentences.
+        SkthermoWarning
+            Its text stands in the report, too.
         """
         yield from self._few_trained()
         yield from self._few_for_parameters()
@@ -241,70 +242,70 @@ class FitReport(SavesFrames):
         yield from self._large_discrepancy()
         yield from self._poor_round_trip()
 
-    def _few_trained(self) -> Iterator[tuple[str, str]]:
+    def _few_trained(self) -> Iterator[SkthermoWarning]:
         if 2 * self.n_trained >= self.n_rows:
             return
         reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
-        yield (
-            "half of the rows",
+        yield FewRecordsWarning(
             f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
             "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
+            "half of the rows",
         )
 
-    def _few_for_parameters(self) -> Iterator[tuple[str, str]]:
+    def _few_for_parameters(self) -> Iterator[SkthermoWarning]:
         n_parameters = len(self.deviations)
         if self.n_trained >= ROWS_PER_PARAMETER * n_parameters or self.fleet is not None:
             return
-        yield (
-            "few rows",
+        yield FewRecordsWarning(
             f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
             "rows for each",
+            "few rows",
         )
 
-    def _mostly_filled(self) -> Iterator[tuple[str, str]]:
+    def _mostly_filled(self) -> Iterator[SkthermoWarning]:
         for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples():
-            yield (
-                f"mostly filled {name}",
+            yield RecordsWarning(
                 f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the others "
                 f"({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
+                f"mostly filled {name}",
             )
 
-    def _worse_than_mean(self) -> Iterator[tuple[str, str]]:
+    def _worse_than_mean(self) -> Iterator[SkthermoWarning]:
         chain, mean = self.errors.mean()
         if not chain > WORSE_THAN_MEAN * mean:
             return
         worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
-        yield (
-            "worse than the mean",
+        yield ModelWarning(
             f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
             f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
             "see report_.offsets, update the model, or use the default aligner and discrepancy",
+            "worse than the mean",
         )
 
-    def _hidden(self) -> Iterator[tuple[str, str]]:
+    def _hidden(self) -> Iterator[SkthermoWarning]:
         if not self.has_hidden_offsets:
             return
         large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
         told = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
-        yield (
-            "hidden offsets",
+        yield ModelWarning(
             f"the aligner hides offsets between measurement and model that weather does not explain ({told}): "
             "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
             "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
             "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
+            "hidden offsets",
         )
 
-    def _many_outliers(self) -> Iterator[tuple[str, str]]:
+    def _many_outliers(self) -> Iterator[SkthermoWarning]:
         far = np.zeros(0, dtype=bool) if self.findings is None else self.findings.outliers.to_numpy()
         if far.sum() <= MANY_OUTLIERS * far.size:
             return
-        yield (
-            "many outliers",
+        yield RecordsWarning(
             f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
             "by one way of identification: see report_.findings",
+            "many outliers",
         )
 
-    def _large_discrepancy(self) -> Iterator[tuple[str, str]]:
+    def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
         if self.variation is None:
             return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
@@ -313,26 +314,26 @@ class FitReport(SavesFrames):
             f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
         )
         if told:
-            yield (
-                "large discrepancy",
+            yield ModelWarning(
                 f"the FE model cannot follow what the weather does to {told}: predictions rely on the discrepancy, and "
                 "simulated damage on a model that is not calibrated; expected a model updated to these records "
                 "(ModelUpdater), or parameters that this weather changes",
+                "large discrepancy",
             )
 
-    def _poor_round_trip(self) -> Iterator[tuple[str, str]]:
+    def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
         if self.round_trip is None:
             return
         shares = self.round_trip.abs() / self.scatter.clip(lower=UNSEEN)
         if not (shares > 1).any():
             return
         worst = shares.idxmax()
-        yield (
-            "round trip",
+        yield ModelWarning(
             f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
             f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
             f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
             "refines its estimates, narrow_bounds=True, or more samples",
+            "round trip",
         )
 
 
@@ -476,8 +477,8 @@ def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Arra
     return float(size / (MOST_UNEXPLAINED if n_months >= MOST_OF_A_YEAR else MOST_OF_FEW_MONTHS))
 
 
-def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
-    """Warnings about the order and the units of the modes: kind and text of each."""
+def mode_warnings(model: FEModel, F: Any) -> Iterator[SkthermoWarning]:
+    """Warnings about the order and the units of the modes."""
     offsets = mode_offsets(model, F)
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
@@ -490,17 +491,17 @@ def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
         moved = order != unchanged
         is_better = (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET
         if moved.any() and is_better and len(np.unique(order)) == len(order):
-            yield (
-                "order of modes",
+            yield ModelWarning(
                 f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
                 f"order of its modes, or model.with_modes({order.tolist()})",
+                "order of modes",
             )
             return
     if len(far):
         units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
-        yield (
-            "offset of modes",
+        yield RecordsWarning(
             f"measured modes differ from the model's nominal frequencies: {listed}{units}; expected Hz, the modes of "
             "the model in their order, and a model updated to the structure",
+            "offset of modes",
         )

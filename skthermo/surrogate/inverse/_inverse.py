@@ -27,13 +27,12 @@ from skthermo._validation import (
     _fit_context,
     check_is_fitted,
 )
+from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._columns import InverseColumns, ShapeScores
-from skthermo.surrogate.inverse._inversions import Inversions
-from skthermo.surrogate.inverse._training import SimulatedTraining, held_out
+from skthermo.surrogate.inverse._training import InverseColumns, Inversions, ShapeScores, SimulatedTraining, held_out
 from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
@@ -409,6 +408,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             warn_user(
                 f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
                 "they keep what they reached, or the regressor's estimate",
+                ModelWarning,
                 "not converged",
             )
         rows = np.flatnonzero(found.full_solves)
@@ -417,6 +417,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"the parameters of {rows.size} of {len(theta)} rows, row {rows[0]} the first, are outside the box of "
                 f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "
                 "like those that fit saw, wider bounds, or the noise of the measurement",
+                ModelWarning,
                 "refined by the full model",
             )
         self._warn_of_box(theta, found.outside)
@@ -648,4 +649,4 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         if message and self.prior is not None:
             message += "; or a wider prior, which these rows contradict"
         if message:
-            warn_user(message, "outside the bounds")
+            warn_user(message, ModelWarning, "outside the bounds")
