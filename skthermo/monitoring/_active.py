@@ -19,8 +19,8 @@ from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
+from skthermo.monitoring._memory import Memory
 from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
 

@@ -34,7 +34,7 @@ N_NODES = 400  # at which that distribution is averaged over what the baseline l
 
 @dataclass(frozen=True)
 class EventState:
-    """Whether an event is open, since when all levels have stayed at or below the clear threshold, and the last indices.
+    """Whether an event is open, since when all levels have stayed within the clear threshold, and the last indices.
 
     ``quiet_since`` is in nanoseconds, None if the last level was above it, or there was none.
     """
@@ -113,14 +113,12 @@ class Tail:
         base + sum of excesses (((k + 1) / n)^(1 / k) - 1),
 
     on average over baselines: exact for an exponential tail, however few peaks there are. Squares are over their scale
-    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says. ``shape`` is that of
-    a generalised Pareto tail, by which p values are; 0 is an exponential one, and None the one of these excesses.
+    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says.
     """
 
     base: float
     excesses: tuple[float, ...]
     scales: tuple[float, ...] = (1.0,)
-    shape: float | None = None
 
     @classmethod
     def of(cls, squares: Array, asked: float, scales: tuple[float, ...] = (1.0,)) -> Tail:
@@ -160,7 +158,7 @@ class Tail:
             square = brentq(lambda one: self.height(one) - height, *ends)
         return float(np.sqrt(square))
 
-    def p_value(self, square: float, ratio: float) -> float:
+    def p_value(self, square: float, ratio: float, shape: float | None = None) -> float:
         """Probability that a time so many times as long as the baseline has a squared peak as high.
 
         The number of peaks above the base in that time is negative binomial, as is that of the baseline's own; each
@@ -168,16 +166,17 @@ class Tail:
         g what these leave open of the tail, gamma distributed: so that p values of a healthy structure are uniformly
         distributed. Integrated at the quantiles of g where exp(-x g) counts.
 
-        Outliers make tails that are not exponential. Where the highest excess of the baseline is as far beyond the
-        others as in one healthy baseline of five, and there is no ``shape``, the logarithms of the squares over the base
-        are taken in place of the excesses: a Pareto tail, by which probabilities are larger.
+        Outliers make tails that are not exponential. A ``shape`` is that of a generalised Pareto tail, 0 that of an
+        exponential one. Without it, where the highest excess of the baseline is as far beyond the others as in one
+        healthy baseline of five, the logarithms of the squares over the base are taken in place of the excesses: a
+        Pareto tail, by which probabilities are larger.
         """
         x = self.height(square)
         if x <= 0:
             return 1.0
-        if self.shape:
-            x = np.log1p(self.shape / (1 - self.shape) * self.k * x) / (self.shape * self.k)
-        elif self.shape is None and self.has_outlier(HEAVY):
+        if shape:
+            x = np.log1p(shape / (1 - shape) * self.k * x) / (shape * self.k)
+        elif shape is None and self.has_outlier(HEAVY):
             logs = np.log1p(np.array(self.excesses) / self.base).sum()
             x = min(x, np.log1p(x * self.excess / self.base) / logs)
         g = _quantiles(self.k) / (1 + x)
@@ -224,9 +223,9 @@ class FalseAlarmEstimate:
             + (f"; no estimate for {self.unseen}" if self.unseen else "")
         )
 
-    def p_value(self, peak: float, n_years: float) -> float:
+    def p_value(self, peak: float, n_years: float, shape: float | None = None) -> float:
         """Probability that a healthy structure has an event as high in so many years."""
-        return self.tail.p_value(peak**2, n_years / self.n_years)
+        return self.tail.p_value(peak**2, n_years / self.n_years, shape)
 
 
 @cache
@@ -303,7 +302,10 @@ def estimate_false_alarms(
     scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
     tail = Tail.of(squares, asked, tuple(scales.tolist()))
     release = release_level(known, hold, persistence) if release is None else release
-    rule, unseen = EventRule(max(tail.threshold(asked), release), release, hold, persistence), _unseen_season(known.index)
+    rule, unseen = (
+        EventRule(max(tail.threshold(asked), release), release, hold, persistence),
+        _unseen_season(known.index),
+    )
     lowest, highest = tail.numbers(asked, n_years)
     method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
         ", extrapolated" if asked < FAR else ""

@@ -350,13 +350,16 @@ class Monitor(SavesFrames, Estimator):
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
-    def event_p_values(self, since: Any = None) -> pd.Series:
+    def event_p_values(self, since: Any = None, *, tail_shape: float | None = None) -> pd.Series:
         """How probable so high a peak is for a healthy structure, by event.
 
         Parameters
         ----------
         since : str or Timestamp, optional
             Only events that are open, or have ended since then; by default all.
+        tail_shape : float, optional
+            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges (`Fleet.discoveries`);
+            0 is an exponential tail. By default the baseline decides whether that is heavy enough.
 
         Returns
         -------
@@ -380,7 +383,9 @@ class Monitor(SavesFrames, Estimator):
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
         p_values = [
-            [promise for taken, promise in self.promises_ if taken <= event["start"]][-1].p_value(event["peak"], n_years)
+            [promise for taken, promise in self.promises_ if taken <= event["start"]][-1].p_value(
+                event["peak"], n_years, tail_shape
+            )
             for _, event in events.iterrows()
         ]
         return pd.Series(p_values, events.index, dtype=float, name="p_value")
