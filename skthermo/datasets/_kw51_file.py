@@ -84,13 +84,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     ValueError
         If the file is damaged, a field is missing or does not fit the others, a time stamp is repeated, or a value is
         impossible: frequencies outside 0.1 to 100 Hz, damping ratios outside -1 to 1, temperatures outside -60 to 80 C,
-        or a number in their place that stands for a missing one, such as -999. The error names the file, field, row
-        (counted from zero) and column.
-
-    Warns
-    -----
-    UserWarning
-        If a zip file is not the published one, or another weather channel has numbers that stand for missing ones.
+        or a number that stands for a missing one, such as -999. The error names the file, field, row (counted from
+        zero) and column. Such numbers in other weather channels give a warning.
 
     See Also
     --------

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._false_alarms import EventRule, EventState
 
+DAMAGE, STIFFENING, MEASUREMENT = "damage", "stiffening", "measurement or structure"
+"""Kinds of events; the last one is that of responses set aside as implausible or stuck."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -38,11 +41,10 @@ class EventLog:
         self,
         rules: dict[str, EventRule],
         by_kind: dict[str, Array],
+        modes: dict[str, Sequence[str]],
         times: NDArray[np.int64],
-        modes: Sequence[str] | None = None,
     ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
-        modes = [""] * len(times) if modes is None else modes
         is_open, levels, states = {}, {}, dict(self.states)
         for kind, index in by_kind.items():
             before = states.get(kind, EventState())
@@ -58,8 +60,14 @@ class EventLog:
                 numbers[kind][inside] = n + 1
                 closing = np.flatnonzero(~is_open[kind][begin:end])
                 end_time = int(times[begin + closing[0]]) if len(closing) else None
-                events[n] = _grown(events[n], level, times, modes, inside, end_time)
+                events[n] = _grown(events[n], level, times, modes[kind], inside, end_time)
         return numbers, EventLog(states, tuple(events))
+
+    def is_open_after(
+        self, rules: dict[str, EventRule], kind: str, index: Array, times: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Whether an event of a kind is open after each of some records."""
+        return rules[kind].follow(self.states.get(kind, EventState()), index, times)[0]
 
     def ended(self, end: int) -> EventLog:
         """The log in which open events ended at a time, or at their start if that is later."""
@@ -99,10 +107,14 @@ def _grown(
 
 @dataclass(frozen=True)
 class Acknowledgement:
-    """What the owner says of an event, known by the time of its peak: late records may move its start and number."""
+    """What the owner says of an event, known by the time of its peak: late records may move its start and number.
+
+    ``time`` is that of the newest record then.
+    """
 
     kind: str
     peak_time: int
+    time: int
     harmless: bool
     note: str
 

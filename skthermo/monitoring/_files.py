@@ -41,7 +41,11 @@ def write_monitor(monitor: Any, path: str | os.PathLike[str]) -> None:
         raise ValueError(
             f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
         )
-    write_when_complete(file, _by_skops(monitor, file) if file.suffix == ".skops" else _by_joblib(monitor))
+    content = _by_skops(monitor, file) if file.suffix == ".skops" else _by_joblib(monitor)
+    try:
+        write_when_complete(file, content)
+    except OSError as error:
+        raise OSError(f"{file} was not written and is as it was before: {error}") from error
 
 
 def load_monitor(path: str | os.PathLike[str]) -> Any:

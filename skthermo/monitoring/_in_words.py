@@ -18,15 +18,15 @@ def in_words(monitor: Any) -> str:
     lines = [
         begin,
         f"Records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
-        f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_repeated']} repeated; "
-        f"{counts['n_implausible']} values taken as missing.",
+        f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too far "
+        f"ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out.",
         f"Damage events open with {counted_number(estimate.rule.persistence, 'record')} in a row above "
         f"{monitor.threshold_:.4g} and close at or below {monitor.clear_threshold_:.4g}: {estimate}.",
         *_events(monitor.events_),
         *_sensors(monitor.faults_),
     ]
     if monitor.drift_ is not None:
-        lines += _drift(monitor.drift_, monitor._course.corrections.drift.n_left_out)
+        lines += _drift(monitor.drift_, monitor._state.corrections.drift.n_left_out)
     return "\n".join(lines)
 
 

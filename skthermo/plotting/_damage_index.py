@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import date_axis, figure_legend, on_axis
 from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers, mark_unjudged
+from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
 from skthermo.plotting._tables import as_table, check_study, in_time, names_from
 
@@ -48,12 +48,8 @@ class DamageIndexDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_scenarios,)
-        One panel for each scenario.
-    ax_ : Axes
-        The first of them.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     points_ : dict of str to list of Line2D
         Points of each panel, in the order of their labels.
     threshold_lines_ : list of Line2D
@@ -92,7 +88,7 @@ class DamageIndexDisplay(Display):
             A detector of this package, one of scikit-learn's with ``score_samples`` and ``offset_``, or a pipeline
             that ends with one.
         X : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such
-            What the detector judges, in Hz for frequencies; several tables by label.
+            What the detector evaluates, in Hz for frequencies; several tables by label.
         **options : dict
             ``onset`` and ``label`` of the display, and options of `plot`.
 
@@ -167,7 +163,10 @@ class DamageIndexDisplay(Display):
 
     @classmethod
     def from_predictions(
-        cls, index: Mapping[str, Any] | ArrayLike, threshold: float | Mapping[str, float], **options: object
+        cls,
+        index: Mapping[str, Mapping[str, ArrayLike] | ArrayLike] | ArrayLike,
+        threshold: float | Mapping[str, float],
+        **options: object,
     ) -> DamageIndexDisplay:
         """Draw damage indices.
 
@@ -202,8 +201,6 @@ class DamageIndexDisplay(Display):
         *,
         n_columns: int = 1,
         colours: Mapping[str, str] | None = None,
-        threshold_label: str = "threshold",
-        log: bool = False,
     ) -> DamageIndexDisplay:
         """Draw into axes.
 
@@ -215,10 +212,6 @@ class DamageIndexDisplay(Display):
             Panels beside each other in a new figure.
         colours : mapping of str to str, optional
             Colours by label; by default those of the palette in their order.
-        threshold_label : str, default="threshold"
-            Legend of the threshold.
-        log : bool, default=False
-            Whether the damage index is drawn on a logarithmic scale.
 
         Returns
         -------
@@ -238,9 +231,9 @@ class DamageIndexDisplay(Display):
         self.threshold_lines_: list[Line2D] = []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
             self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
-            unjudged = {label: unjudged_places(table) for label, table in self.scenarios[title].items()}
-            mark_unjudged(one, {shortened(label): x for label, x in unjudged.items()})
-            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": plain(threshold_label)}
+            drawn = {shortened(label): in_time(table) for label, table in self.scenarios[title].items()}
+            mark_not_evaluated(one, {label: x[np.isnan(values[:, 0])] for label, (x, values) in drawn.items()})
+            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold"}
             self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
             if self.onset is not None:
                 first = next(iter(self.scenarios[title].values()))
@@ -248,11 +241,8 @@ class DamageIndexDisplay(Display):
                     on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
                 )
             one.set_title(shortened(title))
-            if log:
-                one.set_yscale("log")
-            else:
-                one.set_ylim(bottom=0)
-                hold_outliers(one, keep=(0.0, self.thresholds[title]))
+            one.set_ylim(bottom=0)
+            hold_outliers(one, keep=(0.0, self.thresholds[title]))
             if ax is not None or number % n_columns == 0:
                 one.set_ylabel(plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
         for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
@@ -280,12 +270,6 @@ def columns_of(by_label: Mapping[str, ArrayLike]) -> dict[str, pd.DataFrame]:
         if table.shape[1] != 1:
             raise ValueError(f"damage index {label!r} has {table.shape[1]} columns; expected one")
     return tables
-
-
-def unjudged_places(table: pd.DataFrame) -> NDArray:
-    """Places on the horizontal axis of the records that have no damage index."""
-    x, values = in_time(table)
-    return x[np.isnan(values[:, 0])]
 
 
 def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:

@@ -47,10 +47,8 @@ class IdentifiedDamageDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (3,)
-        Explanations, severities, shifts.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     bars_ : BarContainer
         Probabilities of the explanations in percent; those beyond the fifth, and those that are not listed, share the
         last bar.

@@ -59,10 +59,8 @@ class PredictionDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_columns,)
-        One panel for each column.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     lines_ : dict of str to list of Line2D
         Points or lines of each label, panel by panel; in a scatter plot, under the label of what is predicted.
     bands_ : list of PolyCollection

@@ -22,6 +22,7 @@ from skthermo._estimators.regressors import check_takes_weights, fit_outputs, pr
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._tables.arrays import Array, as_columns
 from skthermo._tables.frames import (
+    Table,
     check_columns,
     check_same_rows,
     check_temperatures,
@@ -205,7 +206,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None
 
-    def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
+    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""
         if y is None:
             raise ValueError(
@@ -274,7 +275,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
                 theta[complete] = self.targets_.inverse_transform(means)
         return theta, std
 
-    def _as_targets(self, X: Any, values: Array) -> Any:
+    def _as_targets(self, X: Table, values: Array) -> Any:
         """Predictions as a vector or a frame if the training targets were."""
         return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
@@ -338,10 +339,7 @@ class TemperatureMapper(MultiplierRegressor):
     }
 
     def __init__(
-        self,
-        regressor: BaseEstimator | None = None,
-        *,
-        random_state: int | np.random.RandomState | None = None,
+        self, regressor: BaseEstimator | None = None, *, random_state: int | np.random.RandomState | None = None
     ):
         self.regressor = regressor
         self.random_state = random_state

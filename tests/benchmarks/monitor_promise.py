@@ -39,7 +39,7 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator, Wind
 from skthermo.fem import add_noise
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._false_alarms import EventRule, find_events, estimate_false_alarms, release_level
+from skthermo.monitoring._false_alarms import EventRule, estimate_false_alarms, find_events, release_level
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
 

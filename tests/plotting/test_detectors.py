@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import spearmanr
 from sklearn.decomposition import PCA
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
@@ -55,8 +54,8 @@ def rows_named(ax):
 def test_measured_rates_stand_beside_bands_and_are_counted():
     display = DetectorsDisplay.from_predictions(BOTH)
     healthy, damaged = display.axes_
-    assert healthy.get_title().startswith("false alarms\n3 of 4 in the band")
-    assert damaged.get_title().startswith(f"damage found: {FOUND}\n")
+    assert "3 of 4" in healthy.get_title()
+    assert FOUND in damaged.get_title()
     names = rows_named(healthy)
     assert names == ["raw, a", "whitened", "raw, b", "linear"]  # by the damage that they find
     for detector, bar in zip(SIMULATED, display.bars_["healthy"], strict=True):
@@ -69,10 +68,6 @@ def test_measured_rates_stand_beside_bands_and_are_counted():
     assert drawn == pytest.approx({name: 100 * rate for name, rate in MEASURED.items()})
     assert outside.get_offsets().tolist() == [[26.0, 2.0]]
     assert inside.get_facecolor().tolist() != outside.get_facecolor().tolist() == [[1, 1, 1, 1]]
-    row = display.agreement.loc["healthy"]
-    expected = spearmanr(list(SIMULATED.values()), list(MEASURED.values()))[0]
-    assert row.tolist() == [4, 3, 4, pytest.approx(expected)]
-    assert np.isnan(display.agreement.loc[FOUND, "rank_correlation"])  # all measured rates are the same
 
 
 @pytest.mark.parametrize(
@@ -85,8 +80,7 @@ def test_measured_rates_stand_beside_bands_and_are_counted():
 )
 def test_only_single_campaigns_are_compared_with_bands(changed, n_bands):
     display = DetectorsDisplay.from_predictions(HEALTHY.assign(**changed))
-    assert display.agreement.loc["healthy", "n_bands"] == n_bands
-    assert ("in the band" in display.axes_[0].get_title()) == (n_bands > 0)
+    assert (f"of {n_bands}" in display.axes_[0].get_title()) == (n_bands > 0)
     assert len(display.marks_["healthy"][1].get_offsets()) == (n_bands > 0)
 
 
@@ -119,8 +113,8 @@ def test_a_detector_that_failed_in_one_of_two_studies_is_told_there():
 def test_scenarios_can_be_chosen_and_those_without_measured_records_are_not_drawn():
     other = results_of(SIMULATED, {}, "deck 5 %", "POD")
     results = pd.concat([BOTH, other], ignore_index=True)
-    assert list(DetectorsDisplay.from_predictions(results).agreement.index) == ["healthy", FOUND]
-    assert list(DetectorsDisplay.from_predictions(results, scenarios=[FOUND]).agreement.index) == [FOUND]
+    assert list(DetectorsDisplay.from_predictions(results).panels) == ["healthy", FOUND]
+    assert list(DetectorsDisplay.from_predictions(results, scenarios=[FOUND]).panels) == [FOUND]
     with pytest.raises(ValueError, match=r"expected some of \['healthy', 'piers 18 %'\]"):
         DetectorsDisplay.from_predictions(results, scenarios=["deck 5 %"])
     with pytest.raises(ValueError, match=r"no scenario of \['deck 5 %'\] has both simulated and measured records"):
@@ -170,7 +164,7 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
     display = DetectorsDisplay.from_predictions(ranking)
     names = rows_named(display.axes_[0])
     assert names == [
-        *("best, or not clearly behind", "whitened", "good", "clearly behind", "raw"),
+        *("not significantly worse", "whitened", "good", "significantly lower POD", "raw"),
         *("more than 2\N{NO-BREAK SPACE}% false alarms", "loud", "failed", "none"),
     ]
     assert texts(display.axes_[0]) == ["LinAlgError: singular"]
@@ -198,7 +192,7 @@ def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
     display = DetectorsDisplay.from_predictions(
         RANKING.assign(significantly_worse=False, **dict.fromkeys(bounds, np.nan))
     )
-    assert rows_named(display.axes_[0])[0] == "order not sure: one repeat"
+    assert rows_named(display.axes_[0])[0] == "order uncertain: one repeat"
     with pytest.raises(ValueError, match=r"lacks the columns \['pod_deficit'\]"):
         DetectorsDisplay.from_predictions(RANKING.drop(columns="pod_deficit"))
 

@@ -125,14 +125,6 @@ def test_impossible_data_are_errors(arguments, message):
         pod_curve(*arguments)
 
 
-def test_impossible_questions_are_errors():
-    curve = pod_curve(SEVERITIES, DETECTED, RECORDS)
-    with pytest.raises(ValueError, match="pod is 90; expected a probability"):
-        curve.severity_at(90)
-    with pytest.raises(ValueError, match="expected shares below 1 of the sign of those tested"):
-        curve.predict(-0.2)
-
-
 def warned_share(pod, n_records, n_draws=100):
     """Share of binomial data of which the curve is said to miss the points."""
     random, n_warned = np.random.RandomState(0), 0

@@ -241,15 +241,6 @@ def test_an_inverse_of_another_models_parameters_is_refused():
         chain(inverse=inverse().set_params(model=other)).fit(T, F)
 
 
-def test_imputers_that_append_indicators_serve_too():
-    holed_T, holed_F = gappy()
-    plain, marked = (
-        chain(imputer=KNNGapImputer(add_indicator=mark), mapper=mapper(lags=1)).fit(holed_T, holed_F)
-        for mark in (False, True)
-    )
-    pd.testing.assert_frame_equal(marked.parameters_, plain.parameters_)
-
-
 @pytest.mark.nightly
 @pytest.mark.filterwarnings(FILLED)
 def test_nullable_frames_are_frames():
@@ -276,18 +267,6 @@ def test_an_inverse_within_a_pipeline_gets_the_model_too():
     fitted = chain(inverse=nested).fit(T, F)
     assert fitted.inverse_[0].model is TRUSS
     np.testing.assert_array_equal(fitted.predict(T), FITTED.predict(T))
-
-
-@pytest.mark.parametrize(
-    ("X", "y", "message"),
-    [
-        (T, None, "requires y"),
-        (pd.concat([T, T.iloc[:1]]), pd.concat([F, F.iloc[:1]]), "duplicate stamps"),
-    ],
-)
-def test_bad_input_is_named(X, y, message):
-    with pytest.raises(ValueError, match=message):
-        chain().fit(X, y)
 
 
 def test_an_aligner_without_a_reference_gets_the_models():

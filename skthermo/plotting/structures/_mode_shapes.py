@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
@@ -57,10 +57,8 @@ class ModeShapesDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_modes,)
-        One panel for each mode.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     lines_ : list of collection
         Deformed members of each mode.
 
@@ -153,7 +151,6 @@ class ModeShapesDisplay(Display):
         ax: Axes | np.ndarray | None = None,
         *,
         amplitude: float = 0.06,
-        colour: str | Mapping[str, str] = ORANGE,
         linewidth: float = 1.5,
         n_columns: int = 2,
     ) -> ModeShapesDisplay:
@@ -165,8 +162,6 @@ class ModeShapesDisplay(Display):
             One for each mode, three-dimensional for a structure in space. A new figure by default.
         amplitude : float, default=0.06
             Largest displacement drawn, as a share of the structure's extent.
-        colour : str or mapping of group to str, default="#D55E00"
-            Colour of the deformed members.
         linewidth : float, default=1.5
             Width of their lines in points.
         n_columns : int, default=2
@@ -185,26 +180,24 @@ class ModeShapesDisplay(Display):
             cells = self._new_panels(view, n_columns, height_of(points))
         else:
             self.axes_, cells = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3)), [None] * len(moved)
-        parts = self._parts(colour)
+        groups = [list(self.structure.members)]
+        if self.groups is not None:
+            groups = [list(self.structure.groups[group]) for group in self.groups]
+        parts = [sort_members(self.structure, names)[1:] for names in groups]
         self.lines_ = []
         for ax_, cell, mode, places, frequency in zip(
             self.axes_, cells, self.modes, moved, self.frequencies, strict=True
         ):
             check_axes(ax_, view)
-            for names, part_colour in parts:
-                _, lines, surfaces = sort_members(self.structure, names)
+            drawn = []
+            for lines, surfaces in parts:
                 if surfaces:
                     add_surfaces(ax_, corners(self.structure, surfaces, rest), facecolors=LIGHT, alpha=0.3)
-                    add_surfaces(ax_, corners(self.structure, surfaces, places), facecolors=part_colour, alpha=0.3)
+                    add_surfaces(ax_, corners(self.structure, surfaces, places), facecolors=ORANGE, alpha=0.3)
                 if lines:
                     add_lines(ax_, corners(self.structure, lines, rest), colors=LIGHT, linewidths=0.8, zorder=1)
-            drawn = [
-                add_lines(
-                    ax_, corners(self.structure, lines, places), colors=part_colour, linewidths=linewidth, zorder=2
-                )
-                for names, part_colour in parts
-                if (lines := sort_members(self.structure, names)[1])
-            ]
+                    style = {"colors": ORANGE, "linewidths": linewidth, "zorder": 2}
+                    drawn.append(add_lines(ax_, corners(self.structure, lines, places), **style))
             self.lines_.append(drawn)
             draw_supports(ax_, view, size=7)
             set_view(ax_, points, cell)
@@ -213,16 +206,6 @@ class ModeShapesDisplay(Display):
             if cell is not None:
                 ax_.title.set_y(title_height(ax_, cell))  # axes in space would scale it, were it given above
         return self
-
-    def _parts(self, colour: str | Mapping[str, str]) -> list[tuple[list[Hashable], str]]:
-        """Members to be drawn and their colour; those of each group together."""
-        groups = self.structure.groups
-        if self.groups is None:
-            return [(list(self.structure.members), ORANGE if isinstance(colour, Mapping) else colour)]
-        return [
-            (list(groups[group]), colour.get(group, ORANGE) if isinstance(colour, Mapping) else colour)
-            for group in self.groups
-        ]
 
     def _new_panels(self, view: Projection, n_columns: int, ratio: float) -> list[Cell | None]:
         """Axes of a new figure, and in space the cell of the figure that each of them should fill."""

@@ -14,7 +14,7 @@ from skthermo._tables.arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._axes import legend_columns
 from skthermo.plotting._display import Display
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, ORANGE, drawing, plain, pyplot, shortened
+from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
     add_lines,
     add_points,
@@ -34,16 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import Collection
     from matplotlib.colorbar import Colorbar
 
-    from skthermo.studies import LocatedDamage
-
 WIDTH, THIN = 2.5, 0.8
-DAMAGE_COLOURS = ["#BFC5CC", "#F0C04A", ORANGE, "#7A0019"]  # from grey, as nothing there asks for attention
-LABELS = {
-    "probability": "probability of damage",
-    "severity": "mean loss of stiffness",
-    "if_damaged": "loss of stiffness where damaged",
-}
-"""What the columns of located damage are called beside a colour bar."""
 
 
 @dataclass(eq=False, repr=False)
@@ -55,7 +46,7 @@ class StructureDisplay(Display):
 
     Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
-    It is best made by `from_structure`, or by `from_located`.
+    It is best made by `from_structure`.
 
     Parameters
     ----------
@@ -70,7 +61,7 @@ class StructureDisplay(Display):
 
     Attributes
     ----------
-    ax_, axes_, figure_ : matplotlib's Axes, array that holds them, and Figure
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
         Where it is drawn.
     members_ : dict
         Collections of lines, surfaces and points, by ``"lines"``, ``"surfaces"`` and ``"points"`` or by group.
@@ -135,34 +126,6 @@ class StructureDisplay(Display):
             raise ValueError("values and groups are both given; expected one of them to colour the members")
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
-
-    @classmethod
-    def from_located(cls, located: LocatedDamage, quantity: str = "probability", **options: object) -> StructureDisplay:
-        """Draw where a structure is damaged, member by member.
-
-        Parameters
-        ----------
-        located : LocatedDamage
-            From `~skthermo.studies.locate_damage`.
-        quantity : {"probability", "severity", "if_damaged"}, default="probability"
-            Column of its table that colours the members; those of no group are grey.
-        **options : dict
-            Options of `plot`; by default the colours go from 0 to 1.
-
-        Returns
-        -------
-        StructureDisplay
-
-        Raises
-        ------
-        ValueError
-            If the quantity is unknown.
-        """
-        if quantity not in LABELS:
-            raise ValueError(f"quantity is {quantity!r}; expected one of {list(LABELS)}")
-        cmap = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("damage", DAMAGE_COLOURS)
-        options = {"cmap": cmap, "limits": (0.0, 1.0)} | options
-        return cls.from_structure(located.structure, located.table[quantity], label=LABELS[quantity], **options)
 
     def plot(
         self,

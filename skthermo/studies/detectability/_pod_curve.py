@@ -294,7 +294,7 @@ def pod_curve(
     return curve
 
 
-def check_probability(value: Any, what: str) -> float:
+def check_probability(value: ArrayLike, what: str) -> float:
     """A probability strictly between 0 and 1, or an error."""
     if not is_real(value) or not 0 < float(value) < 1:
         raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")

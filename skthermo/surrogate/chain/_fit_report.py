@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.arguments import seem_rad_per_s
 from skthermo._estimators.regressors import offers, reach_of
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._tables.frames import column_names, columns_by_sensor
+from skthermo._tables.frames import Table, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import last_step
@@ -404,7 +405,7 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
-def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
+def filled(T: Table, sensors: SensorRegression) -> pd.DataFrame:
     """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
     deviations, found = sensors.fill(T)[1], {}
     for sensor, columns in columns_by_sensor(T).items():
@@ -432,7 +433,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     return pd.Series(counts, dtype=int)
 
 
-def periods(T: Any, rows: NDArray[np.bool_]) -> str:
+def periods(T: Table, rows: NDArray[np.bool_]) -> str:
     """When some rows of a table were taken: their period, or the longest one and how many there are."""
     order = np.argsort(row_times(T), kind="stable")
     places = np.flatnonzero(rows[order])
@@ -443,7 +444,7 @@ def periods(T: Any, rows: NDArray[np.bool_]) -> str:
     return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
 
 
-def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
+def _labels(T: Table, rows: NDArray[np.intp]) -> list[str]:
     """What rows are called: their stamps, or their numbers."""
     if not has_stamps(T):
         return [f"row {row}" for row in rows]
@@ -452,19 +453,19 @@ def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
     return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 
-def mode_offsets(model: FEModel, F: Any) -> pd.Series:
+def mode_offsets(model: FEModel, F: Table) -> pd.Series:
     """Mean measured frequency against the model's nominal one, by mode, in percent."""
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
 
 
-def hidden_offsets(aligner: Any, F: Any) -> pd.Series:
+def hidden_offsets(aligner: BaseEstimator, F: Table) -> pd.Series:
     """Mean measured frequency against the mean that the model sees behind an aligner, by mode, in percent."""
     seen = np.nanmean(as_floats(aligner.transform(F)), axis=0)
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
 
 
-def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Array) -> float:
+def unexplained_offset(hidden: pd.Series, predicted: Array, T: Table, errors: Array) -> float:
     """Size of hidden offsets as a share of what weather, errors of the means and a calibrated model may leave."""
     offsets = 100 * np.log1p(hidden.to_numpy() / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]
@@ -477,7 +478,7 @@ def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Arra
     return float(size / (MOST_UNEXPLAINED if n_months >= MOST_OF_A_YEAR else MOST_OF_FEW_MONTHS))
 
 
-def mode_warnings(model: FEModel, F: Any) -> Iterator[SkthermoWarning]:
+def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
     """Warnings about the order and the units of the modes."""
     offsets = mode_offsets(model, F)
     ratios = 1 + offsets.to_numpy() / 100

@@ -18,10 +18,10 @@ from sklearn.utils import Bunch
 from skthermo._estimators.arguments import is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import column_names
+from skthermo._tables.frames import Table, column_names
 from skthermo._validation import validate_data
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
-from skthermo.fem import add_noise, evaluate, sample, share_reordered
+from skthermo.fem import FEModel, add_noise, evaluate, sample, share_reordered
 from skthermo.surrogate._memory import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
 from skthermo.surrogate.refinement import Refinement, ResponseSurface, ShapeInputs
@@ -31,7 +31,7 @@ from skthermo.surrogate.refinement import Refinement, ResponseSurface, ShapeInpu
 class InverseColumns:
     """How an `InverseSurrogate` reads, names and computes its columns: frequencies and, perhaps, shapes."""
 
-    model: Any
+    model: FEModel
     shapes: ShapeInputs | None
     n_jobs: int | None
 
@@ -50,7 +50,7 @@ class InverseColumns:
         dofs = () if self.shapes is None else self.shapes.dofs
         return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
 
-    def check(self, inverse: Any, X: Any) -> None:
+    def check(self, inverse: Any, X: Table) -> None:
         """Check number and names of the columns; without X, they are those of an array."""
         n_columns = len(self.names())
         names_only = np.ones((1, n_columns)) if X is None else X
@@ -194,7 +194,7 @@ def narrower(bounds: Array, theta: Array) -> Array:
 
 def _draw(
     inverse: Any,
-    model: Any,
+    model: FEModel,
     box: Box,
     random: np.random.RandomState,
     *,
@@ -210,7 +210,7 @@ def _draw(
 
 
 def simulations(
-    model: Any,
+    model: FEModel,
     bounds: Any,
     n_samples: int,
     tol: float | None,
