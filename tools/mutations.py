@@ -240,7 +240,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "content_of(guess)",
         ),
     ],
-    ("surrogate/_simulator.py", "surrogate/test_known_changes.py"): [
+    ("surrogate/_simulator.py", "surrogate/test_reduce_auto.py"): [
         ("changes of another simulator", "default_factory=KnownChanges, init=False,", "default_factory=KnownChanges,"),
     ],
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
@@ -484,7 +484,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
-    ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
+    ("studies/detectability/_intervals.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [

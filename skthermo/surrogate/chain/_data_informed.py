@@ -508,7 +508,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records, or a sensor departs from what the others foretell; `predict`, `predict_interval` and `simulate`
+            records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
         weather = self.weather(X)

@@ -26,11 +26,8 @@ UNLIKE = 5.0  # distance of median components from those of the model, in deviat
 
 @dataclass(frozen=True)
 class Estimates:
-    """What M1 finds for each training record: parameters and, where it refines, how the steps ended.
-
-    ``full_solves`` tells how often the full model was solved for each because its steps left the box of the reduced
-    model.
-    """
+    """What M1 finds for each training record: parameters and, where it refines, how the steps ended, and how often the
+    full model was solved because they left the box of the reduced one."""
 
     theta: Array
     n_unconverged: int | None = None
