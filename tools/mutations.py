@@ -141,7 +141,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
         ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
     ],
-    ("monitoring/_promise.py", "fleet/test_discoveries.py"): [
+    ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
         ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
     ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
@@ -503,7 +503,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/structures/_projection.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
-    ("monitoring/_promise.py", "monitoring/test_promise.py"): [
+    ("monitoring/_false_alarms.py", "monitoring/test_false_alarms.py"): [
         ("promised tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
         ("promised end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
         ("promised numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
