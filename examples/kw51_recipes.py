@@ -154,7 +154,7 @@ class Fitted:
         with quiet():
             if change not in self.noise_free:
                 self.noise_free[change] = self.fem.simulate(self.records.temperatures, **self.records.changes[change])
-            draw = self.fem.draw_noise(self.records.temperatures, noise, random_state=seed)
+            draw = self.fem.recorder_.noise(self.fem.weather(self.records.temperatures), noise, random_state=seed)
         return self.noise_free[change] * (1 + draw)
 
     def detection(self, noise="fitted", modes=PAIR, complete=True, change="retrofit", seed=0):

@@ -15,6 +15,7 @@ Run it with ``python examples/plot_fleet.py``; the figures go to the folder ``fi
 from functools import partial
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 from page_recipes import command_line, save_figures
 from sklearn.pipeline import make_pipeline
@@ -22,7 +23,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_fleet
 from skthermo.fleet import FleetPrior, fit_fleet
 from skthermo.metrics import mape
-from skthermo.plotting import FleetPriorDisplay, PredictionDisplay
+from skthermo.plotting import PredictionDisplay
 from skthermo.preprocessing import SensorMeans
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
@@ -58,7 +59,7 @@ print(fleet.summary())
 # What they have in common
 # ------------------------
 # The deck of a girder and that of a truss share a name and little else, so that each kind has its own families. Each
-# family is pooled only if the other bridges foretell a bridge's records better than it does alone.
+# family is pooled only if the other bridges predict a bridge's records better than it does alone.
 
 families = {
     name: {part: f"{bridge.kind} {part}" for part in bridge.model.parameter_names} for name, bridge in campaign.items()
@@ -88,19 +89,36 @@ for name in new:
         for label, chain in chains[name].items()
     }
     follows = chains[name]["30 days and the fleet"].mapper_[-1].pooling_probability_
-    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_atypical, "follows": max(follows.values())}
+    errors[f"{name} ({campaign[name].kind})"] |= {
+        "atypical": campaign[name].is_atypical,
+        "follows": max(follows.values()),
+    }
 print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 
 # %%
 # What the fleet adds
 # -------------------
-# Between the dotted lines, the girder's own records tell how its deck follows the temperature; beyond them, the fleet
-# does, and the band says how well.
+# How parameters of a new girder change with temperature. Bands are two standard deviations. The girder's own records
+# cover the temperatures between the dotted lines. Outside this range, predictions rely on the fleet prior.
 
 girder = next(name for name in new if campaign[name].kind == "girder")
+mapper = chains[girder]["30 days and the fleet"].mapper_[-1]
+june = np.ravel(load_records(girder, 30, "2025-06-01")[0])
+temperatures = np.linspace(-15, 35, 101)
 figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 for ax, part in zip(axes, ("deck", "bearings"), strict=True):
-    FleetPriorDisplay.from_estimator(chains[girder]["30 days and the fleet"], part, ax=ax)
+    effects = {
+        "fleet": (prior.effects(temperatures, families[girder][part], reference=june.mean()), "tab:blue"),
+        "new girder": (mapper.effects(temperatures, part, reference=june.mean()), "tab:orange"),
+    }
+    for label, (effect, colour) in effects.items():
+        low, mean, high = (100 * np.expm1(effect["mean"] + k * effect["standard_deviation"]) for k in (-2, 0, 2))
+        ax.fill_between(temperatures, low, high, color=colour, alpha=0.25, linewidth=0)
+        ax.plot(temperatures, mean, color=colour, label=f"{label}, mean and band")
+    for end in (june.min(), june.max()):
+        ax.axvline(end, color="black", linestyle=":")
+    ax.set(xlabel="steady temperature (°C)", ylabel=f"change of {part} (%)")
+axes[0].legend()
 
 # %%
 # The next year

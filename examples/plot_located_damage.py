@@ -68,7 +68,8 @@ fem = DataInformedFEM(model, random_state=0).fit(T[:366], F[:366])
 located = locate_damage(fem, bridge, T[366:], F[366:], random_state=0)
 print(located.summary())
 print(located.groups.round(2))
-StructureDisplay.from_located(located)
+colours = {"cmap": "viridis_r", "limits": (0, 1), "label": "probability of damage"}
+StructureDisplay.from_structure(bridge, located.table["probability"], **colours)
 
 # %%
 # Mode shapes of both states, measured at nine points of the deck with an error of 2 %, break the symmetry.
@@ -80,7 +81,7 @@ with_shapes = locate_damage(
     fem, bridge, T[366:], F[366:], shapes=tuple(shapes), dofs=dofs, shape_noise=0.02, random_state=0
 )
 print(with_shapes.summary())
-StructureDisplay.from_located(with_shapes)
+StructureDisplay.from_structure(bridge, with_shapes.table["probability"], **colours)
 
 # %%
 # Each beam has its own probability and severity; ``likely_members`` gives the fewest that hold the damage with a

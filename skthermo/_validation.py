@@ -56,33 +56,6 @@ except ImportError:
         """Stands for scikit-learn's mixin where there are no callbacks yet."""
 
 
-__all__ = [
-    "BaseSearchCV",
-    "CallbackSupport",
-    "Estimator",
-    "HasMethods",
-    "Interval",
-    "InvalidParameterError",
-    "Stages",
-    "StrOptions",
-    "TransformerMixin",
-    "_BaseComposition",
-    "_BaseImputer",
-    "_check_feature_names_in",
-    "_fit_context",
-    "_get_weights",
-    "_num_samples",
-    "_routing_enabled",
-    "check_array",
-    "check_is_fitted",
-    "routes_weights",
-    "seed_parts",
-    "seeded",
-    "validate_data",
-    "with_nan",
-]
-
-
 class Estimator(BaseEstimator):
     """Base of estimators that accept NaN in X, and of which clones share FE models."""
 
@@ -149,8 +122,9 @@ class Estimator(BaseEstimator):
                 )
         return self
 
-    def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray[np.float64]:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+    def _validated(self, X: ArrayLike, *, reset: bool, **options: Any) -> NDArray[np.float64]:
+        options |= {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan"}
+        return validate_data(self, X, reset=reset, **options)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

@@ -14,6 +14,13 @@ __all__ = [
 class SkthermoWarning(UserWarning):
     """Any warning of skthermo.
 
+    Parameters
+    ----------
+    message : str, default=""
+        Text of the warning.
+    kind : str, default=""
+        A few words that name what the warning is about, such as "few rows".
+
     Examples
     --------
     >>> import warnings
@@ -21,6 +28,10 @@ class SkthermoWarning(UserWarning):
     >>> warnings.filterwarnings("error", category=SkthermoWarning)  # to stop a script at the first one
     >>> warnings.filterwarnings("default", category=SkthermoWarning)
     """
+
+    def __init__(self, message: str = "", kind: str = ""):
+        super().__init__(message)
+        self.kind = kind
 
 
 class RecordsWarning(SkthermoWarning):

@@ -56,7 +56,7 @@ def chain_results(chain, T, damage):
         "prediction": np.asarray(chain.predict(T)),
         "damaged": np.asarray(chain.simulate(T, damage=damage, noise="fitted", random_state=3)),
         "interval": np.stack([np.asarray(lowest), np.asarray(highest)]),
-        "records": np.asarray(chain.service_records().missing),
+        "records": np.asarray(chain.recorder_.service.missing),
     }
 
 

@@ -15,6 +15,7 @@ from sklearn.utils.validation import has_fit_parameter
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_columns
 from skthermo._validation import BaseSearchCV, InvalidParameterError, _routing_enabled, last_step, routes_weights
+from skthermo.exceptions import WeatherWarning
 
 
 def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
@@ -171,5 +172,6 @@ def warn_of_fleet(rows: NDArray[np.bool_], consequence: str) -> None:
         warn_user(
             f"{rows.sum()} of {len(rows)} rows are in weather that the training records have not seen, and stand on "
             f"what the fleet has shown there: {consequence}",
+            WeatherWarning,
             "rows that stand on the fleet",
         )

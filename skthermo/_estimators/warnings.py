@@ -18,58 +18,13 @@ from joblib import Parallel
 from joblib import hash as content_of
 from numpy.typing import NDArray
 
-from skthermo.exceptions import (
-    FewRecordsWarning,
-    ModelWarning,
-    RecordsWarning,
-    ResultWarning,
-    SkthermoWarning,
-    UnevaluatedRowsWarning,
-    WeatherWarning,
-)
+from skthermo.exceptions import SkthermoWarning
 
 Records = TypeVar("Records")
-Told = tuple[type[Warning], str, str, int]  # category, text, file and line of a warning
 
 PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}  # packages whose lines are not the user's
 REPORTED = (UserWarning, RuntimeWarning, FutureWarning)  # others are for developers
 ALL = "all"  # key of findings that stand for those of all records within
-
-KINDS: dict[type[SkthermoWarning], str] = {
-    RecordsWarning: (
-        "absurd values, another KW51 file, complex shapes, exchanged modes, excursion of the baseline, few "
-        "shapes, filled temperatures, foreign mode shapes, many outliers, markers, memory, modes of other shapes, "
-        "modes that can be confused, mostly filled, names of temperatures, offset of modes, outliers, rows in "
-        "disorder, sensor apart from others, stand-ins, step, stuck, temperatures, time shift, trend, unfinished file, "
-        "weather"
-    ),
-    FewRecordsWarning: (
-        "few independent, few modes, few records, few residuals, few rows, half of the rows, lags without stamps, "
-        "modes never together, no records for, padded lags, scarce modes, threshold beyond the baseline"
-    ),
-    WeatherWarning: (
-        "rows that stand on the fleet, same weather, seasons without baseline, weather of folds, weather outside "
-        "the training range"
-    ),
-    UnevaluatedRowsWarning: (
-        "modes not found, poles without shape, records not evaluated, records that were not compared, rows not "
-        "evaluated, rows scored, rows that cannot be predicted, rows with a likelihood"
-    ),
-    ModelWarning: (
-        "doubtful matrices, doubtful optimum, draws, failed replicates, failing program, hidden offsets, impossible "
-        "parameters, large discrepancy, large factor, no reduced model, no solution, not converged, order of "
-        "modes, outside the, refined by the full model, round trip, shapes unlike the model's, unfinished draws, "
-        "worse than the mean"
-    ),
-    ResultWarning: (
-        "bands without models, confused groups, covariance with gaps, curve beside its points, families that are "
-        "not found, family without a curve, inert settings searched, many false alarms, search that refits, "
-        "separated severities, severity at its bound, the last records differ, unexplained shifts, unknown, "
-        "unseen groups"
-    ),
-    SkthermoWarning: ("bridges that failed, monitors that begin again, versions of a monitor, warnings of bridges"),
-}
-"""Beginnings of the kinds of each category."""
 
 
 @dataclass(frozen=True)
@@ -98,27 +53,22 @@ def _within(**changes: Any) -> Iterator[None]:
         _context.set(replace(_context.get(), **before))
 
 
-def category_of(kind: str) -> type[SkthermoWarning]:
-    """The class of the warnings of a kind; of two beginnings of it, the longer one counts."""
-    known = {
-        start: category for category, starts in KINDS.items() for start in starts.split(", ") if kind.startswith(start)
-    }
-    return known[max(known, key=len)] if known else SkthermoWarning
-
-
-def warn_user(message: str, kind: str, category: type[Warning] | None = None) -> None:
+def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
     """Warn at the nearest line outside skthermo, scikit-learn and joblib.
 
-    Parameters
-    ----------
-    message : str
-        Text of the warning.
-    kind : str
-        One cross-validation or search gives one warning of each kind, not one for each fold; a worker process, which
-        sees only its own folds, one in its life.
-    category : type, default=None
-        Class of the warning, if not that of its kind.
+    One cross-validation or search gives one warning of each kind, not one for each fold; a worker process, which sees
+    only its own folds, one in its life.
     """
+    warn_each([category(message, kind)])
+
+
+def warn_each(warned: Iterable[SkthermoWarning]) -> None:
+    """Give warnings as `warn_user` does."""
+    for warning in warned:
+        _give(warning, warning.kind)
+
+
+def _give(warning: Warning, kind: str) -> None:
     context = _context.get()
     if kind in context.told:
         return
@@ -135,8 +85,6 @@ def warn_user(message: str, kind: str, category: type[Warning] | None = None) ->
         if kind in given:
             return
         given.add(kind)
-    warning: Any = (category or category_of(kind))(message)
-    warning.kind = kind
     warnings.warn(warning, stacklevel=level)
 
 
@@ -155,23 +103,13 @@ def counted_warnings() -> Iterator[Counter[tuple[str, str]]]:
         try:
             yield counts
         finally:
-            counts.update((_kind(one), str(one.message)) for one in caught)
-
-
-def _kind(caught: warnings.WarningMessage) -> str:
-    kind: str = getattr(caught.message, "kind", caught.category.__name__)
-    return "repeated" if kind.startswith(("once: ", "again: ")) else kind
+            kinds = (getattr(one.message, "kind", one.category.__name__) for one in caught)
+            counts.update(zip(kinds, (str(one.message) for one in caught), strict=True))
 
 
 def _may_filter() -> bool:
     """Whether this thread may set filters, which belong to the whole process: it is the main one, or has its turn."""
     return threading.current_thread() is threading.main_thread() or _context.get().given is not None
-
-
-def warn_each(warnings_by_kind: Iterable[tuple[str, str]]) -> None:
-    """Give warnings by kind and text."""
-    for kind, message in warnings_by_kind:
-        warn_user(message, kind)
 
 
 def told_around(kinds: Iterable[str], findings: Any = None) -> AbstractContextManager[None]:
@@ -201,7 +139,7 @@ def findings_of(check: Callable[..., Any], *tables: Any, mended: Collection[str]
         content = ALL if ALL in found else content_of(tables)
     if content not in found:
         found[content] = check(*tables)
-        warn_each((kind, text) for kind, text in found[content].warnings() if kind not in mended)
+        warn_each(warning for warning in found[content].warnings() if warning.kind not in mended)
     return found[content]
 
 
@@ -223,6 +161,38 @@ def explained_rows(table: Any) -> NDArray[np.bool_] | np.bool_:
 
 
 @contextmanager
+def recorded() -> Iterator[list[warnings.WarningMessage]]:
+    """Keep the warnings of what runs inside in a list, for `give_again`; outside the main thread they pass as they are,
+    because filters belong to the whole process."""
+    if not _may_filter():
+        yield []
+        return
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield caught
+
+
+@contextmanager
+def without_warnings() -> Iterator[None]:
+    """Ignore warnings, unless this is a thread beside the main one."""
+    with recorded():
+        yield
+
+
+@contextmanager
+def warnings_of_detector(name: str | None) -> Iterator[None]:
+    """Mark warnings with the detector that they come from, so that `warnings_once` can name it, if it has a name."""
+    if name is None:
+        yield
+        return
+    with recorded() as caught:
+        yield
+    for one in caught:
+        vars(one.message)["detector"] = name
+        warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+
+
+@contextmanager
 def warnings_once(where: str = "") -> Iterator[list[str]]:
     """Give warnings that differ only in their numbers once, when the context ends, and yield a list of their texts.
 
@@ -236,70 +206,24 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
     alike: dict[str, list[warnings.WarningMessage]] = {}
     for warning in caught:
         alike.setdefault(re.sub(r"[\d.]+", "0", str(warning.message)), []).append(warning)
-    for first, *others in alike.values():
-        named = [one.message for one in (first, *others) if hasattr(one.message, "detector")]
-        detectors = dict.fromkeys(repr(message.detector) for message in named)
+    for same in alike.values():
+        detectors = dict.fromkeys(repr(one.message.detector) for one in same if hasattr(one.message, "detector"))
         notes = [f"detectors {', '.join(detectors)}"] if detectors else []
-        notes += [f"and {len(others)} times more {where}"] if others and where else []
-        again = f" ({'; '.join(notes)})" if notes else ""
-        texts.append(f"{first.message}{again}")
-        if first.category is UserWarning or issubclass(first.category, SkthermoWarning):
-            warn_user(f"{first.message}{again}", f"once: {first.message}", first.category)
-        else:
-            if detectors:
-                first.message.args = (texts[-1],)
-            warnings.warn_explicit(first.message, first.category, first.filename, first.lineno)
+        notes += [f"and {len(same) - 1} times more {where}"] if len(same) > 1 and where else []
+        texts.append(f"{same[0].message} ({'; '.join(notes)})" if notes else str(same[0].message))
+        _again(same[0], texts[-1])
 
 
-@contextmanager
-def warnings_of_detector(name: str | None) -> Iterator[None]:
-    """Mark warnings with the detector that they come from, so that `warnings_once` can name it; without a name, and
-    outside the main thread, they pass as they are."""
-    if name is None or not _may_filter():
-        yield
-        return
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            yield
-        finally:
-            marked = list(caught)
-    for one in marked:
-        one.message.detector = name
-        warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
-
-
-@contextmanager
-def recorded() -> Iterator[list[Told]]:
-    """Keep the warnings of what runs inside in a list, for `give_again`; outside the main thread they pass as they are,
-    because filters belong to the whole process."""
-    told: list[Told] = []
-    if not _may_filter():
-        yield told
-        return
-    try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            yield told
-    finally:
-        told += [(one.category, str(one.message), one.filename, one.lineno) for one in caught]
-
-
-def give_again(told: Iterable[Told]) -> None:
+def give_again(told: Iterable[warnings.WarningMessage]) -> None:
     """Give warnings that were recorded, those for users at the user's line of now."""
-    for category, text, filename, line in told:
-        if category is UserWarning or issubclass(category, SkthermoWarning):
-            warn_user(text, f"again: {text}", category)
-        else:
-            warnings.warn_explicit(text, category, filename, line)
+    for one in told:
+        _again(one, str(one.message))
 
 
-@contextmanager
-def without_warnings() -> Iterator[None]:
-    """Ignore warnings, unless this is a thread beside the main one: filters belong to the whole process."""
-    if not _may_filter():
-        yield
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+def _again(caught: warnings.WarningMessage, text: str) -> None:
+    warning: Any = caught.message
+    warning.args = (text,)
+    if isinstance(warning, SkthermoWarning) or caught.category is UserWarning:
+        _give(warning, f"again: {text}")
+    else:
+        warnings.warn_explicit(warning, caught.category, caught.filename, caught.lineno)

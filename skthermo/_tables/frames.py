@@ -3,15 +3,18 @@
 import re
 from collections.abc import Hashable, Iterable
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, median, real_array
+from skthermo._tables.arrays import Array, as_floats, median, real_array, robust_deviation
 from skthermo._validation import _num_samples
+from skthermo.exceptions import RecordsWarning
+
+Table: TypeAlias = Array | pd.DataFrame
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
@@ -141,6 +144,7 @@ def warn_of_markers(X: ArrayLike) -> None:
         warn_user(
             f"{marked.sum()} of {marked.size} values look as if they stood for missing ones, the first "
             f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
+            RecordsWarning,
             "markers",
         )
 
@@ -151,15 +155,15 @@ def warn_of_absurd(X: ArrayLike) -> None:
     values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
     if np.isnan(values).all(axis=0).any():
         return
-    distances = np.abs(values - median(values))
-    middle = median(distances)
-    far = distances > ABSURD * 1.4826 * middle
-    if (far & (middle > 0)).any():
+    deviations = robust_deviation(values)
+    far = (np.abs(values - median(values)) > ABSURD * deviations) & (deviations > 0)
+    if far.any():
         row, column = np.argwhere(far)[0]
         warn_user(
             f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "
             f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
             f"damage; expected NaN where a value is wrong (absurd is more than {ABSURD} robust deviations away)",
+            RecordsWarning,
             "absurd values",
         )
 
@@ -171,6 +175,7 @@ def warn_of_disorder(X: Any) -> None:
         warn_user(
             f"row {row} ({X.index[row]}) is earlier than the row before it: folds are periods of time only for rows in "
             "order; expected X.sort_index()",
+            RecordsWarning,
             "rows in disorder",
         )
 

@@ -13,6 +13,7 @@ import pandas as pd
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import RecordsWarning
 
 ISO = "ISO8601"
 PARQUET = (".parquet", ".pq")
@@ -59,7 +60,9 @@ def _csv(file: Path, separator: str, decimal: str, stamps: str) -> pd.DataFrame:
         if len(row) != len(names):
             raise ValueError(f"{file}, line {line}: values: {len(row)}; expected {len(names)} as named above")
     if not text.endswith(("\n", "\r")):
-        warn_user(f"{file} does not end with a line break: its last value may be cut off", "unfinished file")
+        warn_user(
+            f"{file} does not end with a line break: its last value may be cut off", RecordsWarning, "unfinished file"
+        )
     numbers = [line for line, _ in records]
     cells = list(zip(*(row for _, row in records), strict=True)) or [()] * len(names)
     values = [_numbers(column, decimal, file, numbers) for column in cells[1:]]

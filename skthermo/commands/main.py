@@ -5,7 +5,8 @@
     python -m skthermo acknowledge bridge.skops 3 --harmless --note "a special transport"
 
 Exit codes of update and status: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an error, and
-the monitor's file is as it was. An alarm is 1 also if its report cannot be written. acknowledge: 0 done, 3 an error.
+the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its report cannot be
+written. acknowledge: 0 done, 3 an error.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import argparse
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import pandas as pd
 
@@ -85,6 +86,7 @@ def _add_records(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stamps", default=ISO, metavar="FORMAT", help='such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)'
     )
+    parser.add_argument("--confirm", action="store_true", help="take in records that are stamped far ahead")
 
 
 def _update(options: argparse.Namespace) -> int:
@@ -94,15 +96,14 @@ def _update(options: argparse.Namespace) -> int:
         form = {name: getattr(options, name) for name in ("separator", "decimal", "stamps")}
         records = read_file(options.records, **form, zone=monitor.last_.tz)
         records.index.name = monitor.baseline_.index.name
-        before = dict(monitor.counts_)
+        before = monitor.counts_
         with told_around({"records not evaluated"}):  # said below, with all reasons
-            evaluated = monitor.update(records) if len(records) else None
-        code = _code(monitor, evaluated)
-        print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, evaluated)]))
+            evaluated = monitor.update(records, confirm=options.confirm) if len(records) else None
         if evaluated is not None:
-            code = _also(code, lambda: monitor.save(options.monitor))
+            monitor.save(options.monitor)
+    print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, evaluated)]))
     print("\n".join(_standing(monitor)))
-    return _reported(monitor, options, code)
+    return _reported(monitor, options, _code(monitor, evaluated))
 
 
 def _status(options: argparse.Namespace) -> int:
@@ -129,23 +130,18 @@ def _reported(monitor: Monitor, options: argparse.Namespace, code: int) -> int:
         return code
     from skthermo.reporting import owner_report  # a job without a report needs no drawings
 
-    return _also(code, lambda: owner_report(monitor, options.report, title=options.title))
-
-
-def _also(code: int, action: Callable[[], Any]) -> int:
-    """Exit code if this was tried, too: what fails is told, but does not hide an alarm."""
     try:
-        action()
-    except Exception as error:
-        _complain(error)
+        owner_report(monitor, options.report, title=options.title)
+    except Exception as error:  # it does not hide an alarm
+        _complain(error, f"{options.report} was not written: ")
         return code if code == ALARM else FAILED
     return code
 
 
-def _complain(error: Exception) -> None:
+def _complain(error: Exception, what: str = "") -> None:
     if not isinstance(error, ValueError | OSError | ImportError):  # these explain themselves
         traceback.print_exception(error)
-    print(f"error: {error}", file=sys.stderr)
+    print(f"error: {what}{error}", file=sys.stderr)
 
 
 def _code(monitor: Monitor, evaluated: pd.DataFrame | None) -> int:
@@ -172,6 +168,7 @@ def _taken_in(before: dict[str, int], after: dict[str, int], evaluated: pd.DataF
     states = ", ".join(f"{(new['state'] == state).sum()} {state}" for state in CODES)
     lines = [f"new: {len(new)} ({states}); {others}"]
     lines += [f"evaluated anew, as records came late: {revised}"] if revised else []
+    lines += [f"set aside, stamped too far ahead: {after['n_ahead']}"] if after["n_ahead"] else []
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts()
     return lines + [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
 

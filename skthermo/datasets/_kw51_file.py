@@ -17,6 +17,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_matlab
 from skthermo._tables.arrays import Array
 from skthermo.datasets._results import KW51Monitoring
+from skthermo.exceptions import RecordsWarning
 
 MOST_LABELS = 1000
 UNIX_EPOCH = 719529  # as a MATLAB date number
@@ -83,13 +84,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     ValueError
         If the file is damaged, a field is missing or does not fit the others, a time stamp is repeated, or a value is
         impossible: frequencies outside 0.1 to 100 Hz, damping ratios outside -1 to 1, temperatures outside -60 to 80 C,
-        or a number in their place that stands for a missing one, such as -999. The error names the file, field, row
-        (counted from zero) and column.
-
-    Warns
-    -----
-    UserWarning
-        If a zip file is not the published one, or another weather channel has numbers that stand for missing ones.
+        or a number that stands for a missing one, such as -999. The error names the file, field, row (counted from
+        zero) and column. Such numbers in other weather channels give a warning.
 
     See Also
     --------
@@ -123,7 +119,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
         warn_user(
             f"{file} has the MD5 checksum {md5}; expected {PUBLISHED_MD5}, that of the published trackedmodes.zip: its "
             "content may differ from what was published",
-            kind="another KW51 file",
+            RecordsWarning,
+            "another KW51 file",
         )
     return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
 
@@ -158,21 +155,17 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
         warn_user(
             f"{file}: field 'env' has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, "
             f"column {channels[column]!r}: {env[row, column]:g}; expected measured values, or NaN",
-            kind="stand-ins",
+            RecordsWarning,
+            "stand-ins",
         )
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):
             _check_possible(part[:, :, number], f_names, [None] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
     time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
-    return {
-        "temperatures": pd.DataFrame(env, index=time, columns=channels),
-        "frequencies": pd.DataFrame(f, index=time, columns=f_names),
-        "damping": pd.DataFrame(xi, index=time, columns=xi_names),
-        "shapes": shapes,
-        "sensors": sensors,
-        "state": state_of(time),
-    }
+    tables = {"temperatures": (env, channels), "frequencies": (f, f_names), "damping": (xi, xi_names)}
+    frames = {name: pd.DataFrame(values, index=time, columns=columns) for name, (values, columns) in tables.items()}
+    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}
 
 
 def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:

@@ -253,42 +253,29 @@ def make_kw51(
     Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. Values that they do not give
     are assumed here, before any updating:
 
-    ===================  ================================  =====================================================
-    quantity             value                             reason
-    ===================  ================================  =====================================================
-    transverse beams     33, in 32 equal bays              the monitoring numbers them so
-    arches               12.4 m apart, upright above the   the width stated
-                         girders; parabolas between the
-                         supports
-    rise of an arch      18 m                              L/6.4 is usual; f3 asks for more, f5 for less
-    braces               16 a side, in V-pairs from        hangers usual in tied arches; steeper ones let a
-                         stations 2, 6, .., 30 to the      vertical mode fall from 2.8 to 1.7 Hz
-                         arch 2 bays to either side (the
-                         outermost: 1 bay)
-    connections          1.6 m at both ends of a brace,    Table A.3: sensitivities to E_con and E_br compare
-                         in line with it, upright          as the flexibilities of connections and braces
-    pipes                x/L = 0.25, 0.385 and mirrored    f1, f2 and f4 together
-    mesh of the deck     4 panels across a bay, all        f3 is within 0.2 % of 8 panels
-                         members at one level
-    end beams            1.4 times as stiff as the other   for the mesh: 8 panels raise f1, f2 and f4 by 3.2,
-                         transverse beams                  1.9 and 1.3 %, this by 2.2, 1.4 and 1.0 %
-    stiffeners           every 0.5 m, gathered along the   their own width of 0.25 m, and as much between
-                         lines of the mesh by width        them
-    steel                nu = 0.3, 7850 kg/m3              handbooks
-    ballast              nu = 0.3, 1500 kg/m3, over the    loose crushed stone; rails and sleepers are not
-                         whole width                       mentioned
-    mass                 lumped, translations only         default of the program that the paper used
-    supports 1 and 3     opposite ends of one side         at one end, or across: another order of modes
-    ===================  ================================  =====================================================
+    ===================  ===========================================================================================
+    transverse beams     33, in 32 equal bays, as the monitoring numbers them; the first and the last 1.4 times as
+                         stiff, because of the mesh
+    arches               parabolas 12.4 m apart, upright, between the supports; rise 18 m (L/6.4 is usual)
+    braces               16 a side, in V-pairs from stations 2, 6, .., 30 to the arch 2 bays to either side (the
+                         outermost: 1 bay), as hangers usual in tied arches
+    connections          1.6 m at both ends of a brace, in line with it, upright: sensitivities to E_con and E_br
+                         then compare as in Table A.3
+    pipes                at x/L = 0.25, 0.385 and mirrored: f1, f2 and f4 together
+    mesh of the deck     4 panels across a bay, all members at one level: f3 is within 0.2 % of 8 panels
+    stiffeners           every 0.5 m, gathered along the lines of the mesh by width
+    materials            nu = 0.3; steel 7850 kg/m3; ballast 1500 kg/m3 over the whole width
+    mass                 lumped, translations only: default of the program that the paper used
+    supports 1 and 3     opposite ends of one side; elsewhere the order of modes is another
+    ===================  ===========================================================================================
 
-    Rise, braces, connections, pipes and supports were thus chosen with the paper's un-updated results in view, as
-    round numbers; nothing was optimised. Its six un-updated frequencies, 0.4735 to 2.7810 Hz, are met to 2 %.
-    Modes 3 and 5 share more of each other than in Table A.3: supports that hold one side alone couple them.
-    Beams have no shear deformation.
+    Rise, braces, connections, pipes and supports are round numbers chosen with the paper's un-updated frequencies in
+    view, 0.4735 to 2.7810 Hz, which are met to 2 %; nothing was optimised. Beams have no shear deformation.
 
-    The updated model has eleven multipliers fitted to six measured frequencies, modes followed by shape, moduli within
-    10 % (E_bot within 30 %) and all else within 50 %, by ``python examples/plot_kw51_updating.py`` ("followed, E_bot
-    30 %"). Six of them lie at their bounds, because six frequencies cannot determine eleven multipliers:
+    The updated model has eleven multipliers (``UPDATED`` in the source) fitted to six measured frequencies, modes
+    followed by shape, moduli within 10 % (E_bot within 30 %) and all else within 50 %, by ``python
+    examples/plot_kw51_updating.py`` ("followed, E_bot 30 %"). Six lie at their bounds, because six frequencies cannot
+    determine eleven multipliers:
 
     =======================  ======  ======  ======  ======  ======  ======
     frequency (Hz)               f1      f2      f3      f4      f5      f6
@@ -297,12 +284,6 @@ def make_kw51(
     not updated               0.477   1.113   1.694   2.351   2.535   2.824
     updated                   0.507   1.211   1.888   2.515   2.581   2.920
     =======================  ======  ======  ======  ======  ======  ======
-
-    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
-    E_bot  E_arc  E_br   E_con  E_pip     A_c    I_22p  A_d       I_22a     A_a       M_a
-    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
-    1.3    0.9    0.9    0.9    0.942523  1.5    0.5    1.031471  1.128122  1.016123  0.711763
-    =====  =====  =====  =====  ========  =====  =====  ========  ========  ========  ========
 
     References
     ----------
@@ -355,22 +336,16 @@ def kw51_sensors() -> dict[str, int]:
 
     Notes
     -----
-    The positions are read from the labels, and assumed where these leave them open. On the deck, the number is that of
-    the transverse beam, 1 to 33 (17 is mid-span), so that the station is the number less 1; the letter A or C is the
-    side, and y or z the direction. On the arch, the numbers 9 and 10, 15 and 16, 21 and 22 lie about a middle of 15.5
-    as the deck's numbers 11, 17 and 23 about theirs: the sensors are taken as those above them, at stations 10, 16
-    and 22. Side A is the line 0 of the model (y = -6.2 m), and every sensor counts as positive along the model's axes.
-    Check these assumptions by the MAC of measured and computed shapes (`~skthermo.fem.match_modes`).
-    For `load_kw51`, ``[kw51_sensors()[name] for name in data.sensors]`` are the degrees of freedom of the last axis of
-    ``shapes``.
+    The positions are read from the labels: the number of the transverse beam (1 to 33, 17 at mid-span), the side A or
+    C, and the direction. Assumed are the stations on the arch (10, 16 and 22, above the deck's sensors), side A as line
+    0 (y = -6.2 m), and positive signs along the model's axes. Check these assumptions by the MAC of measured and
+    computed shapes (`~skthermo.fem.match_modes`). For `load_kw51`, ``[kw51_sensors()[name] for name in data.sensors]``
+    are the degrees of freedom of the last axis of ``shapes``.
 
     Examples
     --------
     >>> from skthermo.datasets import kw51_sensors, kw51_structure
-    >>> sensors = kw51_sensors()
-    >>> list(sensors)[:3]
-    ['aBD11Az', 'aBD17Ay', 'aBD17Az']
-    >>> kw51_structure().dofs[sensors["aBD17Az"]]
+    >>> kw51_structure().dofs[kw51_sensors()["aBD17Az"]]
     (('deck', 16, 0), 'z')
     """
     places = {label: (("deck", int(label[3:5]) - 1, SIDE_LINES[label[5]]), label[6]) for label in DECK_SENSORS}

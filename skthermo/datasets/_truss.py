@@ -119,8 +119,7 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     ----------
     Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
-    Seif et al., Temperature-dependent material modeling for structural steels: formulation and application, National
-    Institute of Standards and Technology, 2016 [SCG16]_, from which the paper has the law.
+    Seif et al., Temperature-dependent material modeling for structural steels, NIST, 2016 [SCG16]_: source of the law.
 
     Examples
     --------
@@ -198,8 +197,7 @@ def make_truss_campaign(
     Raises
     ------
     ValueError
-        If a count is not a positive integer, damage, drift, noise or correlation are wrong, or the damage begins
-        outside the campaign.
+        If a group is unknown, drift or damage leave no stiffness, or the damage begins outside the campaign.
 
     Examples
     --------
@@ -210,13 +208,10 @@ def make_truss_campaign(
 
     Four years in which the bottom chord loses 1 % of its stiffness a year, and 12 % more at once:
 
-    >>> ageing = make_truss_campaign(
-    ...     4, drift={"bottom": 0.01}, damage={"bottom": 0.12}, damage_from="2028-01-01", random_state=0
-    ... )
-    >>> steady = make_truss_campaign(4, random_state=0)
-    >>> lost = 1 - (ageing.clean_frequencies / steady.clean_frequencies)["f1"]
-    >>> lost.groupby(lost.index.year).mean().round(3).tolist()
-    [0.001, 0.004, 0.006, 0.038]
+    >>> chord = {"drift": {"bottom": 0.01}, "damage": {"bottom": 0.12}, "damage_from": "2028-01-01"}
+    >>> f1 = make_truss_campaign(4, **chord, random_state=0).clean_frequencies["f1"]
+    >>> f1.groupby(f1.index.year).mean().round(2).tolist()
+    [7.53, 7.51, 7.49, 7.25]
     """
     n_years = positive_integer(n_years, "n_years")
     samples_per_year = positive_integer(samples_per_year, "samples_per_year")

@@ -60,37 +60,21 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     -----
     Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0. The model assumes:
 
-    ================  ==========  =======  =================================================================
-    quantity          value       unit     reason
-    ================  ==========  =======  =================================================================
-    spans             14, 30, 14  m        [PD01]_; straight, without the bridge's skew, same at both ends
-    pier height       5.5         m        from the girder's axis to the footing; assumed
-    element length    1           m        at most; halving it moves no frequency by 0.1 %
-    girder E          37.5e9      Pa       concrete, where FE models of this bridge begin [TD04]_
-    girder G          16e9        Pa       likewise
-    girder density    2700        kg/m3    concrete, and the pavement smeared over its section
-    girder A          4.4         m2       box girder, constant along the bridge; assumed
-    girder I_yy       0.609       m4       vertical bending: fitted, start 0.6
-    girder I_zz       17          m4       lateral bending, mostly of a deck slab 8.6 m wide; assumed
-    girder J          1.27        m4       torsion: fitted, start 1.25
-    pier E            37.5e9      Pa       the girder's
-    pier G            16e9        Pa       the girder's
-    pier density      2500        kg/m3    concrete
-    pier A            2.4         m2       a wall, 0.6 m along and 4 m across the bridge; assumed
-    pier I_yy         0.072       m4       bending along the bridge: 4 * 0.6**3 / 12
-    pier I_zz         3.2         m4       bending across: 0.6 * 4**3 / 12
-    pier J            0.26        m4       4 * 0.6**3 / 3, less a tenth for the section's ends
-    soil x            1.5e9       N/m      order of a footing on gravel, here and in the next five rows
-    soil y            2e9         N/m
-    soil z            3e9         N/m
-    soil rx           9.95e9      N m/rad  rocking across the bridge: fitted, start 1e10
-    soil ry           5e9         N m/rad
-    soil rz           5e9         N m/rad
-    abutment x        3e9         N/m      earth behind it; half of that brings a longitudinal mode below f4
-    abutment y        3e9         N/m      as along x
-    abutment z        5.39e8      N/m      fitted, start 5e8
-    abutment rx       3e9         N m/rad  z spread over the 8.6 m: 8.6**2 / 12 times as much; ry, rz free
-    ================  ==========  =======  =================================================================
+    =====================  =========================================================================================
+    spans                  14, 30 and 14 m [PD01]_; straight, without the bridge's skew, same at both ends
+    pier height            5.5 m from the girder's axis to the footing; assumed
+    element length         at most 1 m; halving it moves no frequency by 0.1 %
+    E and G                37.5 and 16 GPa: concrete, where FE models of this bridge begin [TD04]_
+    density                2700 kg/m3 (girder, with its pavement) and 2500 kg/m3 (piers)
+    girder A, I_zz         4.4 m2 and 17 m4: box girder with a deck slab 8.6 m wide, constant along the bridge; assumed
+    girder I_yy, J         0.609 and 1.27 m4: vertical bending and torsion, fitted, start 0.6 and 1.25
+    pier A, I_yy, I_zz, J  2.4 m2; 0.072, 3.2 and 0.26 m4: a wall, 0.6 m along and 4 m across the bridge; assumed
+    soil x, y, z           1.5, 2 and 3 GN/m: order of a footing on gravel
+    soil rx, ry, rz        9.95 (rocking across the bridge: fitted, start 10), 5 and 5 GN m/rad
+    abutment x, y          3 GN/m: earth behind it; half of that in x brings a longitudinal mode below f4
+    abutment z             0.539 GN/m: fitted, start 0.5
+    abutment rx            3 GN m/rad: z spread over the 8.6 m, 8.6**2 / 12 times as much; ry, rz free
+    =====================  =========================================================================================
 
     ``tools/fit_z24_constants.py`` found the four fitted constants by `~skthermo.updating.ModelUpdater`, with a
     weak prior centred on the start values, from the mean frequencies of the healthy records in which all seven

@@ -19,6 +19,7 @@ from skthermo._tables.times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
+from skthermo.exceptions import UnevaluatedRowsWarning
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -272,5 +273,6 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         warn_user(
             f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
             f"{self._cause(X, rows)}",
+            UnevaluatedRowsWarning,
             "rows not evaluated",
         )

@@ -40,6 +40,7 @@ from skthermo._validation import (
 )
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
@@ -403,11 +404,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
         outside = reach.warning(inputs)
         if outside:
-            warn_user(outside, "weather outside the training range")
+            warn_user(outside, WeatherWarning, "weather outside the training range")
         warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
         apart = self.sensors_.warning(temperatures)
         if apart:
-            warn_user(apart, "sensor apart from others")
+            warn_user(apart, RecordsWarning, "sensor apart from others")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -506,6 +507,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             f"rows have no stamps, and lags inside {type(last_step(self.estimator)).__name__} would take rows of other "
             "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
             "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
+            FewRecordsWarning,
             "lags without stamps",
         )
         return "contiguous"
@@ -517,7 +519,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     consequence = "the spread of residuals is widened by what that costs"
     message = told_fills(deviations, column_names(temperatures, "x"), consequence)
     if message:
-        warn_user(message, "filled temperatures")
+        warn_user(message, RecordsWarning, "filled temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -527,7 +529,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     others = "of which the estimator predicts nothing, as where lags reach to no record"
     message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
     if message:
-        warn_user(message, "rows that cannot be predicted")
+        warn_user(message, UnevaluatedRowsWarning, "rows that cannot be predicted")
     return unknown
 
 
@@ -540,5 +542,5 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     try:
         check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
     except ValueError as error:  # only a warning, as another column may be something else than a temperature
-        warn_user(str(error), "temperatures")
+        warn_user(str(error), RecordsWarning, "temperatures")
     return temperatures, frequencies

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import UnevaluatedRowsWarning
 
 _volumes: dict[int, tuple[ref, tuple[int, ...], Callable[[], Array]]] = {}
 """Arrays by the address of their numbers while they exist, their shapes, and the `log_volumes` of their rows."""
@@ -39,7 +40,9 @@ def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
     known = present.any(axis=1)
     if 2 * known.sum() < len(known):
         warn_user(
-            f"the score is of {known.sum()} of {len(known)} rows: the others have no value", "rows with a likelihood"
+            f"the score is of {known.sum()} of {len(known)} rows: the others have no value",
+            UnevaluatedRowsWarning,
+            "rows with a likelihood",
         )
     return float(densities[known].sum() / present.sum()) if known.any() else float("nan")
 

@@ -16,6 +16,7 @@ from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, modes_text
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
@@ -223,6 +224,7 @@ def _most_likely(F: Array, names: Sequence[str] | None) -> EmpiricalCovariance:
         warn_user(
             f"{modes_text(pair, names)} are never there together ({(~together).sum() // 2} pairs): their correlation "
             "is a guess",
+            FewRecordsWarning,
             "modes never together",
         )
     learned = Gaussian.of(F)

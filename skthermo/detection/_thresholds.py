@@ -8,6 +8,7 @@ import scipy  # which loads scipy.signal once it is used
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import FewRecordsWarning
 
 
 def quantile_threshold(index: Array, contamination: float) -> float:
@@ -67,6 +68,7 @@ def conformal_threshold(
             f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a rate of false alarms of "
             f"{contamination:.2g}: the threshold is the largest index, which later ones exceed at a rate of about "
             f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
+            FewRecordsWarning,
             "few records for a threshold",
         )
     elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
@@ -74,6 +76,7 @@ def conformal_threshold(
             f"the {len(ordered)} baseline {what} depend on each other in time and count as {n_independent:.0f} "
             f"independent ones: false alarms are {contamination:.2g} of the records on the mean over such baselines, "
             f"but may be far more or fewer after this one; expected {FEWEST_INDEPENDENT} independent ones or more",
+            FewRecordsWarning,
             "few records for a threshold",
         )
     return threshold
@@ -91,5 +94,6 @@ def warn_of_blindness(own: Array, threshold: float, contamination: float, seen_a
             "baseline's own indices exceed: the baseline has few records, records that depend on each other, or some "
             f"far from all others{seen_at(threshold)}; expected a longer baseline, or one without outliers "
             "(threshold='quantile' takes the lower one, with more false alarms)",
+            FewRecordsWarning,
             "few records for a sensitive threshold",
         )

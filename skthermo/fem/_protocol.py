@@ -23,11 +23,7 @@ class FEModel(Protocol):
 
     See Also
     --------
-    ModalModel : Gives mode shapes.
-    DifferentiableModel : Gives derivatives of its frequencies.
-    DamageableModel : Takes damage.
-    LocalModel : Gives everything about its modes at one theta.
-    BatchModel : States how many rows are best solved together.
+    ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel : What a model may offer beside.
 
     Notes
     -----
@@ -81,10 +77,8 @@ class ModalModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
+    parameter_names, n_modes
+        As of `FEModel`.
     """
 
     def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
@@ -109,10 +103,8 @@ class DifferentiableModel(FEModel, Protocol):
 
     Attributes
     ----------
-    parameter_names : tuple of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
+    parameter_names, n_modes
+        As of `FEModel`.
     """
 
     def jacobian(self, theta: ArrayLike) -> Array:
@@ -136,8 +128,8 @@ class DamageableModel(FEModel, Protocol):
 
     Attributes
     ----------
-    groups : mapping of str
-        The damage groups.
+    groups
+        As described below.
     """
 
     @property
@@ -145,17 +137,24 @@ class DamageableModel(FEModel, Protocol):
         """The damage groups by name."""
 
     def damaged(self, damage: Mapping[str, float]) -> DamageableModel:
-        """A new model with the stiffness of each group times (1 - severity).
+        """A new model with less stiffness (or more) in some groups and the same mass.
 
         Parameters
         ----------
         damage : mapping of str to float
-            Severity by damage group.
+            Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half, -0.15 a strengthening by
+            15 %. A term in several damaged groups is multiplied by all their factors.
 
         Returns
         -------
         FE model
-            Its columns are the modes of the undamaged model.
+            Its columns are the modes of this model's undamaged nominal state. A reduced model is checked anew, and its
+            basis grows if it must.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or a severity is 1 or more or not finite.
         """
 
 
@@ -164,10 +163,8 @@ class LocalModel(FEModel, Protocol):
 
     Attributes
     ----------
-    n_dof : int
-        Number of degrees of freedom.
-    track : bool
-        Whether a column follows its mode rather than its rank.
+    n_dof, track
+        As described below.
     """
 
     @property
@@ -200,12 +197,8 @@ class BatchModel(FEModel, Protocol):
 
     Attributes
     ----------
-    rows_per_chunk : int
-        How many rows are solved together.
-    prefer : str
-        Hint to joblib: "threads" or "processes".
-    thread_safe : bool
-        Whether several threads may ask it at the same time.
+    rows_per_chunk, prefer, thread_safe
+        As described below.
     """
 
     @property
@@ -234,8 +227,6 @@ class BatchModel(FEModel, Protocol):
 
         Parameters
         ----------
-        theta : ndarray of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
-        frequencies : ndarray of shape (n_samples, n_modes)
-            Solution in Hz.
+        theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
+            The table, and its solution in Hz.
         """

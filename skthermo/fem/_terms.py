@@ -2,8 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import scipy.sparse
@@ -34,6 +36,7 @@ class AffineTerms(ABC):
         self.exponents = exponents
         self.factors = np.ones(len(exponents)) if factors is None else factors
         self._used = [(t, p, exponents[t, p]) for t, p in np.argwhere(exponents)]
+        _freeze(self.exponents, self.factors)
 
     @property
     def is_constant(self) -> bool:
@@ -97,13 +100,18 @@ class AffineTerms(ABC):
     def quadratic_forms(self, shapes: Array) -> Array:
         """phi' A_t phi of every shape and term, (n_samples, n_modes, n_terms)."""
 
-    @abstractmethod
-    def scaled(self, factors: Array) -> "AffineTerms":
+    def scaled(self, factors: Array) -> Self:
         """The same matrices with their factors multiplied."""
+        return self._with(self.exponents, self.factors * factors)
 
-    @abstractmethod
-    def with_exponents(self, exponents: NDArray[np.int64]) -> "AffineTerms":
+    def with_exponents(self, exponents: NDArray[np.int64]) -> Self:
         """The same matrices, multiplied by other parameters."""
+        return self._with(exponents, self.factors)
+
+    def _with(self, exponents: NDArray[np.int64], factors: Array) -> Self:
+        twin = copy(self)
+        AffineTerms.__init__(twin, exponents, factors)
+        return twin
 
     @property
     @abstractmethod
@@ -127,7 +135,7 @@ class DenseTerms(AffineTerms):
         super().__init__(exponents, factors)
         self.matrices = matrices
         self.n_dof = matrices.shape[1]
-        _freeze(self.matrices, self.exponents, self.factors)
+        _freeze(self.matrices)
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
@@ -152,12 +160,6 @@ class DenseTerms(AffineTerms):
     def quadratic_forms(self, shapes: Array) -> Array:
         forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
         return np.stack(forms, axis=2)
-
-    def scaled(self, factors: Array) -> "DenseTerms":
-        return DenseTerms(self.matrices, self.exponents, self.factors * factors)
-
-    def with_exponents(self, exponents: NDArray[np.int64]) -> "DenseTerms":
-        return DenseTerms(self.matrices, exponents, self.factors)
 
     @property
     def each_matrix(self) -> list[Matrix]:
@@ -205,18 +207,12 @@ class SparseTerms(AffineTerms):
 
     max_rows = SPARSE_ROWS_PER_CHUNK
 
-    def __init__(
-        self,
-        entries: scipy.sparse.csc_array,
-        pattern: SparsityPattern,
-        exponents: NDArray[np.int64],
-        factors: Array | None = None,
-    ):
-        super().__init__(exponents, factors)
+    def __init__(self, entries: scipy.sparse.csc_array, pattern: SparsityPattern, exponents: NDArray[np.int64]):
+        super().__init__(exponents)
         self.entries = entries
         self.pattern = pattern
         self.n_dof = pattern.n_dof
-        _freeze(entries.data, entries.indices, entries.indptr, self.exponents, self.factors)
+        _freeze(entries.data, entries.indices, entries.indptr)
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
@@ -246,12 +242,6 @@ class SparseTerms(AffineTerms):
         columns = self.pattern.columns
         forms = [self.entries.T @ (shape[self.pattern.rows] * shape[columns]) for shape in shapes]
         return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
-
-    def scaled(self, factors: Array) -> "SparseTerms":
-        return SparseTerms(self.entries, self.pattern, self.exponents, self.factors * factors)
-
-    def with_exponents(self, exponents: NDArray[np.int64]) -> "SparseTerms":
-        return SparseTerms(self.entries, self.pattern, exponents, self.factors)
 
     @property
     def each_matrix(self) -> list[Matrix]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import ModelWarning
 
 ROWS_PER_CHUNK = 256  # largest number of samples solved together
 
@@ -24,6 +25,7 @@ def warn_of_failures(theta: Array, solved: Array) -> None:
         warn_user(
             f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
             f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
+            ModelWarning,
             "no solution",
         )
 

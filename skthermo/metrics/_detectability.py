@@ -13,6 +13,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import real_array
 from skthermo._tables.frames import check_same_rows
 from skthermo._tables.times import row_times, time_of
+from skthermo.exceptions import UnevaluatedRowsWarning
 
 
 def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> float:
@@ -215,6 +216,7 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
         warn_user(
             f"{len(index) - len(present)} of {len(index)} records are not evaluated, their damage index is NaN: the "
             f"rate is that of the other {len(present)}",
+            UnevaluatedRowsWarning,
             "records not evaluated",
         )
     return float((present > limit).mean()) if present.size else float("nan")

@@ -11,17 +11,18 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.warnings import without_warnings
+from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import DAY
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
+from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
-from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
 
 DECIMALS = 6  # of a damage index
@@ -30,6 +31,7 @@ MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
+PROBED = (5.0, 20.0, 80.0)  # standard deviations by which each response is lowered to see whether there is an alarm
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Branch:
         yield cls(steps[: places[0]] if places else [], compensator, last)
 
     def standard(self, records: pd.DataFrame, usual: tuple[Array, Array], targets: list[Any]) -> Array:
-        """Residuals of records in standard deviations, or frequencies where there is no compensator."""
+        """Residuals of records in standard deviations, or responses without a compensator; NaN for other targets."""
         if self.compensator is None:
             mean, deviation = usual
             return (as_floats(records[targets]) - mean) / deviation
@@ -62,11 +64,14 @@ class Branch:
         for step in self.before:
             table = step.transform(table)
         residuals = as_floats(self.compensator.transform(table))
-        if self.compensator.whiten is not None:
-            return residuals
-        overall = self.compensator.spread_.overall
-        deviation = np.sqrt(np.diag(overall.covariance))
-        return (residuals - overall.mean) / np.where(deviation > 0, deviation, 1.0)
+        if self.compensator.whiten is None:
+            overall = self.compensator.spread_.overall
+            deviation = np.sqrt(np.diag(overall.covariance))
+            residuals = (residuals - overall.mean) / np.where(deviation > 0, deviation, 1.0)
+        names = list(self.compensator.get_feature_names_out())
+        if not set(names) <= set(targets):  # a step before has made arrays of the records
+            return residuals[:, np.argsort(self.compensator.targets_)]
+        return pd.DataFrame(residuals, columns=names).reindex(columns=targets).to_numpy()
 
 
 def _steps(detector: Any) -> Iterator[Any]:
@@ -85,8 +90,9 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the frequencies; records go through ``plausible`` and ``corrections`` before. Without a direction, all changes are
-    damage. There is a promise for each kind of event.
+    the responses; records go through ``corrections`` before. Without a direction, all changes are damage. There is an
+    estimate of false alarms for each kind of event that has a damage index. After a new baseline, ``prior`` are records
+    from before the intervention, which was complete ``since`` then.
     """
 
     detector: Any
@@ -97,10 +103,11 @@ class ActiveDetector(SavesFrames):
     targets: list[Any]
     usual: tuple[Array, Array]
     weather: TrainingRange
-    plausible: Plausible
     corrections: Corrections
     direction: Direction | None
-    promises: dict[str, Promise]
+    estimates: dict[str, FalseAlarmEstimate]
+    prior: pd.DataFrame | None = None
+    since: pd.Timestamp | None = None
 
     @classmethod
     def of(
@@ -114,6 +121,7 @@ class ActiveDetector(SavesFrames):
         *,
         by_direction: bool,
         per_year: float,
+        persistence: int = 1,
     ) -> ActiveDetector:
         """Learned from what the detector was fitted on; ``by_direction`` tells softening from stiffening."""
         temperatures = [name for name in trained.columns if name not in targets]
@@ -122,27 +130,28 @@ class ActiveDetector(SavesFrames):
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind = None, {"damage": index}
+        direction, by_kind, release = None, {DAMAGE: index}, release_level(index, DAY, persistence)
         if by_direction:
             direction = Direction.of(detector, trained[columns], targets)
-            stiffer = direction.of_rows(trained[columns]) < 0
-            by_kind = {"damage": index.mask(stiffer & index.notna(), 0.0)}
-            by_kind["stiffening"] = index.mask(~stiffer & index.notna(), 0.0)
-        release = release_level(index, DAY)
-        promises = {kind: promised_rule(one, per_year, hold=DAY, release=release) for kind, one in by_kind.items()}
-        plausible = Plausible.of(trained, targets)
-        parts = (memory, columns, temperatures, targets, usual, weather, plausible, corrections, direction, promises)
+            is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
+            by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
+        estimates = {
+            kind: estimate_false_alarms(one, per_year, hold=DAY, persistence=persistence, release=release)
+            for kind, one in by_kind.items()
+        }
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, estimates)
         return cls(detector, trained, *parts)
 
     @property
     def rules(self) -> dict[str, EventRule]:
         """By which events of each kind open and close."""
-        return {kind: promise.rule for kind, promise in self.promises.items()}
+        set_aside = EventRule(threshold=0.5, release=0.5, hold=pd.Timedelta(0))
+        return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
 
     @property
     def threshold(self) -> float:
         """A damage event opens with an index above it."""
-        return self.promises["damage"].rule.threshold
+        return self.estimates[DAMAGE].rule.threshold
 
     @property
     def baseline_index(self) -> pd.Series:
@@ -163,16 +172,16 @@ class ActiveDetector(SavesFrames):
         It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
         """
         if self.direction is None:
-            return {"damage": index}
+            return {DAMAGE: index}
         with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.promises["damage"].rule.release)
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimates[DAMAGE].rule.release)
         stiffer = np.zeros(len(index), dtype=bool)
         if wanted.any():
             begin = self.memory.start(records.index.asi8, first)
             signs = self.direction.of_rows(records.iloc[begin:][self.columns], wanted[begin:])
             stiffer = signs[first - begin :] < 0
         softer = wanted[first:] & ~stiffer
-        return {"damage": np.where(stiffer, np.nan, index), "stiffening": np.where(softer, np.nan, index)}
+        return {DAMAGE: np.where(stiffer, np.nan, index), STIFFENING: np.where(softer, np.nan, index)}
 
     def index(self, records: pd.DataFrame, first: int) -> Array:
         """Damage index of the records from a position on, in order of time, rounded; those before are their memory.
@@ -194,9 +203,39 @@ class ActiveDetector(SavesFrames):
         """Damage index of one record by a call with just its memory."""
         return self._exact(records.iloc[self.memory.start(times, row) : row + 1])[-1]
 
-    def check_memory(self) -> None:
-        """Refuse a detector that looks at later records, or farther back than its memory: it would evaluate batches
-        differently from all records at once."""
+    def check(self) -> None:
+        """Refuse a detector that evaluates batches differently from all records at once, or large changes as none."""
+        self._check_memory()
+        self._check_monotone()
+
+    def _check_monotone(self) -> None:
+        """Refuse a detector by which a response that changes more is in alarm less; warn where no change is seen."""
+        times, blind = self.trained.index.asi8, []
+        row = (
+            int(self.trained[self.targets].notna().sum(axis=1).to_numpy()[len(times) // 2 :].argmax()) + len(times) // 2
+        )
+        part = self.trained.iloc[self.memory.start(times, row) : row + 1]
+        for target, deviation in zip(self.targets, self.usual[1], strict=True):
+            changed = (part.assign(**{target: part[target] - size * deviation}) for size in PROBED)
+            seen = np.array([self._exact(records)[-1] > self.threshold for records in changed])
+            if (seen[:-1] & ~seen[1:]).any():
+                lost = int(np.flatnonzero(seen[:-1] & ~seen[1:])[0])
+                raise ValueError(
+                    f"{target} that falls by {PROBED[lost]:g} standard deviations of the baseline is in alarm, and by "
+                    f"{PROBED[lost + 1]:g} it is not: a step of the detector drops or fills large changes; expected "
+                    "more alarm for more change: filter the baseline before fit"
+                )
+            blind += [] if seen[-1] else [str(target)]
+        if blind:
+            warn_user(
+                f"a fall by {PROBED[-1]:g} standard deviations of the baseline stays at or below the threshold "
+                f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
+                "another detector, or more false alarms a year",
+                ResultWarning,
+                "blind detector",
+            )
+
+    def _check_memory(self) -> None:
         baseline, times = self.trained, self.trained.index.asi8
         rows = np.linspace(len(times) // 2, min(len(times) // 2 + N_AROUND, len(times) - 1), N_CHECKED).astype(np.intp)
         start = max(self.memory.start(times, int(rows[0])) - N_AROUND, 0)

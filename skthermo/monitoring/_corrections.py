@@ -1,14 +1,19 @@
-"""What happens to records before they are evaluated: sensors that fail are left out, followed drift is taken out."""
+"""What happens to records before they are evaluated: what is no measurement is left out, drift is taken out."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from skthermo._tables.arrays import Array
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import SensorWatch
+from skthermo.preprocessing.checks import Plausible
 
 
 @dataclass(frozen=True)
@@ -20,51 +25,123 @@ class CorrectionState:
 
 
 @dataclass(frozen=True)
-class Corrections:
-    """The sensor watch and the drift follower, either of which may be None."""
+class Corrected:
+    """Records as the detector sees them, and what became of their values.
 
-    temperatures: list[Any]
-    modes: list[Any]
-    sensors: Any = None
-    drift: Any = None
+    ``is_held`` are records of which a response was set aside although the structure may have moved it: they are not
+    healthy. ``n_held`` counts those that were set aside for so long that it is an event, and ``held`` names them.
+    """
+
+    records: pd.DataFrame
+    is_held: NDArray[np.bool_]
+    n_held: Array
+    held: list[str]
+    notes: list[str]
+    n_left_out: NDArray[np.int64]
 
     @classmethod
-    def of(cls, baseline: pd.DataFrame, targets: list[Any], *, fem: Any = None, sensors: bool = True) -> Corrections:
-        """Learned from the baseline that the detector was fitted on; drift is followed where there is a chain."""
-        T, F = baseline.drop(columns=targets), baseline[targets]
-        watch = SensorWatch.of(T, F) if sensors else None
-        follower = None if fem is None else DriftFollower.of(fem, T, F)
-        return cls(list(T.columns), list(targets), watch, follower)
+    def joined(cls, parts: Sequence[Corrected]) -> Corrected:
+        """One after the other."""
+        return cls(
+            pd.concat([part.records for part in parts]),
+            np.concatenate([part.is_held for part in parts]),
+            np.concatenate([part.n_held for part in parts]),
+            [name for part in parts for name in part.held],
+            [note for part in parts for note in part.notes],
+            np.concatenate([part.n_left_out for part in parts]),
+        )
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Bounds of what can be measured, the sensor watch and the drift follower; the latter two may be None."""
+
+    temperatures: list[Any]
+    targets: list[Any]
+    reference: list[Any]
+    units: dict[Any, str]
+    plausible: Plausible
+    sensors: SensorWatch | None = None
+    drift: DriftFollower | None = None
+
+    @classmethod
+    def of(
+        cls,
+        baseline: pd.DataFrame,
+        targets: list[Any],
+        reference: list[Any],
+        units: Mapping[Any, str],
+        *,
+        fem: Any = None,
+        sensors: bool = True,
+    ) -> Corrections:
+        """Learned from a raw baseline; drift is followed where there is a chain."""
+        plausible = Plausible.of(baseline, targets)
+        cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
+        T, F = cleaned.drop(columns=targets), cleaned[targets]
+        watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None
+        follower = None if fem is None else DriftFollower.of(fem, T.drop(columns=reference), F)
+        return cls(list(T.columns), list(targets), list(reference), dict(units), plausible, watch, follower)
 
     def start(self) -> CorrectionState:
         """The states after the baseline."""
-        return CorrectionState(
-            None if self.sensors is None else self.sensors.start(), None if self.drift is None else self.drift.start()
-        )
+        return CorrectionState(*(None if one is None else one.start() for one in (self.sensors, self.drift)))
 
-    def advance(self, state: CorrectionState, day: pd.DataFrame) -> CorrectionState:
+    def cleaned(self, raw: pd.DataFrame) -> pd.DataFrame:
+        """Records without what no sensor measures."""
+        wrong = self.plausible.implausible(raw.to_numpy())
+        return raw.mask(wrong) if wrong.any() else raw
+
+    def advance(self, state: CorrectionState, raw: pd.DataFrame) -> CorrectionState:
         """The states after one more complete day, which may have no records."""
         if self.sensors is None and self.drift is None:
             return state
-        T, F = day[self.temperatures], day[self.modes]
+        day = self.cleaned(raw)
+        T, F = day[self.temperatures], day[self.targets]
         sensors, drift = state.sensors, state.drift
         if self.drift is not None:
-            masked = (T, F) if self.sensors is None else self.sensors.masked(sensors, T, F)
-            drift = self.drift.advance(drift, *masked)
+            T_seen, F_seen = self._masked(state, T, F)
+            drift = self.drift.advance(drift, T_seen, F_seen.where(F_seen > 0))
         if self.sensors is not None:
             sensors = self.sensors.advance(sensors, T, F)
         return CorrectionState(sensors, drift)
 
-    def corrected(self, state: CorrectionState, records: pd.DataFrame) -> pd.DataFrame:
-        """Records of one day as the detector sees them."""
-        if (self.sensors is None and self.drift is None) or not len(records):
-            return records
-        T, F = records[self.temperatures], records[self.modes]
-        if self.sensors is not None:
-            T, F = self.sensors.masked(state.sensors, T, F)
+    def _masked(self, state: CorrectionState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+        if self.sensors is None:
+            return T.drop(columns=self.reference), F
+        seen = self.sensors.masked(state.sensors, T, F)
+        return seen.T, seen.F
+
+    def corrected(self, state: CorrectionState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Corrected:
+        """Raw records of one day as the detector sees them.
+
+        ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a sensor.
+        """
+        wrong = self.plausible.implausible(raw.to_numpy())
+        day = raw.mask(wrong) if wrong.any() else raw
+        T, F = day[self.temperatures], day[self.targets]
+        held, n_held = np.zeros(F.shape, dtype=bool), np.zeros(len(raw))
+        notes, n_left_out = self._said_of(raw, wrong), wrong.sum(axis=1)
+        if self.sensors is None:
+            T = T.drop(columns=self.reference)
+        else:
+            seen = self.sensors.masked(state.sensors, T, F, acknowledged)
+            T, F, held, n_held, n_left_out = seen.T, seen.F, seen.held, seen.opens, n_left_out + seen.n_left_out
+            notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
         if self.drift is not None:
             F = self.drift.corrected(state.drift, F)
-        return pd.concat([T, F], axis=1)[list(records.columns)]
+        names = [", ".join(str(self.targets[k]) for k in np.flatnonzero(row)) if row.any() else "" for row in held]
+        records = pd.concat([T, F], axis=1)[[name for name in raw.columns if name not in self.reference]]
+        return Corrected(records, held.any(axis=1), n_held, names, notes, n_left_out)
+
+    def _said_of(self, raw: pd.DataFrame, wrong: NDArray[np.bool_]) -> list[str]:
+        """A phrase about each record that has values which no sensor measures."""
+        notes = [""] * len(raw)
+        for row in np.flatnonzero(wrong.any(axis=1)):
+            columns = [raw.columns[k] for k in np.flatnonzero(wrong[row])]
+            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
+            notes[row] = f"{', '.join(parts)}: taken as missing"
+        return notes
 
     def faults(self, state: CorrectionState) -> pd.DataFrame:
         """Sensors that have failed."""

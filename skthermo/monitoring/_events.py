@@ -11,7 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo.monitoring._promise import EventRule, EventState
+from skthermo.monitoring._false_alarms import EventRule, EventState
+
+DAMAGE, STIFFENING, MEASUREMENT = "damage", "stiffening", "measurement or structure"
+"""Kinds of events; the last one is that of responses set aside as implausible or stuck."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +41,18 @@ class EventLog:
         self,
         rules: dict[str, EventRule],
         by_kind: dict[str, Array],
+        modes: dict[str, Sequence[str]],
         times: NDArray[np.int64],
-        modes: Sequence[str] | None = None,
     ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
-        modes = [""] * len(times) if modes is None else modes
-        is_open, states = {}, dict(self.states)
+        is_open, levels, states = {}, {}, dict(self.states)
         for kind, index in by_kind.items():
-            is_open[kind], states[kind] = rules[kind].follow(states.get(kind, EventState()), index, times)
+            before = states.get(kind, EventState())
+            is_open[kind], levels[kind], states[kind] = rules[kind].follow(before, index, times)
         events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
-        for kind, index in by_kind.items():
+        for kind, level in levels.items():
             own = [n for n, event in enumerate(events) if event.kind == kind and event.end is None]
             begins = np.searchsorted(times, [events[n].start for n in own])
             for n, begin, end in zip(own, begins, [*begins, len(times)][1:], strict=True):
@@ -57,8 +60,14 @@ class EventLog:
                 numbers[kind][inside] = n + 1
                 closing = np.flatnonzero(~is_open[kind][begin:end])
                 end_time = int(times[begin + closing[0]]) if len(closing) else None
-                events[n] = _grown(events[n], index, times, modes, inside, end_time)
+                events[n] = _grown(events[n], level, times, modes[kind], inside, end_time)
         return numbers, EventLog(states, tuple(events))
+
+    def is_open_after(
+        self, rules: dict[str, EventRule], kind: str, index: Array, times: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Whether an event of a kind is open after each of some records."""
+        return rules[kind].follow(self.states.get(kind, EventState()), index, times)[0]
 
     def ended(self, end: int) -> EventLog:
         """The log in which open events ended at a time, or at their start if that is later."""
@@ -80,28 +89,32 @@ class EventLog:
 
 def _grown(
     event: Event,
-    index: Array,
+    level: Array,
     times: NDArray[np.int64],
     modes: Sequence[str],
     inside: NDArray[np.intp],
     end: int | None,
 ) -> Event:
     """The event with the records in which it was open."""
-    evaluated = inside[~np.isnan(index[inside])]
+    evaluated = inside[~np.isnan(level[inside])]
     if len(evaluated):
-        peak = evaluated[np.argmax(index[evaluated])]
-        if index[peak] > event.peak:
-            found = {"peak": float(index[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
+        peak = evaluated[np.argmax(level[evaluated])]
+        if level[peak] > event.peak:
+            found = {"peak": float(level[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
             event = replace(event, **found)
     return replace(event, end=end, n_alarms=event.n_alarms + len(evaluated))
 
 
 @dataclass(frozen=True)
 class Acknowledgement:
-    """What the owner says of an event, known by the time of its peak: late records may move its start and number."""
+    """What the owner says of an event, known by the time of its peak: late records may move its start and number.
+
+    ``time`` is that of the newest record then.
+    """
 
     kind: str
     peak_time: int
+    time: int
     harmless: bool
     note: str
 

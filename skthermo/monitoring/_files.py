@@ -20,6 +20,7 @@ from skthermo._estimators.arguments import check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import write_when_complete
 from skthermo._validation import import_optional
+from skthermo.exceptions import SkthermoWarning
 
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
@@ -40,7 +41,11 @@ def write_monitor(monitor: Any, path: str | os.PathLike[str]) -> None:
         raise ValueError(
             f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
         )
-    write_when_complete(file, _by_skops(monitor, file) if file.suffix == ".skops" else _by_joblib(monitor))
+    content = _by_skops(monitor, file) if file.suffix == ".skops" else _by_joblib(monitor)
+    try:
+        write_when_complete(file, content)
+    except OSError as error:
+        raise OSError(f"{file} was not written and is as it was before: {error}") from error
 
 
 def load_monitor(path: str | os.PathLike[str]) -> Any:
@@ -109,6 +114,7 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
         warn_user(
             f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}: its decisions "
             "may differ from those of the monitor that was fitted",
+            SkthermoWarning,
             "versions of a monitor",
         )
     return monitor

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any, Literal
@@ -28,19 +29,18 @@ from skthermo._validation import (
     seeded,
 )
 from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._course import Course, no_evaluations
-from skthermo.monitoring._events import Acknowledgement, event_table
+from skthermo.monitoring._events import DAMAGE, Acknowledgement, event_table
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._in_words import in_words
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import Promise
-from skthermo.monitoring._records import Intake, RecordStore, read_records
+from skthermo.monitoring._records import RecordStore, read_records
+from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
-from skthermo.preprocessing.checks import Plausible
 
-COUNTS = ("n_records", "n_repeated", "n_late", "n_too_late", "n_not_evaluated", "n_implausible")
 MOST_CAUSES = 3  # in a warning
 
 
@@ -54,19 +54,32 @@ class Monitor(SavesFrames, Estimator):
         ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
         frequencies only.
     targets : sequence of str, optional
-        Names of the frequency columns. By default those of the compensator, else those that ``fem`` was fitted on.
+        Names of the responses: natural frequencies, or any others of any sign and unit. By default those of the
+        compensator, else those that ``fem`` was fitted on; with a compensator, they have to be its own.
+    reference : sequence of str, optional
+        Names of columns with temperatures from elsewhere, such as a weather station or a reanalysis. They check the
+        thermometers and fill their gaps, and are no inputs of the detector.
     fem : DataInformedFEM, optional
         A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
     false_alarms_per_year : float, default=1.0
         Damage events that a healthy structure has in a year, on average.
+    persistence : int, default=3
+        Number of evaluated records in a row above the threshold by which an event opens: single outliers raise no
+        alarm, and damage is found by so many records later. 1 means that a single record does.
     direction : {"both", "softening"}, default="both"
         Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
+    max_jump : str or timedelta, optional
+        How far a stamp may be from the record before it. Beyond it, records are set aside until they are confirmed. By
+        default 28 days, twice the longest gap of the baseline, or ten usual steps, whichever is longest.
     retention : str or timedelta, default="400D"
         How long raw records are kept, for a new fit and to tell repeated records.
     sensors : bool, default=True
         Whether sensors are watched, and those that fail left out.
+    units : str or mapping of str to str, optional
+        Unit of the responses, or units by column, for messages and pages. By default "Hz" where there is a ``fem``, as
+        its responses are natural frequencies, else none; temperatures are in "°C".
     lookback : str or timedelta, optional
         How long before a record the detector looks. By default the lags and windows of its parts tell.
     random_state : int, RandomState or None, default=None
@@ -77,25 +90,27 @@ class Monitor(SavesFrames, Estimator):
     detector_ : detector or Pipeline
         Fitted clone.
     targets_ : list of str
-        Names of the frequency columns.
+        Names of the responses, in the order of the columns.
+    units_ : dict
+        Unit of each column, "" where it is not known.
     false_alarm_estimate_ : object
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
-    promises_ : tuple of (Timestamp, object)
-        The promises of all detectors that were in charge, and since when.
     threshold_ : float
-        A damage event opens with an index above it.
+        A damage event opens with an index above it, of ``persistence`` evaluated records in a row.
     clear_threshold_ : float
-        An event closes when the index has stayed at or below it.
+        An event closes when, for a day, no ``persistence`` records in a row have been above it.
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
-        A row for each event, counted from 1: ``kind`` ("damage" or "stiffening"), ``start``, ``end`` (first record
-        after it, NaT while it is open), ``peak`` (highest index), ``peak_time``, ``modes``, ``n_alarms`` (records
-        evaluated while it was open), ``acknowledged``, ``harmless`` and ``note``.
+        A row for each event, counted from 1: ``kind`` ("damage", "stiffening", or "measurement or structure": responses
+        that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it is open),
+        ``peak`` (highest index that ``persistence`` records in a row reached; of the last kind, the largest number of
+        responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open), ``acknowledged``,
+        ``harmless`` and ``note``.
     days_ : DataFrame
-        A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``index_median``, ``index_max``
-        and, where drift is followed, a column ``drift GROUP`` for each group.
+        A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
+        ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
     evaluations_ : DataFrame
         The latest evaluation of each record that is kept, as `update` gives it.
     faults_ : DataFrame
@@ -104,9 +119,9 @@ class Monitor(SavesFrames, Estimator):
         Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
         ``per_year_error``, ``significant``; None without ``fem``.
     counts_ : dict
-        ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (evaluated
-        all the same) and ``n_too_late`` (not evaluated); ``n_repeated``, and
-        ``n_implausible``: values that were taken as missing.
+        ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (evaluated all the
+        same), ``n_too_late`` and ``n_ahead`` (set aside at present), neither of them evaluated; ``n_repeated``; and
+        ``n_left_out``: values that came and were not used.
     baseline_, records_, corrected_ : DataFrame
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
@@ -131,9 +146,21 @@ class Monitor(SavesFrames, Estimator):
     The damage index is rounded to six decimals. Where the last bits, which depend on how many records are evaluated at
     once, would decide how, the index of the record alone with its memory counts.
 
-    A value that no sensor measures is taken as missing: a number that loggers write for a missing one (-999), a
-    frequency of zero or below, a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80
-    degrees Celsius, as in kelvin.
+    More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
+    25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not
+    evaluated, or in alarm if the others are. From the third such record on, an event of kind "measurement or structure"
+    is open. While it is, or while a response repeats one value, no record is healthy and no damage event closes, until
+    the response comes back or `acknowledge` says that its sensor is at fault. Smaller changes, and those of most
+    responses at once, are left to the detector; `fit` refuses one that drops large changes.
+
+    A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
+    a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in
+    kelvin. Whatever is left out has its reason in the row and counts in ``counts_``.
+
+    A logger's clock may be wrong. After a jump of more than ``max_jump``, records are taken in if they are of the
+    present by the clock of this computer, or if ten or more of them confirm each other and none is in the future.
+    Otherwise they are set aside, and never make true records late. Where earlier records are in the future already, as
+    in a simulation, only a year or more is a jump.
 
     Examples
     --------
@@ -156,10 +183,14 @@ class Monitor(SavesFrames, Estimator):
         "targets": ["array-like", None],
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
+        "persistence": [Interval(Integral, 1, None, closed="left")],
         "direction": [StrOptions({"both", "softening"})],
+        "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
+        "max_jump": [str, timedelta, np.timedelta64, None],
         "retention": [str, timedelta, np.timedelta64],
         "sensors": ["boolean"],
+        "units": [str, Mapping, None],
         "lookback": [str, timedelta, np.timedelta64, None],
         "random_state": ["random_state"],
     }
@@ -169,23 +200,31 @@ class Monitor(SavesFrames, Estimator):
         detector: Any,
         *,
         targets: Sequence[Hashable] | None = None,
+        reference: Sequence[Hashable] | None = None,
         fem: Any = None,
         false_alarms_per_year: float = 1.0,
+        persistence: int = 3,
         direction: Literal["both", "softening"] = "both",
         max_delay: str | timedelta = "7D",
+        max_jump: str | timedelta | None = None,
         retention: str | timedelta = "400D",
         sensors: bool = True,
+        units: str | Mapping[Hashable, str] | None = None,
         lookback: str | timedelta | None = None,
         random_state: int | np.random.RandomState | None = None,
     ):
         self.detector = detector
         self.targets = targets
+        self.reference = reference
         self.fem = fem
         self.false_alarms_per_year = false_alarms_per_year
+        self.persistence = persistence
         self.direction = direction
         self.max_delay = max_delay
+        self.max_jump = max_jump
         self.retention = retention
         self.sensors = sensors
+        self.units = units
         self.lookback = lookback
         self.random_state = random_state
 
@@ -199,7 +238,7 @@ class Monitor(SavesFrames, Estimator):
         Parameters
         ----------
         X : DataFrame of shape (n_samples, n_features)
-            Temperatures in degrees Celsius and frequencies in Hz of the healthy structure, side by side, on a
+            Temperatures in degrees Celsius and responses of the healthy structure, side by side, on a
             ``DatetimeIndex``.
         y : None
             Ignored.
@@ -212,15 +251,18 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the frequency columns are not
-            known; if the detector looks at later records, or farther back than its parts tell.
+            If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the responses are not known, or
+            not those of the compensator; if the detector looks at later records, farther back than its parts tell, or
+            drops large changes.
 
         Warns
         -----
         UserWarning
-            As the detector does; if values are no measurements and are taken as missing.
+            As the detector does; if values are no measurements and are taken as missing; if the detector does not see
+            even large changes of a response.
         """
         max_delay, retention = (_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
+        max_jump = None if self.max_jump is None else _duration(self.max_jump, "max_jump")
         if retention < max_delay + 2 * DAY:
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
@@ -240,35 +282,38 @@ class Monitor(SavesFrames, Estimator):
         seed_parts(detector, seeded(self.random_state))
         parts = [detector, *detector.get_params(deep=True).values()]
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
-        self.targets_ = self._frequency_columns(baseline, compensators)
-        columns = list(baseline.columns) if compensators else self.targets_
-        anything = Plausible.of_anything(baseline.shape[1])
-        n_markers, cleaned = int(anything.implausible(baseline.to_numpy()).sum()), anything.cleaned(baseline)[0]
+        reference = _among(self.reference or [], list(baseline.columns), "reference")
+        inputs = [name for name in baseline.columns if name not in reference]
+        self.targets_ = self._responses(inputs, compensators)
+        self.units_ = self._units(baseline.columns)
+        options = {"fem": self.fem, "sensors": self.sensors}
+        corrections = Corrections.of(baseline, self.targets_, reference, self.units_, **options)
+        trained = corrections.cleaned(baseline)
+        n_markers = int((trained.isna() & baseline.notna()).to_numpy().sum())
         if n_markers:
             warn_user(
-                f"{n_markers} of {cleaned.size} values of the baseline stand for missing ones, such as -999, and "
+                f"{n_markers} of {baseline.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
+                RecordsWarning,
                 "markers",
             )
-        corrections = Corrections.of(cleaned, self.targets_, fem=self.fem, sensors=self.sensors)
-        active = self._activated(detector.fit(cleaned[columns]), cleaned, columns, corrections)
-        active.check_memory()
-        self._store = RecordStore(baseline, baseline.iloc[:0], max_delay, retention)
-        self._active, self._course = active, Course.of(active, baseline)
-        self.promises_ = ((self.last_, self.false_alarm_estimate_),)
-        self.counts_ = dict.fromkeys(COUNTS, 0)
-        self._acknowledgements: tuple[Acknowledgement, ...] = ()
-        self.prior_, self.since_ = None, None
+        trained, columns = trained[inputs], inputs if compensators else self.targets_
+        active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
+        active.check()
+        store = RecordStore.of(baseline, max_delay, max_jump, retention)
+        self._active, self._state = active, MonitorState.of(active, store)
         self.versions_ = versions()
         return self
 
-    def update(self, new: pd.DataFrame) -> pd.DataFrame:
+    def update(self, new: pd.DataFrame, *, confirm: bool = False) -> pd.DataFrame:
         """Evaluate records that came since.
 
         Parameters
         ----------
         new : DataFrame of shape (n_samples, n_features)
             Raw records in the columns of `fit`, in any order: an hour, a day or a month, with gaps, late or repeated.
+        confirm : bool, default=False
+            Whether records that are stamped far ahead of the newest one, and those set aside before, are right.
 
         Returns
         -------
@@ -291,17 +336,11 @@ class Monitor(SavesFrames, Estimator):
             If new records are not evaluated: how many, and why.
         """
         check_is_fitted(self)
-        intake = self._store.sort_in(read_records(new, self.baseline_.columns, self.baseline_.index.tz))
-        store, course = self._store.with_records(intake.fresh), self._course
-        answers = no_evaluations(self.baseline_.index[:0]).assign(revised=False)
-        if len(intake.fresh):
-            course, answers = course.advanced(self._active, intake.fresh, store)
-        if len(intake.too_late):
-            refused = no_evaluations(intake.too_late.index, self.threshold_, self._why_too_late(intake.too_late))
-            answers = pd.concat([answers, refused.assign(revised=False)]).sort_index()
-        counts = self._counted(intake, course)
+        records = read_records(new, self.baseline_.columns, self.baseline_.index.tz)
+        intake = self._state.store.sort_in(records, check_flag(confirm, "confirm"))
+        state, answers = self._state.taken_in(self._active, intake)
         _warn_of_not_evaluated(answers)
-        self._store, self._course, self.counts_ = store.trimmed(), course, counts
+        self._state = state
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not evaluated"]:
@@ -313,9 +352,10 @@ class Monitor(SavesFrames, Estimator):
             "alarm" while a damage event is open, else "healthy" or "not evaluated", as the newest record was.
         """
         check_is_fitted(self)
-        if self._course.log.is_open("damage"):
+        if self._state.log.is_open(DAMAGE):
             return "alarm"
-        return self.evaluations_["state"].iloc[-1] if len(self.evaluations_) else "not evaluated"
+        evaluations = self._state.evaluations
+        return evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
 
     def years_watched(self, since: Any = None) -> float:
         """Time in which records were evaluated.
@@ -341,13 +381,16 @@ class Monitor(SavesFrames, Estimator):
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
-    def event_p_values(self, since: Any = None) -> pd.Series:
+    def event_p_values(self, since: Any = None, *, tail_shape: float | None = None) -> pd.Series:
         """How probable so high a peak is for a healthy structure, by event.
 
         Parameters
         ----------
         since : str or Timestamp, optional
             Only events that are open, or have ended since then; by default all.
+        tail_shape : float, optional
+            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges (`Fleet.discoveries`);
+            0 is an exponential tail. By default the baseline decides whether that is heavy enough.
 
         Returns
         -------
@@ -357,25 +400,26 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        A p value: for a healthy structure, that of its highest event is at most p with probability p or less, if
-        squared peaks have an exponential tail, as those of normal residuals have. Single outliers make heavier tails. A
-        detector that needs several records, such as ``WindowedAlarm("5D", rule="m-of-n")``, is not moved by them, and
-        where the baseline shows one, a heavier tail is taken. The chance comes from the highest excursions of the
-        baseline, by which the detector in charge when the event began was given its threshold; however few these are,
-        that they are few is allowed for.
+        For a healthy structure, the p value of its highest event is at most p with probability p or less, if squared
+        peaks over their scale in the season have an exponential tail, as those of normal residuals have. Single
+        outliers are no peaks where ``persistence`` is more than 1; where the baseline shows a heavier tail, that is
+        taken. The p value comes from the highest excursions of the baseline, by which the detector in charge when the
+        event began was given its threshold, and allows for their number, however small.
         """
         check_is_fitted(self)
-        events = self.events_[self.events_["kind"] == "damage"]
+        events = self.events_[self.events_["kind"] == DAMAGE]
         if since is not None:
             begin = pd.Timestamp(since)
             events = events[events["end"].isna() | (events["end"] >= begin)]
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
-        chances = [
-            [promise for taken, promise in self.promises_ if taken <= event["start"]][-1].chance(event["peak"], n_years)
+        p_values = [
+            [estimate for taken, estimate in self._state.estimates if taken <= event["start"]][-1].p_value(
+                event["peak"], n_years, tail_shape
+            )
             for _, event in events.iterrows()
         ]
-        return pd.Series(chances, events.index, dtype=float, name="chance")
+        return pd.Series(p_values, events.index, dtype=float, name="p_value")
 
     def acknowledge(self, event: int, *, harmless: bool, note: str = "") -> None:
         """Record what the owner has found out about an event.
@@ -385,7 +429,9 @@ class Monitor(SavesFrames, Estimator):
         event : int
             Its number in ``events_``.
         harmless : bool
-            Whether the structure is as before: records of a harmless event may train a new detector.
+            Whether the structure is as before: records of a harmless event may train a new detector. Of an event of
+            kind "measurement or structure", that sensors are at fault: from the next record on, the other responses
+            are evaluated without them.
         note : str, default=""
             What was found.
 
@@ -395,15 +441,14 @@ class Monitor(SavesFrames, Estimator):
             If there is no such event.
         """
         check_is_fitted(self)
-        events = self._course.log.events
+        events = self._state.log.events
         if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
             raise ValueError(f"note is {note!r:.100}; expected text")
-        said = Acknowledgement(
-            events[event - 1].kind, events[event - 1].peak_time, check_flag(harmless, "harmless"), note
-        )
-        self._acknowledgements = (*self._acknowledgements, said)
+        of, now = events[event - 1], self.last_.as_unit("ns").value
+        one = Acknowledgement(of.kind, of.peak_time, now, check_flag(harmless, "harmless"), note)
+        self._state = replace(self._state, acknowledgements=(*self._state.acknowledgements, one))
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
@@ -443,7 +488,7 @@ class Monitor(SavesFrames, Estimator):
         check_is_fitted(self)
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
-            records = self._active.plausible.cleaned(records)[0]
+            records = self._active.corrections.cleaned(records)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -503,27 +548,31 @@ class Monitor(SavesFrames, Estimator):
             Memory.of(detector) if self.lookback is None else Memory.of_time(_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
+            persistence=self.persistence,
         )
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, corrections, said = retraining.baseline, None, self._active.corrections, self._acknowledgements
+        trained, end, corrections, state = retraining.baseline, None, self._active.corrections, self._state
         if retraining.kind == "new baseline":
-            end = (self.last_ + pd.Timedelta("1s")).as_unit("ns").value
-            note = f"ended by the new baseline since {retraining.since}"
+            now = self.last_.as_unit("ns").value
+            end, note = now + 10**9, f"ended by the new baseline since {retraining.since}"
             known = self.events_["acknowledged"]
-            said += tuple(
-                Acknowledgement(one.kind, one.peak_time, True, note)
-                for one, is_known in zip(self._course.log.events, known, strict=True)
+            ended = tuple(
+                Acknowledgement(one.kind, one.peak_time, now, True, note)
+                for one, is_known in zip(state.log.events, known, strict=True)
                 if one.end is None and not is_known
             )
+            state = replace(state, acknowledgements=(*state.acknowledgements, *ended))
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
-            corrections = Corrections.of(trained, self.targets_, fem=fem, sensors=self.sensors)
+            raw = pd.concat([self.baseline_, self.records_]).reindex(trained.index)
+            whole = trained.join(raw[corrections.reference])[list(raw.columns)]
+            options = {"fem": fem, "sensors": self.sensors}
+            corrections = Corrections.of(whole, self.targets_, corrections.reference, self.units_, **options)
         active = self._activated(retraining.detector, trained, corrections=corrections)
-        self._course = self._course.handed_over(active, self._store, end)
-        self._active, self.promises_ = active, (*self.promises_, (self.last_, active.promises["damage"]))
-        self.prior_, self.since_, self._acknowledgements = retraining.prior, retraining.since, said
+        self._active = replace(active, prior=retraining.prior, since=retraining.since)
+        self._state = state.handed_over(self._active, end)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
@@ -565,7 +614,7 @@ class Monitor(SavesFrames, Estimator):
     @property
     def trained_(self) -> pd.DataFrame:
         """What the detector in charge was fitted on."""
-        return self._active.trained
+        return self._active.trained.copy()
 
     @property
     def lookback_(self) -> Memory:
@@ -573,9 +622,9 @@ class Monitor(SavesFrames, Estimator):
         return self._active.memory
 
     @property
-    def false_alarm_estimate_(self) -> Promise:
+    def false_alarm_estimate_(self) -> FalseAlarmEstimate:
         """How the threshold was set, and how many false events to expect."""
-        return self._active.promises["damage"]
+        return self._active.estimates[DAMAGE]
 
     @property
     def threshold_(self) -> float:
@@ -588,94 +637,103 @@ class Monitor(SavesFrames, Estimator):
         return self.false_alarm_estimate_.rule.release
 
     @property
+    def prior_(self) -> pd.DataFrame | None:
+        """Records from before the intervention after which the baseline began anew."""
+        return self._active.prior
+
+    @property
+    def since_(self) -> pd.Timestamp | None:
+        """When that intervention was complete."""
+        return self._active.since
+
+    @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
-        return self._store.baseline
+        return self._state.store.baseline.copy()
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
-        return self._store.kept
+        return self._state.store.kept.copy()
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
-        return self._course.corrected.loc[self.records_.index]
+        return self._state.corrected.loc[self._state.store.kept.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
-        return self._store.last
+        return self._state.store.last
 
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record that is kept."""
-        return self._course.evaluations
+        return self._state.evaluations.copy()
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
-        return self._course.days
+        return self._state.days.copy()
+
+    @property
+    def counts_(self) -> dict[str, int]:
+        """Numbers of records, and of values that were left out."""
+        return self._state.counts
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
-        return event_table(self._course.log.events, self._acknowledgements, self.baseline_.index.tz)
+        return event_table(self._state.log.events, self._state.acknowledgements, self.last_.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
-        return self._active.corrections.faults(self._course.corrections)
+        return self._active.corrections.faults(self._state.corrections)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        return self._active.corrections.drifts(self._course.corrections)
+        return self._active.corrections.drifts(self._state.corrections)
 
-    def _frequency_columns(self, baseline: pd.DataFrame, compensators: Sequence[TemperatureCompensator]) -> list[Any]:
-        """Names of the frequency columns: as given, those of the compensators, or those of the chain."""
-        columns = list(baseline.columns)
-        if self.targets is not None:
-            wanted = list(self.targets)
-        elif compensators:
-            places = [positions_of(one.targets, len(columns), np.array(columns, dtype=object)) for one in compensators]
-            return [columns[k] for k in sorted(set(np.concatenate(places).tolist()))]
-        elif self.fem is not None:
-            check_is_fitted(self.fem)
-            wanted = list(self.fem.mode_names_)
-        else:
+    def _responses(self, columns: list[Any], compensators: Sequence[TemperatureCompensator]) -> list[Any]:
+        """Names of the responses: as given, those of the compensators, or those of the chain."""
+        names = np.array(columns, dtype=object)
+        places = [positions_of(one.targets, len(columns), names) for one in compensators]
+        own = [columns[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
+        if self.targets is None and own is not None:
+            return own
+        if self.targets is None and self.fem is None:
             raise ValueError(
-                "the detector has no TemperatureCompensator whose targets tell which columns are frequencies, and "
-                "there is no fem; expected targets=[names of the frequency columns]"
+                "the detector has no TemperatureCompensator whose targets say which columns are responses, and there "
+                "is no fem; expected targets=[names of the responses]"
             )
-        unknown = [name for name in wanted if name not in columns]
-        if unknown or not wanted or len(set(wanted)) < len(wanted):
-            raise ValueError(f"targets are {wanted}; expected different names among the columns {columns}")
-        return wanted
+        if self.targets is None:
+            check_is_fitted(self.fem)
+        wanted = _among(self.fem.mode_names_ if self.targets is None else self.targets, columns, "targets")
+        if not wanted or (own is not None and set(wanted) != set(own)):
+            raise ValueError(
+                f"targets are {wanted}; expected {'some of the columns' if own is None else 'those of the compensator'}"
+                f" {columns if own is None else own}"
+            )
+        return [name for name in columns if name in wanted]
 
-    def _why_too_late(self, records: pd.DataFrame) -> list[str]:
-        end = self.baseline_.index[-1]
-        return [
-            f"before the end of the baseline ({end})"
-            if stamp <= end
-            else f"came too late, more than {self.max_delay} after newer records"
-            for stamp in records.index
-        ]
+    def _units(self, columns: pd.Index) -> dict[Any, str]:
+        """Unit of each column."""
+        of_targets = self.units if isinstance(self.units, str) else "" if self.fem is None else "Hz"
+        given = dict(self.units) if isinstance(self.units, Mapping) else {}
+        unknown = [name for name in given if name not in columns]
+        if unknown or not all(isinstance(unit, str) for unit in given.values()):
+            raise ValueError(f"units are {given}; expected a text for some of the columns {list(columns)}")
+        return {name: of_targets if name in self.targets_ else "°C" for name in columns} | given
 
-    def _counted(self, intake: Intake, course: Course) -> dict[str, int]:
-        """The counts after a batch."""
-        counts = self.counts_
-        n_too_late = counts["n_too_late"] + len(intake.too_late)
-        n_records, n_evaluated = course.days[["n_records", "n_evaluated"]].sum()
-        return {
-            "n_records": int(n_records) + n_too_late,
-            "n_repeated": counts["n_repeated"] + intake.n_repeated,
-            "n_late": counts["n_late"] + intake.n_late,
-            "n_too_late": n_too_late,
-            "n_not_evaluated": int(n_records - n_evaluated) + n_too_late,
-            "n_implausible": counts["n_implausible"]
-            + int(self._active.plausible.implausible(intake.fresh.to_numpy()).sum()),
-        }
+
+def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
+    """Different names of columns."""
+    wanted = [names] if isinstance(names, str) else list(names)
+    if any(name not in columns for name in wanted) or len(set(wanted)) < len(wanted):
+        raise ValueError(f"{what} is {wanted}; expected different names among the columns {columns}")
+    return wanted
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
@@ -689,6 +747,7 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
     warn_user(
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
+        UnevaluatedRowsWarning,
         "records not evaluated",
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,13 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import as_floats
 from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import duration_text
+from skthermo._tables.times import DAY_NS, YEAR
 from skthermo._validation import with_nan
+
+JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
+TIMES_LONGEST, TIMES_USUAL = 2, 10  # the same in longest and usual steps of the baseline, if those are longer
+CONFIRMED = 10  # records after a jump that confirm each other
 
 
 def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> pd.DataFrame:
@@ -57,55 +64,112 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
 
 @dataclass(frozen=True)
 class Intake:
-    """What a batch brings: records to evaluate, records that came too late, and how many were repeated or late."""
+    """What a batch brings: records to evaluate, those that came too late or are stamped too far ahead, and the store.
 
+    ``reasons`` say why those of ``too_late`` and ``ahead`` are not evaluated.
+    """
+
+    store: RecordStore
     fresh: pd.DataFrame
     too_late: pd.DataFrame
+    ahead: pd.DataFrame
+    reasons: list[str]
     n_repeated: int
     n_late: int
 
 
 @dataclass(frozen=True)
 class RecordStore(SavesFrames):
-    """Raw records of the baseline, and those that came since for the time of ``retention``."""
+    """Raw records of the baseline, those that came since for the time of ``retention``, and those set aside.
+
+    A record is set ``ahead`` if it is stamped more than ``max_jump`` after the one before it, until it is of the
+    present by the clock of this computer, or others confirm it.
+    """
 
     baseline: pd.DataFrame
     kept: pd.DataFrame
+    ahead: pd.DataFrame
     max_delay: pd.Timedelta
+    max_jump: pd.Timedelta
     retention: pd.Timedelta
+
+    @classmethod
+    def of(
+        cls, baseline: pd.DataFrame, max_delay: pd.Timedelta, max_jump: pd.Timedelta | None, retention: pd.Timedelta
+    ) -> RecordStore:
+        """With no record since the baseline; by default a jump is one that no outage of the baseline explains."""
+        steps = np.diff(baseline.index.asi8)
+        longest, usual = (pd.Timedelta(int(of(steps)) if len(steps) else 0, "ns") for of in (np.max, np.median))
+        if max_jump is None:
+            max_jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual)
+        nothing = baseline.iloc[:0]
+        return cls(baseline, nothing, nothing, max_delay, max_jump, retention)
 
     @property
     def last(self) -> pd.Timestamp:
         """Stamp of the newest record."""
         return (self.kept if len(self.kept) else self.baseline).index[-1]
 
-    def sort_in(self, batch: pd.DataFrame) -> Intake:
-        """Tell new records of a batch from those that are known; another value at a known stamp is an error."""
-        n_given = len(batch)
-        again = batch.index.duplicated()
+    def sort_in(self, batch: pd.DataFrame, are_confirmed: bool = False) -> Intake:
+        """Distinguish new records of a batch from known ones; another value at a known stamp is an error."""
+        n_given, again = len(batch), batch.index.duplicated()
         if again.any():
             self._check_same(batch[again], batch[~again])
             batch = batch[~again]
         known = np.zeros(len(batch), dtype=bool)
-        for table in (self.kept, self.baseline):
+        for table in (self.kept, self.baseline, self.ahead):
             known |= self._check_same(batch, table)
         batch = batch[~known]
         is_too_late = (batch.index <= self.baseline.index[-1]) | (batch.index < self.last - self.max_delay)
-        fresh = batch[~is_too_late]
+        too_late, timely = batch[is_too_late], batch[~is_too_late]
+        timely = pd.concat([timely, self.ahead]).sort_index() if len(self.ahead) else timely
+        n_taken = len(timely) if are_confirmed else self._n_in_time(timely.index)
+        fresh, ahead = timely.iloc[:n_taken], timely.iloc[n_taken:]
+        set_aside = ahead[ahead.index.isin(batch.index)]
+        reasons = [self._why_too_late(stamp) for stamp in too_late.index]
+        newest = max(self.last, fresh.index[-1]) if len(fresh) else self.last
+        reasons += [
+            f"stamped more than {duration_text(self.max_jump)} after the newest record ({newest}): set aside"
+        ] * len(set_aside)
         n_late = int((fresh.index < self.last).sum())
-        return Intake(fresh, batch[is_too_late], n_given - len(batch), n_late)
-
-    def with_records(self, fresh: pd.DataFrame) -> RecordStore:
-        """The store with new records."""
-        if not len(fresh):
-            return self
-        kept = pd.concat([self.kept, fresh]) if len(self.kept) else fresh
-        return replace(self, kept=kept if kept.index.is_monotonic_increasing else kept.sort_index())
+        store = replace(self._with_records(fresh), ahead=ahead)
+        return Intake(store, fresh, too_late, set_aside, reasons, n_given - len(batch), n_late)
 
     def trimmed(self) -> RecordStore:
         """The store without records that are too old to be kept."""
         first = self.kept.index.searchsorted(self.last - self.retention)
         return replace(self, kept=self.kept.iloc[first:]) if first else self
+
+    def _n_in_time(self, stamps: pd.DatetimeIndex) -> int:
+        """How many records, in order of time, are not too far ahead.
+
+        After a jump, those up to the next one are taken in if they reach the present, or if they are enough to confirm
+        each other and are not in the future: a logger may have been silent for months. Where earlier records were in
+        the future already, as in a simulation, the clock says nothing, and only a year or more is a jump.
+        """
+        times, last = stamps.asi8, self.last.as_unit("ns").value
+        now = pd.Timestamp.now("UTC").as_unit("ns").value + DAY_NS  # stamps without a time zone are local
+        is_live = last <= now
+        jump = self.max_jump.value if is_live else max(self.max_jump.value, YEAR.value)
+        before = np.maximum.accumulate(np.append(last, times[:-1]))
+        for start, stop in pairwise([*np.flatnonzero(times - before > jump), len(times)]):
+            newest = times[stop - 1]
+            is_present = is_live and now - jump <= newest <= now
+            if (is_live and newest > now) or (not is_present and stop - start < CONFIRMED):
+                return int(start)
+        return len(times)
+
+    def _with_records(self, fresh: pd.DataFrame) -> RecordStore:
+        if not len(fresh):
+            return self
+        kept = pd.concat([self.kept, fresh]) if len(self.kept) else fresh
+        return replace(self, kept=kept if kept.index.is_monotonic_increasing else kept.sort_index())
+
+    def _why_too_late(self, stamp: pd.Timestamp) -> str:
+        end = self.baseline.index[-1]
+        if stamp <= end:
+            return f"before the end of the baseline ({end})"
+        return f"came too late, more than {duration_text(self.max_delay)} after newer records"
 
     def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows of a batch stand in a table; an error if some have other values there."""

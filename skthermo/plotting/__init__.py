@@ -2,10 +2,8 @@
 
 from skthermo.plotting._damage_index import DamageIndexDisplay
 from skthermo.plotting._detectors import DetectorsDisplay
-from skthermo.plotting._fleet_prior import FleetPriorDisplay
 from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
 from skthermo.plotting._monitor import MonitorDisplay
-from skthermo.plotting._parameter_history import ParameterHistoryDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
@@ -13,12 +11,10 @@ from skthermo.plotting.structures import ModeShapesDisplay, StructureDisplay
 __all__ = [
     "DamageIndexDisplay",
     "DetectorsDisplay",
-    "FleetPriorDisplay",
     "IdentifiedDamageDisplay",
     "ModeShapesDisplay",
     "MonitorDisplay",
     "PODCurveDisplay",
-    "ParameterHistoryDisplay",
     "PredictionDisplay",
     "StructureDisplay",
 ]

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import date_axis, figure_legend, on_axis
 from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers, mark_unjudged
+from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
-from skthermo.plotting._tables import as_table, check_study, in_time, names_from
+from skthermo.plotting._tables import as_table, in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
-
-    from skthermo.studies import DetectabilityStudy
 
 
 @dataclass(eq=False, repr=False)
@@ -33,7 +31,7 @@ class DamageIndexDisplay(Display):
     Records without an index, which are not evaluated, are grey ticks at the bottom, with their number. A few indices
     far above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
-    It is best made by `from_estimator`, `from_predictions`, or `from_study` with a panel for each detector.
+    It is best made by `from_estimator` or `from_predictions`.
 
     Parameters
     ----------
@@ -48,12 +46,8 @@ class DamageIndexDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_scenarios,)
-        One panel for each scenario.
-    ax_ : Axes
-        The first of them.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     points_ : dict of str to list of Line2D
         Points of each panel, in the order of their labels.
     threshold_lines_ : list of Line2D
@@ -92,7 +86,7 @@ class DamageIndexDisplay(Display):
             A detector of this package, one of scikit-learn's with ``score_samples`` and ``offset_``, or a pipeline
             that ends with one.
         X : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such
-            What the detector judges, in Hz for frequencies; several tables by label.
+            What the detector evaluates, in Hz for frequencies; several tables by label.
         **options : dict
             ``onset`` and ``label`` of the display, and options of `plot`.
 
@@ -117,57 +111,11 @@ class DamageIndexDisplay(Display):
         return cls.from_predictions(indices, threshold, **{"label": name, **options})
 
     @classmethod
-    def from_study(
-        cls,
-        study: DetectabilityStudy,
-        scenarios: Sequence[str] | None = None,
-        *,
-        detectors: Sequence[str] | None = None,
-        source: str = "simulated",
-        **options: object,
-    ) -> DamageIndexDisplay:
-        """Draw the records of the first repeat of a study, one panel for each detector.
-
-        Parameters
-        ----------
-        study : DetectabilityStudy
-            With results.
-        scenarios : sequence of str, optional
-            Those that are drawn beside each other in each panel; by default all.
-        detectors : sequence of str, optional
-            Those that are drawn; by default all that did not fail.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        **options : dict
-            ``onset`` and ``label`` of the display, and options of `plot`.
-
-        Returns
-        -------
-        DamageIndexDisplay
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If a detector or scenario has no records of this source, or a detector no threshold.
-        """
-        check_study(study)
-        keys = [key for key in study.indices_ if key[2] == source]
-        chosen = names_from(detectors, dict.fromkeys(key[0] for key in keys), "detectors")
-        states = names_from(scenarios, dict.fromkeys(key[1] for key in keys), "scenarios")
-        shown = {
-            name: {state: study.indices_[name, state, source] for state in states if (name, state, source) in keys}
-            for name in chosen
-        }
-        thresholds = {name: study.thresholds_[name] for name in chosen}
-        is_distance = all(isinstance(last_step(study.detectors_[name]), MahalanobisDetector) for name in chosen)
-        options = {"label": DAMAGE_INDEX if is_distance else "damage index"} | options
-        return cls.from_predictions(shown, thresholds, **options)
-
-    @classmethod
     def from_predictions(
-        cls, index: Mapping[str, Any] | ArrayLike, threshold: float | Mapping[str, float], **options: object
+        cls,
+        index: Mapping[str, Mapping[str, ArrayLike] | ArrayLike] | ArrayLike,
+        threshold: float | Mapping[str, float],
+        **options: object,
     ) -> DamageIndexDisplay:
         """Draw damage indices.
 
@@ -202,8 +150,6 @@ class DamageIndexDisplay(Display):
         *,
         n_columns: int = 1,
         colours: Mapping[str, str] | None = None,
-        threshold_label: str = "threshold",
-        log: bool = False,
     ) -> DamageIndexDisplay:
         """Draw into axes.
 
@@ -215,10 +161,6 @@ class DamageIndexDisplay(Display):
             Panels beside each other in a new figure.
         colours : mapping of str to str, optional
             Colours by label; by default those of the palette in their order.
-        threshold_label : str, default="threshold"
-            Legend of the threshold.
-        log : bool, default=False
-            Whether the damage index is drawn on a logarithmic scale.
 
         Returns
         -------
@@ -238,9 +180,9 @@ class DamageIndexDisplay(Display):
         self.threshold_lines_: list[Line2D] = []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
             self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
-            unjudged = {label: unjudged_places(table) for label, table in self.scenarios[title].items()}
-            mark_unjudged(one, {shortened(label): x for label, x in unjudged.items()})
-            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": plain(threshold_label)}
+            drawn = {shortened(label): in_time(table) for label, table in self.scenarios[title].items()}
+            mark_not_evaluated(one, {label: x[np.isnan(values[:, 0])] for label, (x, values) in drawn.items()})
+            style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold"}
             self.threshold_lines_.append(one.axhline(self.thresholds[title], **style))
             if self.onset is not None:
                 first = next(iter(self.scenarios[title].values()))
@@ -248,11 +190,8 @@ class DamageIndexDisplay(Display):
                     on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
                 )
             one.set_title(shortened(title))
-            if log:
-                one.set_yscale("log")
-            else:
-                one.set_ylim(bottom=0)
-                hold_outliers(one, keep=(0.0, self.thresholds[title]))
+            one.set_ylim(bottom=0)
+            hold_outliers(one, keep=(0.0, self.thresholds[title]))
             if ax is not None or number % n_columns == 0:
                 one.set_ylabel(plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
         for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
@@ -280,12 +219,6 @@ def columns_of(by_label: Mapping[str, ArrayLike]) -> dict[str, pd.DataFrame]:
         if table.shape[1] != 1:
             raise ValueError(f"damage index {label!r} has {table.shape[1]} columns; expected one")
     return tables
-
-
-def unjudged_places(table: pd.DataFrame) -> NDArray:
-    """Places on the horizontal axis of the records that have no damage index."""
-    x, values = in_time(table)
-    return x[np.isnan(values[:, 0])]
 
 
 def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:

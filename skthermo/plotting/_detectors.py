@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
-from scipy.stats import spearmanr
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import percent, printable, share_text
 from skthermo.plotting._axes import LETTER, figure_legend
 from skthermo.plotting._display import Display
 from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, plain, shortened
-from skthermo.plotting._tables import check_study
+from skthermo.plotting._tables import check_study, names_from
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,21 +25,11 @@ if TYPE_CHECKING:
 
 SIMULATED, REFERENCE = "simulated", "reference"
 OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-OF_RANKING = [
-    *(
-        "false_alarms",
-        "false_alarms_ci_low",
-        "false_alarms_ci_high",
-        "within_limit",
-        "pod",
-        "pod_ci_low",
-        "pod_ci_high",
-    ),
-    *("pod_at_equal_pfa", "pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high", "significantly_worse"),
-]
-LEVEL, ONE_REPEAT = "best, or not clearly behind", "order not sure: one repeat"
-BEHIND, FAILED = "clearly behind", "failed"
-FEWEST = 3  # detectors from which on their ranks are compared
+BOUNDED = ["false_alarms", "pod", "pod_deficit"]  # columns of a ranking that have bounds
+OF_RANKING = [f"{name}{end}" for name in BOUNDED for end in ("", "_ci_low", "_ci_high")]
+OF_RANKING += ["within_limit", "pod_at_equal_pfa", "significantly_worse"]
+BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
+WORSE, FAILED = "significantly lower POD", "failed"
 
 ROW, MARGINS = 0.26, 1.5
 """Inches that a row takes, and all that is above and below the rows."""
@@ -55,8 +44,7 @@ RATES = ["low", "high", "value", "mark"]
 @dataclass(frozen=True, eq=False)
 class RatesPanel:
     """What one panel shows of each detector: ``rates``, indexed by detector, has the columns ``low``, ``high``,
-    ``value``, ``mark`` (in percent) and ``is_open``, whether the mark is not filled; ``notes`` are by detector. An axis
-    of small rates is even in their square root, one of shares goes to 100 %."""
+    ``value``, ``mark`` (in percent) and ``is_open``, whether the mark is not filled; ``notes`` are by detector."""
 
     title: str
     label: str
@@ -70,18 +58,18 @@ class RatesPanel:
 class DetectorsDisplay(Display):
     """Detectors beside each other, a row for each: their ranking, or measured rates beside simulated ones.
 
-    Of a ranking, three panels show false alarms with their limit; found damage, the mean over all damaged scenarios, at
-    the detector's own threshold and, as circles, with thresholds moved to equal false alarms; and how much less than
-    the best each one finds, with bounds for all comparisons together. Headings say which detectors are not clearly
-    behind the best, which are (grey), which raise clearly more false alarms than the limit (orange), and which failed.
+    Of a ranking, three panels show false alarms with their limit; the probability of detection (POD), the mean over all
+    damaged scenarios, at the detector's own threshold and, as circles, with thresholds moved to equal false alarms; and
+    by how much it is below that of the best. Headings say which detectors are not significantly worse than the best,
+    which have a significantly lower POD (grey), which exceed the limit of false alarms (orange), and which failed.
 
-    Of results with measured records, there is a panel for each scenario: false alarms of the healthy structure, and
-    found damage. A bar is the band in which the rate of one measured campaign should lie, the line in it the mean of
-    all simulated ones, a dot the measured rate; a reference of several repeats is a mean, too, and not compared with
-    the band. Detectors are in the order of the damage that they find in simulation.
+    Of results with measured records, there is a panel for each scenario. A bar is the prediction interval of the rate
+    of one measured campaign, the line in it the simulated mean, a dot the measured rate, open outside the interval. A
+    reference of several repeats is a mean and not compared with the interval. Detectors are in the order of their
+    simulated POD.
 
-    Failures, and shares of records that are not evaluated, which count neither as healthy nor as alarms, are told in
-    words. The axis of false alarms is even in their square root, so that small ones are told apart.
+    Failures, and shares of records that are not evaluated, are written beside the rates. The axis of false alarms has a
+    square-root scale.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -95,17 +83,11 @@ class DetectorsDisplay(Display):
         Colour of each detector's bounds.
     labels : sequence of str
         Legend of bounds, values, filled marks and open marks.
-    agreement : DataFrame, optional
-        By scenario, over the detectors that have both rates: their number ``n_detectors``, how many measured rates lie
-        in the band, ``n_inside``, of how many that have one, ``n_bands``, and Spearman's ``rank_correlation`` of the
-        measured rates with the simulated ones (NaN for less than three detectors).
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_panels,)
-        One for each panel.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     bars_ : dict of str to BarContainer
         Bounds or bands, by panel.
     values_ : dict of str to PathCollection
@@ -129,7 +111,7 @@ class DetectorsDisplay(Display):
     ...      "pod_deficit_ci_high": [0.0, 0.5], "significantly_worse": [False, True]}, index=["whitened", "raw"])
     >>> display = DetectorsDisplay.from_predictions(ranking)
     >>> [text.get_text() for text in display.axes_[0].get_yticklabels()]
-    ['best, or not clearly behind', 'whitened', 'clearly behind', 'raw']
+    ['not significantly worse', 'whitened', 'significantly lower POD', 'raw']
     >>> plt.close(display.figure_)
     """
 
@@ -138,7 +120,6 @@ class DetectorsDisplay(Display):
     _: KW_ONLY
     colours: Mapping[Hashable, str]
     labels: Sequence[str]
-    agreement: pd.DataFrame | None = None
 
     @classmethod
     def from_estimator(
@@ -162,7 +143,7 @@ class DetectorsDisplay(Display):
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms in a ranking.
         source : str, default="simulated"
-            Records of a ranking: "simulated" (simulated) or "reference".
+            Records of a ranking: "simulated" or "reference".
         by : {"pod", "pod_at_equal_pfa"}, default="pod"
             What a ranking compares: detectors as they are, or with thresholds moved to equal false alarms.
         **options : dict
@@ -204,7 +185,7 @@ class DetectorsDisplay(Display):
         ----------
         table : DataFrame
             What `~skthermo.studies.DetectabilityStudy.ranking` or `~skthermo.studies.DetectabilityStudy.run` returned,
-            or rows of several results, for example false alarms in one weather and found damage in another.
+            or rows of several results, for example false alarms in one weather and detected damage in another.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which a ranking was made.
         by : {"pod", "pod_at_equal_pfa"}, default="pod"
@@ -236,22 +217,20 @@ class DetectorsDisplay(Display):
             return cls(**of_ranking(table, max_false_alarms, by)).plot(**options)
         return cls(**of_results(table, scenarios, groups or {})).plot(**options)
 
-    def plot(self, ax: Axes | np.ndarray | None = None, *, n_columns: int | None = None) -> DetectorsDisplay:
+    def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
         """Draw into axes.
 
         Parameters
         ----------
         ax : matplotlib's Axes or array of Axes, optional
             One for each panel. A new figure by default.
-        n_columns : int, optional
-            Panels beside each other in a new figure; by default 3 of a ranking, and else 2.
 
         Returns
         -------
         DetectorsDisplay
             Itself.
         """
-        n_columns = min(n_columns or (3 if self.agreement is None else 2), len(self.panels))
+        n_columns = min(3 if "pod_deficit" in self.panels else 2, len(self.panels))
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
         size = 3.6 + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
         self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
@@ -277,7 +256,7 @@ class DetectorsDisplay(Display):
         ax.set_title(panel.title, fontsize="medium")
         ax.set_xlabel(panel.label)
         if panel.limit is not None:
-            ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of false alarms")
+            ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of the false-alarm rate")
         bounds, mean, filled, empty = self.labels
         self.bars_[name] = ax.barh(y, high - low, 0.62, low, color=colours, alpha=0.35, label=bounds)
         style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": mean}
@@ -307,12 +286,12 @@ class DetectorsDisplay(Display):
 
 def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
     """What a display of a ranking is made of."""
-    level = LEVEL if ranking["pod_deficit_ci_low"].notna().any() else ONE_REPEAT
+    level = BEST if ranking["pod_deficit_ci_low"].notna().any() else ONE_REPEAT
     loud = f"more than {percent(limit)} false alarms"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
-    kinds = ranking["significantly_worse"].astype(bool).map({True: BEHIND, False: level})
+    kinds = ranking["significantly_worse"].astype(bool).map({True: WORSE, False: level})
     kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, FAILED)
-    kinds = kinds.sort_values(key=lambda names: names.map([level, BEHIND, loud, FAILED].index), kind="stable")
+    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, FAILED].index), kind="stable")
     tested = ranking[is_tested]
 
     def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:
@@ -320,17 +299,17 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
         return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
 
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
-    unjudged = tested["not_evaluated"] if "not_evaluated" in tested else pd.Series(dtype=float)
-    notes = {name: f"{share_text(share)} not evaluated" for name, share in unjudged.items() if share > 0}
+    unknown = tested.get("not_evaluated", pd.Series(dtype=float))
+    notes = {name: f"{share_text(share)} not evaluated" for name, share in unknown.items() if share > 0}
     label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
-    false, found = "healthy records in alarm (%)", "damaged records in alarm (%)"
+    false, found = "healthy in alarm (%, square-root scale)", "damaged in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
-        "pod": RatesPanel("damage found", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
-        "pod_deficit": RatesPanel("less found than by the best", label, rates("pod_deficit"), axis="free"),
+        "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
+        "pod_deficit": RatesPanel("POD below that of the best", label, rates("pod_deficit"), axis="free"),
     }
-    colours = {name: {LEVEL: BLUE, ONE_REPEAT: BLUE, BEHIND: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
-    labels = ["bounds", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
+    colours = {name: {BEST: BLUE, ONE_REPEAT: BLUE, WORSE: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
+    labels = ["confidence interval", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
     places = places_of(list(ranking.index), kinds.to_dict())
     return {"panels": panels, "places": places, "colours": colours, "labels": labels}
 
@@ -341,95 +320,60 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
     errors = {row["detector"]: f"failed: {row.get('error', '')}" for _, row in results[failed].iterrows()}
     table = both_rates(results[~failed])
     measures = table.groupby("scenario", sort=False)["measure"].first()
-    known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index.tolist()
-    names = known if scenarios is None else [scenarios] if isinstance(scenarios, str) else list(scenarios)
-    if not names or not set(names) <= set(known):
-        raise ValueError(f"scenarios is {names}; expected some of {known}, which have simulated and measured rates")
+    known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index
+    names = names_from(scenarios, known, "scenarios")
     rows = table[table["scenario"].isin(names)]
     rows = rows[rows["measure"] == "POD"] if (rows["measure"] == "POD").any() else rows
     found = rows.groupby("detector", sort=False)["value"].mean().sort_values(ascending=False, kind="stable")
     order = list(dict.fromkeys([*found.index, *table["detector"], *errors]))
-    agreement = pd.DataFrame([_agreement(table[table["scenario"] == name]) for name in names])
-    agreement.index = pd.Index(names, name="scenario")
-    is_only = (measures[names] == "PFA").sum() == 1
     panels = {}
     for number, name in enumerate(names):
         rates = table[table["scenario"] == name].set_index("detector")
         lacking = [one for one in order if one not in rates.index and (number == 0 or one in set(table["detector"]))]
-        notes = {one: _unjudged(rates.loc[one]) for one in rates.index}
-        notes |= {one: errors.get(one, "no measured records") for one in lacking}
-        is_healthy = measures[name] == "PFA"
-        title = "false alarms" if is_healthy else "damage found"
-        title = title if is_healthy and is_only else f"{title}: {shortened(name)}"
+        notes = rates["note"].to_dict() | {one: errors.get(one, "no measured records") for one in lacking}
+        is_healthy, inside = measures[name] == "PFA", rates["inside"].dropna()
+        title = f"{'false alarms' if is_healthy else 'POD'}: {shortened(name)}"
+        title += f"\n{inside.sum():.0f} of {len(inside)} within the prediction interval" if len(inside) else ""
         rates = rates.assign(is_open=rates["inside"] == 0)
         rates[RATES] *= 100
-        title = f"{title}\n{_words(agreement.loc[name])}".rstrip()
-        panels[name] = RatesPanel(title, "records in alarm (%)", rates, notes, "small" if is_healthy else "shares")
-    labels = ["band of single simulated campaigns", "simulated, mean", "measured", "measured, not in the band"]
-    return {
-        "panels": panels,
-        "places": places_of(order, groups),
-        "colours": dict.fromkeys(order, ORANGE),
-        "labels": labels,
-        "agreement": agreement,
-    }
-
-
-def _agreement(rows: pd.DataFrame) -> dict[str, float]:
-    rows = rows.dropna(subset=["value", "mark"])
-    pairs, inside = rows[["value", "mark"]].to_numpy(), rows["inside"].dropna()
-    can_rank = len(rows) >= FEWEST and (np.ptp(pairs, axis=0) > 0).all()
-    correlation = float(spearmanr(*pairs.T)[0]) if can_rank else float("nan")
-    numbers = {"n_detectors": len(rows), "n_inside": int(inside.sum()), "n_bands": len(inside)}
-    return numbers | {"rank_correlation": correlation}
-
-
-def _words(row: pd.Series) -> str:
-    """How many measured rates lie in their bands, and how well the ranks agree."""
-    texts = [f"{row['n_inside']:.0f} of {row['n_bands']:.0f} in the band"] if row["n_bands"] else []
-    if np.isfinite(row["rank_correlation"]):
-        texts.append(f"rank correlation {row['rank_correlation']:.2f}")
-    return ", ".join(texts)
+        label = f"records in alarm (%{', square-root scale' if is_healthy else ''})"
+        panels[name] = RatesPanel(title, label, rates, notes, "small" if is_healthy else "shares")
+    labels = ["prediction interval of one campaign", "simulated mean", "measured", "measured, outside the interval"]
+    colours = dict.fromkeys(order, ORANGE)
+    return {"panels": panels, "places": places_of(order, groups), "colours": colours, "labels": labels}
 
 
 def both_rates(results: pd.DataFrame) -> pd.DataFrame:
     """Simulated rates with their bands (value, low, high) and measured ones (mark), of scenarios that have both."""
     keys = ["detector", "scenario"]
-    twice = results[results.duplicated([*keys, "source"], keep=False)]
-    if len(twice):
-        first = twice.iloc[0]
-        n_rows = int((twice[[*keys, "source"]] == first[[*keys, "source"]]).all(axis=1).sum())
+    counts = results.value_counts([*keys, "source"])
+    if counts.max() > 1:
+        (detector, scenario, source), n_rows = counts.index[0], counts.iloc[0]
         raise ValueError(
-            f"detector {first['detector']!r} has {n_rows} rows of scenario {first['scenario']!r}, source "
-            f"{first['source']!r}; expected one: of each study, keep the scenarios that are to be compared"
+            f"detector {detector!r} has {n_rows} rows of scenario {scenario!r}, source {source!r}; expected one: of "
+            "each study, keep the scenarios that are to be compared"
         )
-    share = np.nan
-    if {"n_records", "n_not_evaluated"} <= set(results.columns):
-        share = results["n_not_evaluated"] / (results["n_records"] + results["n_not_evaluated"])
-    results = results.assign(not_evaluated=share)
-    simulated, measured = (results[results["source"] == source] for source in (SIMULATED, REFERENCE))
-    both = set(simulated["scenario"]) & set(measured["scenario"])
-    if not both:
+    n_unknown = results.get("n_not_evaluated", pd.Series(0, results.index))
+    results = results.assign(unknown=n_unknown / (results.get("n_records", 0) + n_unknown))
+    simulated, measured = (results[results["source"] == source].set_index(keys) for source in (SIMULATED, REFERENCE))
+    table = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
+    measured = measured.rename(columns={"rate": "mark", "unknown": "unknown_measured", "n_repeats": "n_campaigns"})
+    scenarios = measured.index.get_level_values("scenario")
+    table = table[table.index.get_level_values("scenario").isin(scenarios)]
+    if not len(table):
         raise ValueError(
             f"no scenario of {results['scenario'].unique().tolist()} has both simulated and measured records; expected "
             "the results of a run with a reference"
         )
-    left = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
-    right = measured.set_index(keys)
-    is_single = right.get("n_repeats", pd.Series(1, right.index)) == 1
-    right = (
-        right[["rate", "not_evaluated"]].set_axis(["mark", "not_evaluated_measured"], axis=1).assign(single=is_single)
-    )
-    left = left.loc[left["scenario"].isin(both), [*keys, "measure", "value", "low", "high", "not_evaluated"]]
-    table = left.join(right, on=keys).reset_index(drop=True)
-    known = table[["low", "high", "mark"]].notna().all(axis=1) & (table.pop("single") == 1)
-    inside = table["mark"].between(table["low"], table["high"]).astype(float)
-    return table.assign(inside=inside.where(known))
+    table = table.join(measured.reindex(columns=["mark", "unknown_measured", "n_campaigns"])).reset_index()
+    can_compare = table[["low", "high", "mark"]].notna().all(axis=1) & (table["n_campaigns"].fillna(1) == 1)
+    inside = table["mark"].between(table["low"], table["high"]).astype(float).where(can_compare)
+    shares = table[["unknown_measured", "unknown"]].itertuples(index=False)
+    return table.assign(inside=inside, note=[_not_evaluated(*both) for both in shares])
 
 
-def _unjudged(row: pd.Series) -> str:
+def _not_evaluated(measured: float, simulated: float) -> str:
     """What share of the measured and of the simulated records is not evaluated; nothing if all are."""
-    measured, simulated = row["not_evaluated_measured"], row["not_evaluated"]
     if measured > 0:
         return f"{share_text(measured)} not evaluated{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
     return f"{share_text(simulated)} of simulated not evaluated" if simulated > 0 else ""
@@ -464,7 +408,7 @@ def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None
 
 
 def small_rates(ax: Axes, drawn: Array) -> None:
-    """An axis from 0 to the largest of some rates in percent, whose square root is even: small ones are told apart."""
+    """An axis from 0 to the largest of some rates in percent, on a square-root scale, which spreads small ones."""
     largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
     functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []

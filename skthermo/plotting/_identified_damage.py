@@ -1,4 +1,4 @@
-"""Identified damage: what explains the shifts, how probable that is, and how severe."""
+"""Identified damage: explanations of the shifts, how probable that is, and how severe."""
 
 from __future__ import annotations
 
@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 
     from skthermo.studies import IdentifiedDamage
 
-NEEDED = {
-    "told": {"probability"},
-    "table": {"probability", "severity", "ci_low", "ci_high"},
-    "shifts": {"measured", "explained", "standard_error"},
-}
 N_ERRORS = 2  # standard errors on either side of a measured shift
 LINE = 120  # number of letters of a line of the heading
 LABEL = 46  # number of letters of a line above a bar
@@ -47,10 +42,8 @@ class IdentifiedDamageDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (3,)
-        Explanations, severities, shifts.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     bars_ : BarContainer
         Probabilities of the explanations in percent; those beyond the fifth, and those that are not listed, share the
         last bar.
@@ -79,7 +72,7 @@ class IdentifiedDamageDisplay(Display):
     ...         ["f1", "f2"]))
     >>> display = IdentifiedDamageDisplay.from_predictions(identified)
     >>> [ax.get_title() for ax in display.axes_]
-    ['what explains the shifts', 'average severity', 'shift of frequencies']
+    ['explanations of the shifts', 'mean severity', 'shift of frequencies']
     >>> plt.close(display.figure_)
     """
 
@@ -103,16 +96,13 @@ class IdentifiedDamageDisplay(Display):
         Raises
         ------
         ValueError
-            If a frame or a column is missing.
+            If a frame is missing.
         """
-        for name, columns in NEEDED.items():
-            frame = getattr(identified, name, None)
-            missing = columns - set(getattr(frame, "columns", ()))
-            if frame is None or missing:
-                raise ValueError(
-                    f"identified is a {type(identified).__name__} whose {name!r} is missing or lacks "
-                    f"{sorted(missing)}; expected an IdentifiedDamage"
-                )
+        missing = [name for name in ("told", "table", "shifts") if not hasattr(identified, name)]
+        if missing:
+            raise ValueError(
+                f"identified is a {type(identified).__name__} without {missing}; expected an IdentifiedDamage"
+            )
         return cls(identified).plot(**options)
 
     def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:
@@ -153,7 +143,7 @@ class IdentifiedDamageDisplay(Display):
             ax.text(0.8, place - 0.22, plain(text), ha="left", va="bottom", fontsize="small")
             ax.text(probability + 1.5, place, chance_text(probability / 100), ha="left", va="center", fontsize="small")
         ax.set_yticks([])
-        ax.set(title="what explains the shifts", xlabel="probability (%)", xlim=(0, 118))
+        ax.set(title="explanations of the shifts", xlabel="probability (%)", xlim=(0, 118))
         ax.set_xticks(range(0, 101, 20))
         ax.set_ylim(max(len(shown), 3) - 0.5, -1.0)
         ax.spines[["top", "right"]].set_visible(False)
@@ -169,17 +159,17 @@ class IdentifiedDamageDisplay(Display):
             possible = np.where(is_known, 100 * table["highest_if_damaged"].to_numpy(dtype=float), np.nan)
             ax.barh(places, possible, height=0.5, color=LIGHT, alpha=0.5, label="if damaged, up to (95 %)")
         errors = np.clip([severity - lowest, highest - severity], 0, None)[:, is_known]
-        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "90 % band"}
+        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "credible interval, 90 %"}
         drawn = ax.errorbar(severity[is_known], places[is_known], xerr=errors, **style)
-        shades = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("probability", ["white", ORANGE])
-        points = {"cmap": shades, "vmin": 0, "vmax": 1, "edgecolors": ORANGE, "s": 50, "zorder": 3}
-        ax.scatter(severity[is_known], places[is_known], c=probability[is_known], **points)
+        shades = drawing("matplotlib.colors").to_rgba_array([(ORANGE, share) for share in probability[is_known]])
+        style = {"c": shades, "edgecolors": ORANGE, "s": 50, "zorder": 3}
+        ax.scatter(severity[is_known], places[is_known], **style)
         for place, known, share in zip(places, is_known, probability, strict=True):
             if not known:  # it may be anything
                 ax.axhline(place, color=GREY, linestyle=":", linewidth=1.2)
                 style = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"}
                 ax.text(
-                    0.5, place, "cannot be seen", transform=side, ha="center", va="center", fontsize="small", bbox=style
+                    0.5, place, "unobservable", transform=side, ha="center", va="center", fontsize="small", bbox=style
                 )
             else:
                 ax.text(1.02, place, chance_text(share), transform=side, ha="left", va="center", fontsize="small")
@@ -188,7 +178,7 @@ class IdentifiedDamageDisplay(Display):
         ax.set_yticks(places, [shortened(name) for name in table.index])
         is_damage = "kind" not in table or table["kind"].eq("damage").all()
         label = "loss of stiffness (%)" if is_damage else "loss of stiffness, or change (%)"
-        ax.set(title="average severity", xlabel=label, ylim=(len(table) - 0.5, -0.5))
+        ax.set(title="mean severity", xlabel=label, ylim=(len(table) - 0.5, -0.5))
         right = max(ax.get_xlim()[1], 1.0)
         ax.set_xlim(min(ax.get_xlim()[0], -0.03 * right), right)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False, fontsize="small")
@@ -210,14 +200,8 @@ class IdentifiedDamageDisplay(Display):
         style = {"linestyle": "", "marker": "D", "color": ORANGE, "label": "explained"}
         self.explained_ = ax.plot(places + 0.1, shifts["explained"].to_numpy(), **style)[0]
         ax.axhline(0, color=BLACK, linewidth=0.8)
-        ax.set_xticks(places, [label_of(name) for name in shifts.index])
-        if max(len(str(name)) for name in shifts.index) > SHORT_NAME:
-            lean(ax)
+        is_long = max(len(str(name)) for name in shifts.index) > SHORT_NAME
+        leaning = {"rotation": 45, "ha": "right", "rotation_mode": "anchor"} if is_long else {}
+        ax.set_xticks(places, [label_of(name) for name in shifts.index], **leaning)
         ax.set(title="shift of frequencies", ylabel="shift (%)", xlim=(-0.5, len(shifts) - 0.5))
         ax.legend(frameon=False, fontsize="small")
-
-
-def lean(ax: Axes) -> None:
-    """Turn the labels of the horizontal axis so that long ones end below their ticks."""
-    for label in ax.get_xticklabels():
-        label.set(rotation=45, ha="right", rotation_mode="anchor")

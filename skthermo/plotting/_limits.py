@@ -83,7 +83,7 @@ def _mark_edge(
     _write(ax, text, gid=f"{BEYOND} {direction}", **place)
 
 
-def mark_unjudged(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
+def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
     """Grey ticks at the bottom where records of each label are not evaluated, and a text that counts them."""
     texts = []
     for label, x in places.items():

@@ -12,7 +12,7 @@ import pandas as pd
 from skthermo._tables.arrays import Array
 from skthermo.plotting._axes import date_axis, figure_legend
 from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers, mark_unjudged
+from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
 from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, line_style, marker_style, shortened
 from skthermo.plotting._tables import in_time, with_breaks
 
@@ -34,7 +34,7 @@ DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
     "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
-    "event said to be harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
+    "event marked as harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
 }
 
 
@@ -50,7 +50,7 @@ class MonitorDisplay(Display):
     Parameters
     ----------
     index : DataFrame
-        On a ``DatetimeIndex``, a row for each record or day: ``index`` (NaN where none was judged), ``is_alarm``,
+        On a ``DatetimeIndex``, a row for each record or day: ``index`` (NaN where none was evaluated), ``is_alarm``,
         ``threshold`` (an event begins above it) and, of days, ``median``.
     events : DataFrame
         ``kind``, ``start``, ``end`` (NaT while it is open) and ``harmless``.
@@ -65,12 +65,8 @@ class MonitorDisplay(Display):
 
     Attributes
     ----------
-    axes_ : ndarray of Axes of shape (n_parts,)
-        A panel for each part.
-    ax_ : Axes
-        The first of them.
-    figure_ : Figure
-        Their figure.
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
     points_ : list of Line2D
         Records or days that are not in alarm, and those in alarm.
     threshold_line_ : Line2D or None
@@ -122,7 +118,7 @@ class MonitorDisplay(Display):
         Parameters
         ----------
         monitor : Monitor
-            A `~skthermo.monitoring.Monitor` that has judged records.
+            A `~skthermo.monitoring.Monitor` that has evaluated records.
         start, end : time, optional
             First and last time that are drawn; by default all days in service.
         by : {"day", "record"}, default="day"
@@ -205,7 +201,7 @@ class MonitorDisplay(Display):
 
     def _draw_index(self, ax: Axes) -> None:
         for _, event in self.events.iterrows():
-            label = "event said to be harmless" if event["harmless"] else f"{event['kind']} event"
+            label = "event marked as harmless" if event["harmless"] else f"{event['kind']} event"
             span = self._span(event["start"], event["end"])
             style = SHADES.get(label, SHADES["damage event"])
             self.event_spans_.append(ax.axvspan(*span, linewidth=1, label=label, **style))
@@ -220,7 +216,7 @@ class MonitorDisplay(Display):
             style = marker_style(number, len(x)) | {"marker": "o" if colour == BLUE else "^", "color": colour}
             if rows.any() or colour == BLUE:
                 self.points_ += ax.plot(x[rows], index[rows], **style, label=label)
-        mark_unjudged(ax, {"": x[np.isnan(index)]}, "day" if is_daily else "")
+        mark_not_evaluated(ax, {"": x[np.isnan(index)]}, "day" if is_daily else "")
         threshold = self.index["threshold"].to_numpy()
         style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold of an alarm"}
         if (threshold == threshold[0]).all():
@@ -291,16 +287,16 @@ def _by_day(days: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns).astype({"index": float, "median": float})
 
 
-def _by_record(judged: pd.DataFrame) -> pd.DataFrame:
-    return pd.DataFrame({"index": judged["index"], "is_alarm": judged["state"] == "alarm"})
+def _by_record(evaluated: pd.DataFrame) -> pd.DataFrame:
+    return pd.DataFrame({"index": evaluated["index"], "is_alarm": evaluated["state"] == "alarm"})
 
 
 def _thresholds(monitor: Monitor, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:
     """Threshold at the end of records or days of this length; before what is kept, the earliest known."""
-    judged = getattr(monitor, "evaluations_", None)
-    if judged is None or not len(judged):
+    evaluated = getattr(monitor, "evaluations_", None)
+    if evaluated is None or not len(evaluated):
         return np.full(len(times), float(monitor.threshold_))
-    known, stamps = judged["threshold"].to_numpy(dtype=float), judged.index.as_unit("ns").asi8
+    known, stamps = evaluated["threshold"].to_numpy(dtype=float), evaluated.index.as_unit("ns").asi8
     places = np.searchsorted(stamps, (times.as_unit("ns") + length).asi8) - 1
     return known[np.clip(places, 0, None)]
 

@@ -41,7 +41,7 @@ class PODCurveDisplay(Display):
 
     Attributes
     ----------
-    ax_, axes_, figure_ : matplotlib's Axes, array that holds them, and Figure
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
         Where it is drawn.
     line_ : Line2D
         The curve.
@@ -150,17 +150,15 @@ class PODCurveDisplay(Display):
             raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
         return cls._drawn(curve, **options)
 
-    def plot(self, ax: Axes | None = None, *, colour: str | None = None, marks: bool = True) -> PODCurveDisplay:
+    def plot(self, ax: Axes | None = None, *, marks: bool = True) -> PODCurveDisplay:
         """Draw into axes.
 
         Parameters
         ----------
         ax : matplotlib's Axes, optional
             Those of another curve, for example. A new figure by default.
-        colour : str, optional
-            Colour of the curve; by default the next one of the palette.
         marks : bool, default=True
-            Whether the severities that are found with a probability of 90 %, and so with a confidence of 95 %, are
+            Whether the severities that are detected with a probability of 90 %, and so with a confidence of 95 %, are
             marked.
 
         Returns
@@ -170,7 +168,7 @@ class PODCurveDisplay(Display):
         """
         self._take_axes(ax, ["one display"], (6.5, 4.2))
         number = sum(line.get_gid() == "POD" for line in self.ax_.lines)
-        colour = colour or COLOURS[number % len(COLOURS)]
+        colour = COLOURS[number % len(COLOURS)]
         marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
         severities = np.asarray(self.curve.severities, dtype=float)
         self._draw_shares(severities, colour, marker)
@@ -179,19 +177,21 @@ class PODCurveDisplay(Display):
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
         self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
-        self.replicates_ = self._draw_worlds(drawn, colour)
+        self.replicates_ = self._draw_campaigns(drawn, colour)
         self.marks_ = self._draw_marks(colour) if marks else {}
         self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
         self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
         return self
 
-    def _draw_worlds(self, drawn: Array, colour: str) -> PolyCollection | None:
+    def _draw_campaigns(self, drawn: Array, colour: str) -> PolyCollection | None:
         """The band of a measured campaign; None for a curve without one."""
         if not getattr(self.curve, "replicates", ()):
             return None
         low, high = (100 * np.asarray(values) for values in self.curve.band(drawn))
         style = {"facecolor": colour, "edgecolor": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8}
-        return self.ax_.fill_between(100 * drawn, low, high, label="measured campaign", zorder=0, **style)
+        return self.ax_.fill_between(
+            100 * drawn, low, high, label="prediction interval of one campaign", zorder=0, **style
+        )
 
     def _draw_shares(self, severities: Array, colour: str, marker: str) -> None:
         n_detected, n_records, severities = np.broadcast_arrays(

@@ -10,14 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import by_mode, is_model
 from skthermo._tables.arrays import as_floats, real_array
-from skthermo._tables.frames import check_columns, frame_like, warn_of_markers
-from skthermo._validation import (
-    HasMethods,
-    StrOptions,
-    _fit_context,
-    check_array,
-    check_is_fitted,
-)
+from skthermo._tables.frames import Table, check_columns, frame_like, warn_of_markers
+from skthermo._validation import HasMethods, StrOptions, check_array, check_is_fitted
 from skthermo.preprocessing._records import RecordTransformer
 
 
@@ -67,46 +61,18 @@ class BiasAligner(RecordTransformer):
         self.reference = reference
         self.method = method
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> BiasAligner:
-        """Compute the means of measured frequencies.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Measured frequencies in Hz; NaN is ignored.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        BiasAligner
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            If a mode is NaN in every row, the reference has another number of modes, or, with
-            ``method="scale"``, a mean or a reference is zero.
-
-        Warns
-        -----
-        UserWarning
-            If there are numbers that stand for a missing value, such as -999.
-        """
-        F = self._validated(X, reset=True)
-        check_columns(frame_like(X, F), "frequency")
-        warn_of_markers(frame_like(X, F))
-        self.mean_ = np.nanmean(F, axis=0)
-        self.reference_ = self._read_reference(F.shape[1])
+    def _learn(self, X: Table, values: NDArray) -> None:
+        check_columns(frame_like(X, values), "frequency")
+        warn_of_markers(frame_like(X, values))
+        self.mean_ = np.nanmean(values, axis=0)
+        self.reference_ = self._read_reference(values.shape[1])
         if self.method == "scale":
-            for what, values in (("mean", self.mean_), ("reference", self.reference_)):
-                if (values == 0).any():
-                    name = self.get_feature_names_out()[values == 0][0]
+            for what, factors in (("mean", self.mean_), ("reference", self.reference_)):
+                if (factors == 0).any():
+                    name = self.get_feature_names_out()[factors == 0][0]
                     raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
-        return self
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         if self.method == "scale":
             return frame_like(X, values / self.mean_ * self.reference_)
         return frame_like(X, values - self.mean_ + self.reference_)

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
+from skthermo._tables.frames import Table
 from skthermo._tables.text import duration_text
-from skthermo._validation import _fit_context, check_is_fitted
+from skthermo._validation import check_is_fitted
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
@@ -32,8 +34,8 @@ class ExponentialMeans(PastFeatures):
     Parameters
     ----------
     time_constants : sequence of str, timedelta or int, default=("30D",)
-        Time constants, such as ``("12h", "30D")``: the weight of a record falls by a factor of e in this time. Integers
-        count rows, for arrays and frames without a DatetimeIndex.
+        Time constants, such as ``("12h", "30D")``: the weight of a record falls by a factor of e in this time. At most
+        ten years. Integers count rows, for arrays and frames without a DatetimeIndex.
     sensors : sequence of str or int, optional
         Sensors that get means, by name or position; by default all.
 
@@ -107,37 +109,15 @@ class ExponentialMeans(PastFeatures):
         self.time_constants = time_constants
         self.sensors = sensors
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> ExponentialMeans:
-        """Read the time constants and, on a DatetimeIndex, store the records.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius; NaN is allowed.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        ExponentialMeans
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            If time constants are not different positive durations of fixed length, at most ten years, or numbers of
-            rows where X has no DatetimeIndex; if sensors are unknown or repeated; if a stamp is missing or occurs
-            twice.
-        """
-        values = self._validated(X, reset=True)
+    def _learn(self, X: Table, values: NDArray) -> None:
         stamps = self._remember(X, values)
         self.time_constants_ = _read_time_constants(self.time_constants, stamps is not None)
         self.sensors_ = self._read_sensors(values.shape[1])
         self.first_row_ = values[0 if stamps is None else stamps.argmin()].copy()
-        return self
 
-    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(
+        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
+    ) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
             own, records = np.arange(len(values)), values
             times = own
@@ -188,14 +168,14 @@ class ExponentialMeans(PastFeatures):
             raise ValueError(f"sensors is {self.sensors!r}; expected different ones of the columns {columns}")
         return np.array([columns.index(one) for one in known], dtype=np.intp)
 
-    def _names(self, sensors: Sequence[Any]) -> list[Any]:
+    def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         if not len(sensors):
             return []
         chosen = [sensors[position] for position in self.sensors_]
         return [*sensors, *(f"{one}_mean{_as_label(constant)}" for constant in self.time_constants for one in chosen)]
 
     def _warn_of_no_past(
-        self, X: Any, values: NDArray, own: NDArray[np.int64], times: NDArray[np.int64]
+        self, X: Table, values: NDArray, own: NDArray[np.int64], times: NDArray[np.int64]
     ) -> NDArray[np.bool_] | np.bool_:
         """Warn if more than half of the rows have no record a time constant back, unless the first is that of `fit`;
         which rows these are."""
@@ -210,6 +190,7 @@ class ExponentialMeans(PastFeatures):
             f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before: their means are of the few "
             f"records since {X.index.min() if is_timed else 'the first row'}; give those of {REACH} times {reach} "
             "before, too",
+            FewRecordsWarning,
             "no records for means",
         )
         return lacking

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
-from skthermo._tables.frames import check_positions_are_names, frame_like, positions_of
+from skthermo._tables.frames import Table, check_positions_are_names, frame_like, positions_of
 from skthermo._tables.times import has_stamps, row_times
-from skthermo._validation import Interval, _fit_context, validate_data
+from skthermo._validation import Interval
 from skthermo.preprocessing._records import RecordTransformer
 from skthermo.preprocessing._stamps import as_duration
 from skthermo.preprocessing._weather_regression import WeatherRegression
@@ -101,29 +100,7 @@ class HampelFilter(RecordTransformer):
         self.n_deviations = n_deviations
         self.targets = targets
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> HampelFilter:
-        """Learn how far values scatter and, with ``targets``, what the weather explains.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            Records of the healthy structure; NaN is ignored.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        HampelFilter
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            If a target is not among the columns or is named twice, or the targets are all of them or none; if the
-            window is a duration without a ``DatetimeIndex``, or has no unit.
-        """
-        values = self._validated(X, reset=True)
+    def _learn(self, X: Table, values: NDArray) -> None:
         self.targets_, self.regression_ = np.arange(values.shape[1]), None
         if self.targets is not None:
             check_positions_are_names(self.targets, getattr(X, "columns", ()))
@@ -135,9 +112,8 @@ class HampelFilter(RecordTransformer):
         distances, local = self._distances(X, values)
         self.deviations_[self.targets_] = np.nan_to_num(robust_deviation(distances))
         self.n_removed_[self.targets_] = self._far(distances, local).sum(axis=0)
-        return self
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         cleaned = values.copy()
         far = np.zeros(values.shape, dtype=bool)
         far[:, self.targets_] = self._far(*self._distances(X, values))
@@ -145,11 +121,9 @@ class HampelFilter(RecordTransformer):
         return frame_like(X, cleaned)
 
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
-        n_least = 2 if reset and self.targets is not None else 1
-        options = {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan", "ensure_min_features": n_least}
-        return validate_data(self, X, reset=reset, **options)
+        return super()._validated(X, reset=reset, ensure_min_features=2 if reset and self.targets is not None else 1)
 
-    def _distances(self, X: Any, values: NDArray) -> tuple[Array, Array]:
+    def _distances(self, X: Table, values: NDArray) -> tuple[Array, Array]:
         """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""
         rest = as_floats(values)[:, self.targets_]
         if self.regression_ is not None:
@@ -161,7 +135,7 @@ class HampelFilter(RecordTransformer):
         with np.errstate(invalid="ignore"):
             return np.abs(distances) > self.n_deviations * np.fmax(local, self.deviations_[self.targets_])
 
-    def _rows_or_duration(self, X: Any) -> int | pd.Timedelta:
+    def _rows_or_duration(self, X: Table) -> int | pd.Timedelta:
         if isinstance(self.window, Integral) and not isinstance(self.window, np.timedelta64):
             return int(self.window)
         if not has_stamps(X):

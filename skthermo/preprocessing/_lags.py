@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
+from skthermo._tables.frames import Table
 from skthermo._tables.text import duration_text
-from skthermo._validation import (
-    Interval,
-    StrOptions,
-    _fit_context,
-)
+from skthermo._validation import Interval, StrOptions
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._records import PastFeatures
 from skthermo.preprocessing._stamps import as_duration
 
@@ -34,7 +32,8 @@ class LagFeatures(PastFeatures):
     ----------
     lags : int or sequence of int, default=24
         Number of columns for each sensor, the current value included: 24 gives the values at
-        t, t-1, ..., t-23. Or an explicit list of lags, such as ``[0, 1, 24]``.
+        t, t-1, ..., t-23. Or an explicit list of lags, such as ``[0, 1, 24]``. At most 10,000 or as many as there are
+        rows, and at most 100 years back.
     freq : str or timedelta, optional
         Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most
         frequent time between consecutive records of `fit`.
@@ -121,31 +120,7 @@ class LagFeatures(PastFeatures):
         self.tolerance = tolerance
         self.padding = padding
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> LagFeatures:
-        """Read the lags and, on a DatetimeIndex, store the records.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        LagFeatures
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            If the lags are not different non-negative integers; if they are more than 10,000 and more than the
-            rows, or reach back more than 100 years; if ``freq`` or ``tolerance`` is given without a DatetimeIndex, is
-            not positive or has no fixed length, as a month; if a stamp is missing or occurs twice; if the index holds
-            durations, or stamps as text.
-        """
-        values = self._validated(X, reset=True)
+    def _learn(self, X: Table, values: NDArray) -> None:
         self.lags_ = _read_lags(self.lags, len(values))
         self.freq_ = self.tolerance_ = None
         stamps = self._remember(X, values)
@@ -166,9 +141,10 @@ class LagFeatures(PastFeatures):
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
-        return self
 
-    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(
+        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
+    ) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
             return self._by_row(values, self.lags_), self._warn_of_padding(values)
         return self._by_time(stamps, values)
@@ -179,7 +155,7 @@ class LagFeatures(PastFeatures):
         longest = max(self.lags_)
         return longest * self.freq_ + self.tolerance_ if longest and self.freq_ is not None else longest
 
-    def _names(self, sensors: Sequence[Any]) -> list[str]:
+    def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
 
     def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:
@@ -192,6 +168,7 @@ class LagFeatures(PastFeatures):
             warn_user(
                 f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
                 f"{reach} rows before, too, or a frame on a DatetimeIndex",
+                FewRecordsWarning,
                 "padded lags",
             )
         return is_told & (np.arange(n_rows) < reach)
@@ -205,6 +182,7 @@ class LagFeatures(PastFeatures):
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
+                FewRecordsWarning,
                 "no records for lags",
             )
         return is_told & unknown

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from skthermo._tables.arrays import as_floats, means_of_known
-from skthermo._tables.frames import frame_like
-from skthermo._validation import _fit_context
+from skthermo._tables.frames import Table, frame_like
 from skthermo.preprocessing._records import RecordTransformer
 
 EVERYWHERE = "ambient"
@@ -71,42 +69,21 @@ class SensorMeans(RecordTransformer):
     def __init__(self, roles: Mapping[Hashable, str | None] | None = None):
         self.roles = roles
 
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: None = None) -> SensorMeans:
-        """Learn by how much sensors differ from the mean of their role.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            Temperatures in degrees Celsius; NaN is ignored.
-        y : None
-            Ignored.
-
-        Returns
-        -------
-        SensorMeans
-            The fitted transformer.
-
-        Raises
-        ------
-        ValueError
-            If ``roles`` does not name each column of X, and no other, or gives no column a role.
-        """
-        values = as_floats(self._validated(X, reset=True))
+    def _learn(self, X: Table, values: NDArray) -> None:
+        values = as_floats(values)
         role_of = self._read_roles()
         roles = sorted({role for role in role_of if role is not None})
         self.columns_ = {role: [i for i, own in enumerate(role_of) if own == role] for role in roles}
         self.offsets_ = np.full(values.shape[1], np.nan)
         for columns in self.columns_.values():
             self.offsets_[columns] = offsets_between(values[:, columns])
-        return self
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         level = as_floats(values) - self.offsets_
         means = [means_of_known(level[:, columns], axis=1) for columns in self.columns_.values()]
         return frame_like(X, np.column_stack(means), self.columns_)
 
-    def _names(self, columns: Sequence[Any]) -> list[Any]:
+    def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         return list(self.columns_)
 
     def _read_roles(self) -> list[str | None]:

@@ -1,4 +1,4 @@
-"""Sections of a report on the answer, and on what would be found and what not."""
+"""Sections of a report on the answer, and on what would be detected and what not."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -10,12 +10,12 @@ from skthermo._tables.text import bounds_text, counted, duration_text, percent, 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
-from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding
+from skthermo.reporting._findings import COLUMNS, LEVEL, REFERENCE, SIMULATED, Finding
 from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, joined, paragraphs, section, table
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage
 
-MOST_LISTED = 12  # largest number of scenarios that are listed or drawn
-RELIABLE = 0.95  # share of the cases in which damage is found within the time that is told
+MOST_NAMED = 12  # largest number of scenarios that are named or drawn in a section
+RELIABLE = 0.95  # share of the cases in which damage is detected within the reported time
 State: TypeAlias = Scenario | ProgressiveDamage | UncertainDamage
 WITHIN = {"1D": "a day", "7D": "a week", "30D": "30 days"}
 
@@ -27,31 +27,22 @@ def answer(study: DetectabilityStudy, findings: Sequence[Finding], identified: S
     words = paragraphs(
         "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
         "learned from measurements how temperature moves this structure, simulated it in the same weather without "
-        f"damage and with damage. {_judged(study)}"
+        f"damage and with damage. {_share_evaluated(study)}"
     )
     meaning = paragraphs(
         "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
-        "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as found reliably if at "
-        f"least {share_text(LEVEL)} of the records of the damaged structure raise an alarm. Bounds of rates hold with "
-        f"{confidence} confidence; they cover the scatter of the measurements, but neither weather of another kind nor "
-        f"errors of the model. {_expected(study)}"
+        "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as detected reliably if "
+        f"at least {share_text(LEVEL)} of the records of the damaged structure raise an alarm. Bounds of rates hold "
+        f"with {confidence} confidence; they cover the scatter of the measurements, but neither weather of another "
+        f"kind nor errors of the model. {_expected(study)}"
     )
     parts = [words]
     if identified:
         parts += [element("h3", "The structure as it is now"), bullets(identified)]
-    parts += [element("h3", "How soon damage is found"), how_soon(study)]
+    parts += [element("h3", "Time to detection"), how_soon(study)]
     parts += [element("h3", "False alarms"), _false_alarms(rows)]
-    if findings:
-        items = (element("span", element("strong", f"{one.family}:"), f" {one.sentence()}") for one in findings)
-        parts += [element("h3", "Smallest damage that is found reliably, by shares of records"), bullets(items)]
-    unclear = _unclear_families(rows, findings)
-    if unclear:
-        text = "of damage and strengthening together, or of one severity twice, no smallest damage can be given"
-        parts.append(paragraphs(f"{', '.join(unclear)}: {text}."))
-    elif not findings:
-        text = "No damage group was tested on its own, so that there is no smallest damage to report."
-        parts.append(paragraphs(text))
-    parts += [element("h3", "What would not be found"), _missed(rows), element("h3", "What the words mean"), meaning]
+    parts += [element("h3", "Smallest change that is detected reliably"), _smallest(rows, findings)]
+    parts += [element("h3", "What would not be detected"), _missed(rows), element("h3", "What the words mean"), meaning]
     return section("answer", "The answer", *parts)
 
 
@@ -59,20 +50,19 @@ def how_soon(study: DetectabilityStudy) -> Html:
     """Sentences on the smallest damage of each family, and a table of all scenarios."""
     waits = study.time_to_detection(level=RELIABLE)
     is_healthy = dict(zip(study.results_["scenario"], study.results_["measure"] == "PFA", strict=True))
-    told = study.time_to_detection(level=RELIABLE, smallest=True)
+    smallest = study.time_to_detection(level=RELIABLE, smallest=True)
+    smallest = smallest.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable")
     items = [
-        element("span", element("strong", f"{row['scenario']}:"), f" {row['text']}.")
-        for _, row in told.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable").iterrows()
+        element("span", element("strong", f"{row['scenario']}:"), f" {row['text']}.") for _, row in smallest.iterrows()
     ]
     times = [name for name in waits if f"{name} healthy" in waits and waits[name].notna().any()]
     meaning = (
-        "Damage may begin on any day of the simulated weather, and is found with the first alarm after that. An alarm "
-        "may also be a false one: the chance that the structure without damage raises one in the same time stands "
-        "beside. The longer the time, the more of both there are."
+        "Damage may begin on any day of the simulated weather, and is detected with the first alarm after that. The "
+        "chance of a false alarm of the healthy structure within the same time grows, too."
     )
     delayed = float(waits["not_evaluated"].max())
     if delayed:
-        meaning += f" In {share_text(delayed)} of the time no record can be judged, which delays what is found."
+        meaning += f" In {share_text(delayed)} of the time no record can be evaluated, which delays detection."
     labels = (WITHIN.get(name, f"{name} records" if name.isdigit() else name) for name in times)
     columns = ["Scenario", *(f"Alarm within {label}" for label in labels), "In half of the cases", "In 95 of 100"]
     cells = [
@@ -107,23 +97,31 @@ def _expected(study: DetectabilityStudy) -> str:
     )
 
 
-def _unclear_families(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[str]:
-    """Families with several scenarios that do not say which severity is the smallest that is found."""
+def _smallest(rows: pd.DataFrame, findings: Sequence[Finding]) -> Html:
+    """A row for each family with severities, also for those that have no smallest one."""
     tested = rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
-    found = {finding.family for finding in findings}
-    return [name for family in tested["family"].unique() if (name := str(family)) not in found]
+    if not len(tested):
+        return paragraphs("No damage group was tested on its own, so that there is no smallest damage to report.")
+    cells = {found.family: found.cells() for found in findings}
+    unclear = ["not defined", "", "", "", "damage and strengthening together, or one severity twice"]
+    families = (str(family) for family in tested["family"].unique())
+    caption = (
+        "Smallest tested severity from which on damage is detected reliably, with the bounds that follow from those of "
+        "the rates. On a curve through the tested severities, a90 is detected in 90 % of the records, and a90/95 so "
+        "with 95 % confidence."
+    )
+    return table(caption, COLUMNS, [cells.get(family, [family, *unclear]) for family in families])
 
 
-def _judged(study: DetectabilityStudy) -> str:
-    """How many simulated records the alarm system judged."""
-    unjudged = {name: index.isna() for (_, name, source), index in study.indices_.items() if source == SIMULATED}
-    number, total = (int(sum(count)) for count in zip(*((u.sum(), len(u)) for u in unjudged.values()), strict=True))
+def _share_evaluated(study: DetectabilityStudy) -> str:
+    """How many simulated records the alarm system evaluated."""
+    unknown = {name: index.isna() for (_, name, source), index in study.indices_.items() if source == SIMULATED}
+    number, total = (int(sum(count)) for count in zip(*((u.sum(), len(u)) for u in unknown.values()), strict=True))
     if not number:
-        return "The alarm system judged every simulated record."
+        return "The alarm system evaluated every simulated record."
     return (
-        f"The alarm system could not judge {number:,} of {counted(total, 'record')} of the first simulation, because "
-        "they lack what it needs (see the warnings under Settings). These count neither as healthy nor as alarms: "
-        "nothing is known of them."
+        f"The alarm system could not evaluate {number:,} of {counted(total, 'record')} of the first simulation, as "
+        "they lack what it needs (see the warnings under Settings). They count neither as healthy nor as alarms."
     )
 
 
@@ -139,28 +137,26 @@ def found_and_missed(study: DetectabilityStudy, findings: Sequence[Finding]) -> 
     introduction += _beginning(study)
     if (results["source"] == REFERENCE).any():
         introduction += " Rows called reference are of records that were given to compare the simulations with."
-    distance = "The index is the Mahalanobis distance, not squared."
-    judge = last_step(study.detectors_[study.detector_name()])
+    is_distance = isinstance(last_step(study.detectors_[study.detector_name()]), MahalanobisDetector)
+    distance = " The index is the Mahalanobis distance, not squared." if is_distance else ""
     parts = [
         paragraphs(introduction),
         _alarms(study, scenarios),
         figure(
             "Share of records in alarm over the severity of the damage: tested severities with 95 % bounds, and a "
-            "curve through them with its bounds. The label a90 marks the severity at which 90 % of the records raise "
-            "an alarm, a90/95 the one at which this is so with 95 % confidence.",
+            "curve through them with its bounds. The axes are linear.",
             [draw_curve(found, found.curve) for found in findings if found.curve is not None],
             "How the share of alarms grows with damage",
         ),
         figure(
             "Damage index of every record: how far its frequencies are from those of the healthy structure, compared "
             "with the usual scatter. Above the threshold there is an alarm. Healthy records should be below it, "
-            "records of the damaged structure above."
-            + (f" {distance}" if isinstance(judge, MahalanobisDetector) else ""),
+            f"records of the damaged structure above.{distance}",
             _damage_indices(study, findings, scenarios),
             "What the alarm system sees",
         ),
     ]
-    return section("found", "What would be found and what not", *parts, link="What would be found")
+    return section("found", "What would be detected and what not", *parts, link="What would be detected")
 
 
 def _alarms(study: DetectabilityStudy, scenarios: Mapping[str, State]) -> Html:
@@ -168,7 +164,7 @@ def _alarms(study: DetectabilityStudy, scenarios: Mapping[str, State]) -> Html:
     has_bands = study.uncertainty_ is not None
     columns = ["Scenario", "What is changed", "Records in alarm", "Bounds"]
     columns += ["In one measured campaign"] if has_bands else []
-    columns += ["Records judged", "Mean time to the first alarm"]
+    columns += ["Records evaluated", "Mean time to the first alarm"]
     cells = [
         [
             row["scenario"] + (" (reference)" if row["source"] == REFERENCE else ""),
@@ -248,13 +244,12 @@ def _missed(rows: pd.DataFrame) -> Html:
     if not len(damaged):
         return paragraphs("No damage was tested.")
     if not len(missed):
-        return paragraphs("All damage that was tested is found reliably. Less damage than that was not tested.")
-    items = [f"{row['scenario']}: alarms in {share_text(row['rate'])} of the records" for _, row in missed.iterrows()]
-    intro = (
-        f"Of {counted(len(damaged), 'damaged state')} that were tested, {len(missed):,} would not be found reliably:"
+        return paragraphs("All damage that was tested is detected reliably. Less was not tested.")
+    names = [f"{row['scenario']} ({share_text(row['rate'])})" for _, row in missed.head(MOST_NAMED).iterrows()]
+    return paragraphs(
+        f"Of {counted(len(damaged), 'damaged state')}, {len(missed):,} would not be detected reliably. Shares of "
+        f"records in alarm: {', '.join(names)}{', ...' if len(missed) > MOST_NAMED else ''}."
     )
-    rest = f"and {len(missed) - MOST_LISTED} more, which are in the table further below"
-    return joined([paragraphs(intro), bullets(items if len(items) <= MOST_LISTED else [*items[:MOST_LISTED], rest])])
 
 
 def _damage_indices(
@@ -272,7 +267,7 @@ def _damage_indices(
         shown += rows.loc[(rows["family"] == found.family) & (rows["severity"] == severity), "scenario"].tolist()
     shown += rows.loc[(rows["measure"] == "POD") & rows["family"].isna(), "scenario"].tolist()
     drawn = []
-    for name in shown[:MOST_LISTED]:
+    for name in shown[:MOST_NAMED]:
         indices = {scenario: study.indices_[detector, scenario, SIMULATED] for scenario in (*healthy, name)}
         onset = scenarios[name].onset if name in scenarios else None
         drawn.append(draw_damage_indices(study, indices, onset))

@@ -10,7 +10,7 @@ import pandas as pd
 
 from skthermo._tables.text import bounds_text, counted, percent, share_text
 from skthermo.reporting._findings import SIMULATED
-from skthermo.reporting._html import Section, bar, bullets, paragraphs, section, table
+from skthermo.reporting._html import Section, bar, bullets, section, table
 from skthermo.studies import DetectabilityStudy
 
 
@@ -32,7 +32,7 @@ class Choice:
 
     @property
     def best(self) -> pd.Series:
-        """First row of the ranking."""
+        """The recommended detector, or the one with the fewest false alarms."""
         return self.ranking.iloc[0]
 
     def only(self) -> DetectabilityStudy:
@@ -46,9 +46,7 @@ class Choice:
         best, limit = quoted(self.best.name), percent(self.limit)
         text = f"Recommended is {best}, with a limit of {limit} false alarms."
         if not self.best["within_limit"]:
-            text = (
-                f"None keeps the limit of {limit} false alarms, so that none is recommended; {best} raises the fewest."
-            )
+            text = f"None is recommended, as all exceed the limit of {limit} false alarms; {best} raises the fewest."
         asked = f"This report is on {quoted(self.name)}, as was asked for."
         return text if self.name == self.best.name else f"{text} {asked}"
 
@@ -57,27 +55,18 @@ class Choice:
         results = self.study.results_
         damaged = results[(results["measure"] == "POD") & (results["source"] == SIMULATED)]
         n_states = counted(damaged["scenario"].nunique(), "damaged state")
-        n_evaluated = counted(int((self.ranking["error"] == "").sum()), "alarm system")
-        introduction = (
-            f"{n_evaluated} judged the same simulated records: those of the healthy "
-            f"structure and of {n_states}. The damage found is the mean over these states."
-        )
-        columns = ["Alarm system", "False alarms", "Bounds", "Damage found", "Bounds"]
-        columns += [f"Less than {quoted(self.best.name)} (percentage points)", "Not evaluated"]
-        caution = (
-            "Differences hold for all alarm systems together with "
-            f"{percent(self.study.confidence_)} confidence. They cover the scatter of the measurements, but neither "
-            "damage of other kinds than those tested, nor weather of another kind, nor errors of the model."
+        columns = ["Alarm system", "False alarms", "Bounds", "Probability of detection", "Bounds"]
+        columns += [f"Below {quoted(self.best.name)} (percentage points)", "Not evaluated"]
+        caption = (
+            f"Alarm systems, the best first, on the same simulated records. The probability of detection is the "
+            f"mean over {n_states}. Bounds of the differences hold for all alarm systems together with "
+            f"{percent(self.study.confidence_)} confidence; they cover the scatter of the measurements alone."
         )
         return section(
             "choice",
             "Which alarm system is recommended",
-            paragraphs(introduction, self.sentence()),
-            bullets(self.study.summary(self.limit).splitlines()),
-            table(
-                "Alarm systems, the best first.", columns, map(self._cells, *zip(*self.ranking.iterrows(), strict=True))
-            ),
-            paragraphs(caution),
+            bullets([self.sentence(), *self.study.summary(self.limit).splitlines()]),
+            table(caption, columns, [self._cells(name, row) for name, row in self.ranking.iterrows()]),
             link="Which alarm system",
         )
 
@@ -90,8 +79,8 @@ class Choice:
             cells += [bar(row[rate], share_text(row[rate])), bounds]
         points = [100 * row[f"pod_deficit{end}"] for end in ("", "_ci_low", "_ci_high")]
         ends = f" ({points[1]:.1f} to {points[2]:.1f})" if np.isfinite(points[1]) else ""
-        behind = "" if name == self.best.name else f"{points[0]:.1f}{ends}"
-        return [*cells, behind, share_text(row["not_evaluated"])]
+        deficit = "" if name == self.best.name else f"{points[0]:.1f}{ends}"
+        return [*cells, deficit, share_text(row["not_evaluated"])]
 
 
 def quoted(name: object) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, patterns, spread_evenly
+from skthermo.exceptions import ResultWarning
 
 Mask = NDArray[np.bool_]
 MOST_STEPS = 100  # of expectation maximisation
@@ -253,6 +254,7 @@ def _settled(step: Callable[[Array], Array], n_rows: int, n_modes: int) -> tuple
         warn_user(
             f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
             "part of it nearly undetermined",
+            ResultWarning,
             "covariance with gaps",
         )
     return state[0], state[1:]

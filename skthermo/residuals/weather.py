@@ -17,6 +17,7 @@ from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, range_sums
 from skthermo._tables.frames import column_names, frame_like
 from skthermo._tables.times import has_stamps, row_times
+from skthermo.exceptions import WeatherWarning
 from skthermo.residuals.gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
@@ -96,7 +97,7 @@ def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> N
                 f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
             )
     if text:
-        warn_user(text, "weather of folds")
+        warn_user(text, WeatherWarning, "weather of folds")
 
 
 @dataclass(frozen=True)

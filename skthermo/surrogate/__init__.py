@@ -1,16 +1,7 @@
 """From monitoring data to a thermal FE model: inverse surrogate, temperature mapper, the chain."""
 
-from skthermo.surrogate._fitted_chain import FittedChain
-from skthermo.surrogate._mapper import TemperatureMapper
-from skthermo.surrogate._regression import paper_network
-from skthermo.surrogate.chain import DataInformedFEM, FitReport
+from skthermo.surrogate._regression import TemperatureMapper, paper_network
+from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
 from skthermo.surrogate.inverse import InverseSurrogate
 
-__all__ = [
-    "DataInformedFEM",
-    "FitReport",
-    "FittedChain",
-    "InverseSurrogate",
-    "TemperatureMapper",
-    "paper_network",
-]
+__all__ = ["DataInformedFEM", "FitReport", "FittedChain", "InverseSurrogate", "TemperatureMapper", "paper_network"]

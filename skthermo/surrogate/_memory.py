@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any, TypeVar
+from warnings import WarningMessage
 
 import joblib
 import numpy as np
@@ -14,7 +15,7 @@ from joblib import Memory
 from sklearn.utils.validation import check_memory
 
 import skthermo
-from skthermo._estimators.warnings import Told, give_again, recorded
+from skthermo._estimators.warnings import give_again, recorded
 from skthermo._io import lock
 
 Result = TypeVar("Result")
@@ -73,7 +74,7 @@ def remembered(
     return result
 
 
-def made(kind: str, identity: str, make: Callable[[], Any]) -> tuple[Any, list[Told]]:
+def made(kind: str, identity: str, make: Callable[[], Any]) -> tuple[Any, list[WarningMessage]]:
     """A result, and the warnings that came with it."""
     with recorded() as told:
         result = make()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from skthermo._estimators.arguments import DEFAULT_TOLERANCE, Reduce, check_bounds, is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, Bounds
+from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 
 NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
@@ -165,6 +166,7 @@ class Simulator:
                     f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): "
                     f"{error}; all rows are solved by the full model, which takes long: expected a model updated to "
                     "the records",
+                    ModelWarning,
                     "no reduced model",
                 )
             return cls(model, reason=NO_BASIS)
@@ -262,6 +264,7 @@ class Simulator:
                 warn_user(
                     f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
                     "the full one: the weather is outside that of the training rows",
+                    ModelWarning,
                     "outside the reduced model",
                 )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)

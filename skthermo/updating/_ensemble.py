@@ -12,6 +12,7 @@ from skthermo._effects.frequencies import read_groups
 from skthermo._estimators.arguments import check_names
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._measured import Measured
@@ -134,31 +135,31 @@ class Ensemble:
             model = model.damaged(dict(zip(self.groups, (1 - multipliers[n_parameters:]).tolist(), strict=True)))
         return rescaled(model, multipliers[:n_parameters])
 
-    def doubts(self, outcomes: Sequence[Outcome]) -> Iterator[tuple[str, str]]:
-        """Warnings about the draws: kind and text of each."""
+    def doubts(self, outcomes: Sequence[Outcome]) -> Iterator[SkthermoWarning]:
+        """Warnings about the draws."""
         n = len(outcomes)
         theta = np.array([outcome.theta for outcome in outcomes])
         if unfinished := sum(not outcome.success for outcome in outcomes):
-            yield (
-                "unfinished draws",
+            yield ModelWarning(
                 f"the search has not converged for {unfinished} of {n} drawn models, which may not be likely ones: "
                 "expected a higher max_iter, or bounds within which the model has modes",
+                "unfinished draws",
             )
         at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
         if (at_bound > MOST_AT_BOUND * n).any():
             counts = zip(self.names, at_bound, strict=True)
             listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in counts if count)
-            yield (
-                "draws at bounds",
+            yield ModelWarning(
                 f"drawn models lie at the bounds of {listed}, and are less different than what is not known: expected "
                 "wider bounds, or a narrower prior",
+                "draws at bounds",
             )
         mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
         if mismatched:
-            yield (
-                "draws with swapped modes",
+            yield ModelWarning(
                 f"modes swap places in {mismatched} of {n} drawn models, and a measured mode is fitted with "
                 "another one: expected a model with track=True, or shapes",
+                "draws with swapped modes",
             )
 
     def warn_of(self, multipliers: Sequence[Array]) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._estimators.arguments import by_name, check_dofs
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, real_array, shape_array
+from skthermo.exceptions import RecordsWarning
 
 
 @dataclass
@@ -90,6 +91,7 @@ def _real_shapes(shapes: NDArray) -> Array:
     warn_user(
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
         "shape's length, is dropped",
+        RecordsWarning,
         "complex shapes",
     )
     return np.where(np.isnan(shapes), np.nan, turned.real)

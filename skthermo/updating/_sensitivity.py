@@ -55,9 +55,7 @@ def sensitivity(
     Notes
     -----
     Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j. Where the model has
-    no frequencies on one side, the difference to theta itself takes its place. Rounding of frequencies to a share
-    eps = 2.2e-16 gives S an error of about eps / step, so that a step below sqrt(eps) = 1.5e-8 loses more than half of
-    the digits, and is refused.
+    no frequencies on one side, the difference to theta itself takes its place.
 
     References
     ----------

@@ -76,7 +76,7 @@ def preprocessing(T, F):
 def chain(T, F):
     fem = quick_chain()
     yield "fit", lambda: fem.fit(T, F)
-    yield "residuals_", lambda: fem.residuals_
+    yield "residuals()", lambda: fem.residuals()
     yield "predict", lambda: fem.predict(T)
     yield "predict_interval", lambda: fem.predict_interval(T)
     yield "simulate, fitted noise", lambda: fem.simulate(T, noise="fitted", random_state=0)

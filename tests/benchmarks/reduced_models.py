@@ -80,7 +80,7 @@ def compare_small(model, options):
         "1000 reduced samples": lambda: reduced.frequencies(theta),
         "1000 with derivatives": lambda: linearise(reduced, theta),
     }
-    print(f"{100 * (1 - reduced.certified(theta).mean()):.1f} % of rows go to LAPACK")
+    print(f"{100 * (1 - reduced._core.certified(theta).mean()):.1f} % of rows go to LAPACK")
     for name, seconds in median_seconds(ways, options.rounds, time.process_time).items():
         print(f"{name}: {seconds:.2f} s")
 
@@ -119,7 +119,7 @@ def compare(model, options):
         ratio = seconds[f"{kind} by LAPACK"] / seconds[name]
         print(f"{name}: {seconds[name]:.3f} s, {ratio:.1f} times LAPACK's eigh or eigvalsh of every row")
     for kind, rows in {"uniform": theta, "corners": np.where(theta < 1, 1 - BOUNDS, 1 + BOUNDS)}.items():
-        print(f"{kind}: {100 * (1 - reduced.certified(rows).mean()):.1f} % of rows go to LAPACK")
+        print(f"{kind}: {100 * (1 - reduced._core.certified(rows).mean()):.1f} % of rows go to LAPACK")
     for kind in ("", "reduced "):
         ratio = seconds[f"{kind}central differences"] / seconds[f"{kind}exact Jacobian"]
         print(f"{kind}exact Jacobian, {len(model.parameter_names)} parameters: {ratio:.1f} times central differences")

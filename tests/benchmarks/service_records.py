@@ -201,10 +201,10 @@ def faults(structure, seed):
     learned, later = truth.weather
     raw, is_outlier = measured(truth.learned, truth.level, [seed, 0])
     fem = chain_of(truth).fit(learned, raw)
-    found, options = ~np.isnan(fem.service_records().outliers), {"noise": "fitted", "gaps": "fitted"}
+    found, options = ~np.isnan(fem.recorder_.service.outliers), {"noise": "fitted", "gaps": "fitted"}
     drawn = [fem.simulate(later, outliers="fitted", random_state=number, **options) for number in range(N_REPEATS)]
     noise = np.stack([(one / fem.simulate(later) - 1).to_numpy() for one in drawn])
-    is_far = np.abs(noise) > TOO_FAR * robust_deviation(fem.residuals_.values)
+    is_far = np.abs(noise) > TOO_FAR * robust_deviation(fem.residuals().values)
     n_values = raw.notna().to_numpy().sum()
     return {
         "structure": structure,

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -225,10 +226,10 @@ def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
 
     monkeypatch.setattr(skthermo.reporting, "owner_report", fails)
     done = bridge("update", "--report", "status.html", new=records[FIRST + 10 : FIRST + 12])
-    assert (done.code, done.err) == (FAILED, "error: the disk is full\n")
+    assert (done.code, done.err) == (FAILED, "error: status.html was not written: the disk is full\n")
     assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was evaluated is kept
     alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
-    assert (alarm.code, alarm.err) == (ALARM, "error: the disk is full\n")
+    assert (alarm.code, alarm.err) == (ALARM, "error: a.html was not written: the disk is full\n")
 
 
 def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeypatch):
@@ -241,7 +242,7 @@ def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeyp
 
 
 def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch):
-    def fails(*args):
+    def fails(*args, **named):
         raise KeyError("a mistake of ours")
 
     monkeypatch.setattr("skthermo.monitoring._monitor.Monitor.update", fails)
@@ -300,6 +301,6 @@ def test_a_kill_leaves_a_whole_state_that_goes_on_to_the_same_decisions(saved, r
             assert load_monitor(file).last_ in (records.index[day - 1], records.index[day])
     assert kills >= 3
     left = load_monitor(file)
-    left.counts_ |= {"n_repeated": 0}  # where the kill came after the state was saved
+    left._state = replace(left._state, n_repeated=0)  # where the kill came after the state was saved
     assert_same_course(left, undisturbed)
     assert not list(tmp_path.glob(".*.unfinished"))

@@ -34,7 +34,7 @@ def chain():
 def n_checks(monkeypatch):
     """Number of checks so far, of compensators and chains."""
     from skthermo.detection import _compensator
-    from skthermo.surrogate.chain import _parts
+    from skthermo.surrogate.chain import _data_informed
 
     given = []
 
@@ -42,7 +42,7 @@ def n_checks(monkeypatch):
         given.append(tables)
         return check_records(*tables)
 
-    for module in (_compensator, _parts):
+    for module in (_compensator, _data_informed):
         monkeypatch.setattr(module, "check_records", counted)
     return lambda: len(given)
 

@@ -153,11 +153,11 @@ def test_neighbours_are_those_in_time_where_there_are_stamps():
 
 
 def test_four_fifths_of_the_records_stay_however_long_they_remember():
-    rows = autoregressive(80, 0.98)
-    baseline = Neighbourhoods(np.arange(80.0), rows)
+    rows = autoregressive(85, 0.98)
+    baseline = Neighbourhoods(np.arange(85.0), rows)
     assert baseline.is_short
     index = baseline.distances(Gaussian.of(rows))
-    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(80), 8)), rtol=1e-9)
+    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(85), 8)), rtol=1e-9)
 
 
 @REMEMBERED
@@ -204,6 +204,7 @@ def test_thresholds_agree_on_many_normal_records():
     np.testing.assert_allclose(chosen, chosen[2], rtol=0.01)
 
 
+@FAR_ABOVE
 @TOO_FEW
 def test_false_alarms_on_new_records_are_as_asked_where_the_baseline_is_small():
     rates = {"quantile": [], "conformal": []}
@@ -276,7 +277,7 @@ def test_the_factor_of_a_few_independent_records_gives_their_rate():
 def test_the_factor_grows_with_dependence_and_vanishes_with_records(n_records):
     factors = [factor_of_few(n_records, 4, time, 0.02) for time in (1.0, 3.0, 9.0, 19.0)]
     assert (np.diff(factors) > 0).all()
-    assert factors[0] == pytest.approx(1, abs=12 / min(n_records, 400))
+    assert factors[0] == pytest.approx(1, abs=16 / min(n_records, 400))
 
 
 @REMEMBERED

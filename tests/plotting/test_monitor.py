@@ -64,7 +64,7 @@ def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis()
     ]
     display = MonitorDisplay.from_estimator(FakeMonitor(events=rows))
     labels = [span.get_label() for span in display.event_spans_]
-    assert labels == ["damage event", "event said to be harmless", "stiffening event"]
+    assert labels == ["damage event", "event marked as harmless", "stiffening event"]
     widths = [span.get_width() for span in display.event_spans_]
     assert widths[:2] == [7, 3]
     last = display.event_spans_[2]

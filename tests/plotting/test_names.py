@@ -11,7 +11,6 @@ from skthermo.fem import Bar, Structure
 from skthermo.plotting import (
     DamageIndexDisplay,
     DetectorsDisplay,
-    FleetPriorDisplay,
     PODCurveDisplay,
     PredictionDisplay,
     StructureDisplay,
@@ -59,9 +58,6 @@ def structure():
         lambda: PODCurveDisplay.from_predictions(pod_curve([0.1, 0.2], [3, 17], [20, 20]), label=2 * LONG),
         lambda: DetectorsDisplay.from_predictions(RATES, groups={HOSTILE: LONG, LONG: HOSTILE}),
         lambda: DetectorsDisplay.from_predictions(RANKED),
-        lambda: FleetPriorDisplay(
-            TABLE.assign(mean=0.1, standard_deviation=0.01), own_range=(2, 5), name=HOSTILE, is_pooled=False
-        ).plot(),
         lambda: StructureDisplay.from_structure(structure(), groups=[HOSTILE, LONG]),
         lambda: StructureDisplay.from_structure(structure(), {HOSTILE: 0.1}, label=HOSTILE),
     ],

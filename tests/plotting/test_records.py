@@ -5,6 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_rgb
 from sklearn.linear_model import LinearRegression
 
 from skthermo.plotting import PredictionDisplay
@@ -28,15 +29,17 @@ def test_frequencies_over_the_chosen_sensor(fem, later):
     assert display.axes_[1].get_title() == "$f_{2}$"
 
 
-def test_arrays_have_numbered_sensors(later):
+def test_arrays_have_numbered_sensors_and_records(later):
     T, F = later.temperatures.to_numpy(), later.frequencies.to_numpy()
     display = PredictionDisplay.from_predictions(F, temperature=T[:, 1])
     np.testing.assert_array_equal(display.lines_["measured"][2].get_xdata(), T[:, 1])
     assert display.axes_[0].get_xlabel() == "temperature (°C)"
-    with pytest.raises(ValueError, match="sensor is 3; expected a column's number from 0 to 2"):
-        PredictionDisplay.from_estimator(None, T, F, sensor=3)
-    with pytest.raises(ValueError, match=r"sensor is 'T9'; expected one of \['T1', 'T2', 'T3'\]"):
-        PredictionDisplay.from_estimator(None, later.temperatures, later.frequencies, sensor="T9")
+    for X, sensor in ((T, 3), (later.temperatures, "T9")):
+        with pytest.raises(ValueError, match=f"sensor is {sensor!r}; expected"):
+            PredictionDisplay.from_estimator(None, X, F, sensor=sensor)
+    display = PredictionDisplay.from_predictions(np.arange(10.0), unit="")
+    np.testing.assert_array_equal(display.lines_["measured"][0].get_xdata(), np.arange(10))
+    assert (display.axes_[0].get_xlabel(), display.axes_[0].get_ylabel()) == ("record", "$f_{1}$")
 
 
 def test_given_axes_are_used(later):
@@ -78,12 +81,6 @@ def test_time_goes_on_a_date_axis_in_order_and_lines_break_in_gaps():
     assert np.isnan(y[20])
     assert (np.diff(mdates.date2num(line.get_xdata())) > 0).all()
     assert line.get_xdata()[0] == np.datetime64("2020-01-01T00:00")  # local time
-
-
-def test_records_of_arrays_are_numbered():
-    display = PredictionDisplay.from_predictions(np.arange(10.0), unit="")
-    np.testing.assert_array_equal(display.lines_["measured"][0].get_xdata(), np.arange(10))
-    assert (display.axes_[0].get_xlabel(), display.axes_[0].get_ylabel()) == ("record", "$f_{1}$")
 
 
 def test_marks_stand_at_a_time_or_at_a_record(later):
@@ -136,6 +133,8 @@ def test_bands_break_where_an_end_is_unknown():
     lowest[7] = -np.inf
     display = PredictionDisplay.from_predictions(np.ones(10), np.ones(10), lowest, highest)
     assert len(display.bands_[0].get_paths()) == 3
+    alone = PredictionDisplay.from_predictions(np.ones(10), None, np.zeros(10), np.full(10, 2.0), kind="lines")
+    assert alone.bands_[0].get_facecolor()[0, :3] == pytest.approx(to_rgb(alone.lines_["measured"][0].get_color()))
 
 
 def test_predicted_over_measured(fem, later):

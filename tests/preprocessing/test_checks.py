@@ -258,7 +258,7 @@ def test_each_kind_gives_one_warning_and_the_tables_stay_as_they_are():
     spoiled.iloc[[50, 60], [0, 1]] *= 1.3
     before = stuck.copy(), spoiled.copy()
     findings = check_records(stuck, spoiled)
-    kinds = [kind for kind, _ in findings.warnings()]
+    kinds = [warning.kind for warning in findings.warnings()]
     assert kinds == ["stuck sensor", "outliers"]
     assert len(findings.table) == len(str(findings).splitlines()) - 1 == 4
     for table, copy in zip((stuck, spoiled), before, strict=True):

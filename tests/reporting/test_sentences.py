@@ -1,7 +1,5 @@
 """What a report says of numbers, and of families of scenarios."""
 
-import re
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -58,52 +56,42 @@ def finding(severities, rates, n_records=200, false_alarms=np.nan):
     return findings_of(study)
 
 
-def test_a_curve_says_more_than_the_severities_that_were_tested():
-    (found,) = finding([0.3, 0.1, 0.2], [0.99, 0.3, 0.88])
-    said = found.sentence()
-    assert said.startswith("damage of 30\xa0% or more is found reliably.")
-    assert "this limit is 20\xa0% to 30\xa0%" in said
-    numbers = [float(number) for number in re.findall(r"at ([\d.]+)", said)]
+@pytest.mark.parametrize(
+    ("severities", "rates", "smallest", "bounds", "remark"),
+    [
+        ([0.3, 0.1, 0.2], [0.99, 0.3, 0.88], "damage of 30 %", "20 % to 30 %", ""),
+        ([0.1, 0.2, 0.3], [0.02, 0.1, 0.4], "none up to damage of 30 %", "above 30 %", ""),
+        ([0.1, 0.2, 0.3], [0.0, 1.0, 1.0], "damage of 20 %", "20 %", "no severity between 10 % and 20 % was tested"),
+        ([0.2], [0.95], "damage of 20 %; less was not tested", "20 %", "one severity"),
+        ([-0.1, -0.2, -0.4], [0.2, 0.7, 0.96], "strengthening of 40 %", "40 %", ""),
+        ([0.1, 0.2, 0.3], [0.5, 0.4, 0.3], "none up to damage of 30 %", "above 30 %", "does not increase"),
+        ([0.1, 0.2, 0.3], [0.3, 0.88, 0.99], "damage of 30 %", "20 % to 30 %", ""),
+    ],
+)
+def test_smallest_severities_their_bounds_and_doubts(severities, rates, smallest, bounds, remark):
+    (found,) = finding(severities, rates)
+    cells = [cell.replace("\xa0", " ") for cell in found.cells()]
+    assert cells[:3] == ["deck", smallest, bounds]
+    assert remark in cells[5]
+    assert bool(remark) == bool(cells[5])
+
+
+def test_severities_on_the_curve_are_not_extrapolated():
+    (found,) = finding([0.1, 0.2, 0.3], [0.3, 0.88, 0.99])
+    numbers = [float(cell.removesuffix("\xa0%")) for cell in found.cells()[3:5]]
     assert numbers == pytest.approx([100 * found.curve.a90, 100 * found.curve.a90_95], abs=0.06)
+    (beyond,) = finding([0.1, 0.2, 0.3], [0.02, 0.1, 0.4])
+    assert beyond.curve.a90 > 0.3
+    assert beyond.cells()[3] == "more than 30\xa0%"
+    assert finding([0.2, 0.3], [0.93, 0.99])[0].cells()[3] == "less than 20\xa0%"
 
 
-def test_a_limit_beyond_the_tested_severities_is_not_extrapolated():
-    (found,) = finding([0.1, 0.2, 0.3], [0.02, 0.1, 0.4])
-    assert found.sentence().startswith("no tested damage is found reliably; the largest was 30\xa0%.")
-    assert found.curve.a90 > 0.3
-    assert "at more than 30\xa0%" in found.sentence()
-    assert found.bounds == "above 30\xa0%"
-    (found,) = finding([0.2, 0.3], [0.93, 0.99])
-    assert "less was not tested" in found.sentence()
-    assert "at less than 20\xa0%" in found.sentence()
-
-
-def test_severities_that_determine_no_curve():
-    (separated,) = finding([0.1, 0.2, 0.3], [0.0, 1.0, 1.0])
-    assert "between 10\xa0% and 20\xa0%; nothing in between was tested" in separated.sentence()
-    (single,) = finding([0.2], [0.95])
-    assert "Only one severity" in single.sentence()
-    (strengthened,) = finding([-0.1, -0.2, -0.4], [0.2, 0.7, 0.96])
-    assert strengthened.sentence().startswith("strengthening of 40\xa0% or more")
-    (falling,) = finding([0.1, 0.2, 0.3], [0.5, 0.4, 0.3])
-    assert "does not increase with severity" in falling.sentence()
-
-
-def test_a_curve_beside_its_points_is_doubtful():
+def test_a_curve_beside_its_points_is_doubtful_and_one_without_detections_is_not_drawn():
     (found,) = finding([0.02, 0.05, 0.1, 0.3], [0.05, 0.6, 0.65, 0.97], 2000)
     assert found.curve.n_missed == 2
-    assert "doubtful, because the curve lies outside the bounds of 2 of 4 tested severities" in found.sentence()
-    (found,) = finding([0.1, 0.2, 0.3], [0.3, 0.88, 0.99])
-    assert "doubtful" not in found.sentence()
-
-
-def test_a_detector_that_sees_no_damage_is_called_so():
+    assert "2 of 4" in found.cells()[5]
     (blind,) = finding([0.1, 0.2, 0.3], [0.0, 0.01, 0.02], false_alarms=0.01)
-    assert "Alarms are as rare as for the healthy structure" in blind.sentence()
     assert blind.curve is None
-    (seeing,) = finding([0.1, 0.2, 0.3], [0.01, 0.01, 0.3], false_alarms=0.01)
-    assert "as rare as" not in seeing.sentence()
-
-
-def test_damage_and_strengthening_in_one_family_have_no_limit():
-    assert finding([-0.1, 0.1], [0.5, 0.95]) == []
+    assert "as rare as" in blind.cells()[5]
+    assert finding([0.1, 0.2, 0.3], [0.01, 0.01, 0.3], false_alarms=0.01)[0].curve is not None
+    assert finding([-0.1, 0.1], [0.5, 0.95]) == []  # damage and strengthening in one family

@@ -41,7 +41,7 @@ def symmetric():
 
 
 def simulated(fem, T, damage=None):
-    return fem.simulate(T, damage=damage) * (1 + fem.expected_residuals(T))
+    return fem.simulate(T, damage=damage) * (1 + fem.residuals().expected(fem.weather(T).inputs))
 
 
 def test_mirrored_groups_are_named(symmetric):

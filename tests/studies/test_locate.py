@@ -8,7 +8,6 @@ import pytest
 
 from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.fem import Beam, Spring, Structure, add_noise
-from skthermo.plotting import StructureDisplay
 from skthermo.studies import locate_damage
 from skthermo.surrogate import DataInformedFEM
 
@@ -104,8 +103,6 @@ def test_the_structure_must_be_the_models(fem, truss, later):
         located.likely_members(group="deck")
     with pytest.raises(ValueError, match="between 0 and 1"):
         located.likely_members(90)
-    with pytest.raises(ValueError, match="quantity is 'risk'"):
-        StructureDisplay.from_located(located, "risk")
 
 
 # A symmetric bridge, calibrated
@@ -176,12 +173,3 @@ def test_shapes_tell_mirrored_places_apart(calibrated, bridge, of_damaged_deck):
     assert {2, 3} <= set(likely)
     assert max(likely) < N / 2
     assert not located.alike
-
-
-def test_members_in_the_colours_of_their_probability(by_frequencies):
-    located = by_frequencies
-    display = StructureDisplay.from_located(located)
-    assert display.colorbar_.ax.get_ylabel() == "probability of damage"
-    shown = sorted(display.members_["lines"].get_array())
-    assert shown == pytest.approx(sorted(located.table.loc[range(N), "probability"]))
-    assert display.members_["lines"].get_clim() == (0, 1)

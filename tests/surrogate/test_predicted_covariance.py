@@ -105,10 +105,10 @@ def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_th
     frequencies, std = (table.to_numpy() for table in fem.predict(later, return_std=True))
     known = np.sqrt(np.einsum("ijj->ij", fem.predict_covariance(later)))
     scatter = np.sqrt(std**2 - known**2) / frequencies
-    spread = fem.residuals_.spread(later.to_numpy())
+    spread = fem.residuals().spread(later.to_numpy())
     np.testing.assert_allclose(scatter, spread, rtol=1e-6)
     assert spread.max() < 2.5 * NOISE  # of thirty records, and however far from their weather
-    assert (fem.residuals_.spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()).all()  # beyond what anybody has seen
+    assert (fem.residuals().spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()).all()  # beyond what anybody has seen
 
 
 def test_intervals_after_thirty_days_hold_a_later_year():
@@ -139,12 +139,12 @@ def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of
 def test_the_report_says_what_weather_is_the_fleets():
     report = fitted()[0].report_
     assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
-    assert re.search("predictions stand on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
-    assert not [kind for kind, _ in chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings()]
+    assert re.search("predictions are based on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
+    assert not list(chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings())
     T, F = bridge(0, 15)
     alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_
     assert alone.fleet is None
-    assert [kind for kind, _ in alone.warnings()] == ["few rows"]
+    assert [warning.kind for warning in alone.warnings()] == ["few rows"]
 
 
 def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():

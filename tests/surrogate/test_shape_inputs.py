@@ -274,7 +274,7 @@ def test_the_chain_learns_weak_parameters_from_shapes():
     from_frequencies = np.log(chain.estimate_parameters(F) / alone.parameters_).abs().to_numpy()
     deviations = (alone.inverse_.invert(F).std / alone.parameters_).to_numpy()
     assert (from_frequencies < 0.003 * deviations).all()
-    assert len(chain.residuals_.values) == len(F)
+    assert len(chain.residuals().values) == len(F)
 
 
 def test_the_chain_names_shapes_that_are_missing_or_not_wanted():

@@ -188,7 +188,7 @@ def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.residuals_.values
+    records = fem.residuals().values
     assert {tuple(row) for row in np.isnan(noisy.to_numpy())} <= {tuple(row) for row in np.isnan(records)}
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
     assert noisy.isna().mean(axis=None) == pytest.approx(0.1, abs=0.03)
@@ -211,11 +211,11 @@ def test_noise_of_shuffled_records_is_that_of_records_in_order_of_time():
 def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
     fem = any_chain(inverse=inverse(refine=0), mapper=PLAIN, discrepancy=None).fit(T, F)
     folds = BlockedKFold(block="7D")
-    np.testing.assert_array_equal(fem.residuals_.folds, folds.fold_of(T))
+    np.testing.assert_array_equal(fem.residuals().folds, folds.fold_of(T))
     for fold, (train, test) in enumerate(folds.split(T)):
         theta = clone(fem.mapper_).fit(T.iloc[train], fem.parameters_.iloc[train]).predict(T.iloc[test])
         predicted = fem.aligner_.inverse_transform(fem.model.frequencies(theta))
-        values = fem.residuals_.values[fem.residuals_.folds == fold]
+        values = fem.residuals().values[fem.residuals().folds == fold]
         np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
 
 
@@ -223,7 +223,7 @@ def test_residuals_do_not_know_the_discrepancy_of_their_own_week():
     """A mode that one week alone moves: what is learned there is not in its residuals."""
     week = np.arange(365) // 7 == 20
     fem = chain().fit(T, F.assign(f2=F["f2"] * np.where(week, 1.02, 1.0)))
-    of_week = fem.residuals_.values[week, 1] - FITTED.residuals_.values[week, 1]
+    of_week = fem.residuals().values[week, 1] - FITTED.residuals().values[week, 1]
     np.testing.assert_allclose(of_week.mean(), 0.02, atol=0.002)
 
 
@@ -245,7 +245,7 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
 @pytest.mark.filterwarnings("ignore:what the weather leaves of the frequencies has a trend", "ignore:.* change at once")
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
-    blocks = [np.diff(np.flatnonzero(np.diff(one.residuals_.folds))) for one in (FITTED, chain().fit(T, lasting))]
+    blocks = [np.diff(np.flatnonzero(np.diff(one.residuals().folds))) for one in (FITTED, chain().fit(T, lasting))]
     assert set(blocks[0]) == {7}
     assert min(blocks[1]) > 20
 
@@ -261,8 +261,8 @@ def test_folds_in_unseen_weather_are_named():
 def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
     order = np.random.default_rng(0).permutation(len(T))
     sorted_rows, shuffled = (chain(mapper=mapper).fit(T.iloc[rows], F.iloc[rows]) for rows in (slice(None), order))
-    np.testing.assert_allclose(shuffled.residuals_.values, sorted_rows.residuals_.values, atol=1e-6)
-    np.testing.assert_allclose(shuffled.residuals_.weather, sorted_rows.residuals_.weather)
+    np.testing.assert_allclose(shuffled.residuals().values, sorted_rows.residuals().values, atol=1e-6)
+    np.testing.assert_allclose(shuffled.residuals().weather, sorted_rows.residuals().weather)
 
 
 @pytest.mark.nightly
@@ -277,7 +277,7 @@ def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
 def test_any_mapper_has_residuals(mapper):
     fem = chain(mapper=mapper).fit(T, F)
     lagged = 1 if hasattr(mapper, "steps") else 0
-    assert fem.residuals_.values.shape == (365 - lagged, 6)
+    assert fem.residuals().values.shape == (365 - lagged, 6)
     with pytest.warns(UserWarning, match="1 of 365 rows cannot be predicted") if lagged else nullcontext():
         std = fem.predict(T, return_std=True)[1]
     np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
@@ -292,12 +292,12 @@ def test_few_records_have_no_residuals():
 
 def test_pickles_keep_residuals_and_clones_do_not():
     twin = pickle.loads(pickle.dumps(FITTED))
-    np.testing.assert_array_equal(twin.residuals_.values, FITTED.residuals_.values)
+    np.testing.assert_array_equal(twin.residuals().values, FITTED.residuals().values)
     for one, other in zip(twin.predict_interval(T), FITTED.predict_interval(T), strict=True):
         pd.testing.assert_frame_equal(one, other)
     assert not hasattr(clone(FITTED), "_residuals")
     refitted = pickle.loads(pickle.dumps(FITTED)).fit(T[:200], F[:200])
-    assert len(refitted.residuals_.values) == 200
+    assert len(refitted.residuals().values) == 200
 
 
 # Standard deviations and intervals
@@ -306,7 +306,7 @@ def test_pickles_keep_residuals_and_clones_do_not():
 def test_standard_deviations_are_spreads_in_hertz():
     frequencies, std = FITTED.predict(T, return_std=True)
     pd.testing.assert_frame_equal(frequencies, FITTED.predict(T))
-    np.testing.assert_allclose(std / frequencies, FITTED.residuals_.spread(T.to_numpy()))
+    np.testing.assert_allclose(std / frequencies, FITTED.residuals().spread(T.to_numpy()))
     assert (std > 0).all(axis=None)
     np.testing.assert_allclose((std / frequencies).mean(), 0.01, rtol=0.2)  # the noise of the campaign
     assert isinstance(chain().fit(T.to_numpy(), F.to_numpy()).predict(T[:3].to_numpy(), True)[1], np.ndarray)
@@ -399,7 +399,7 @@ def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadratur
         for side in (-deviations, deviations)
     ]
     change = np.sqrt(np.mean([np.log(one / predicted) ** 2 for one in moved], axis=0))
-    spread = FITTED.residuals_.spread(filled)
+    spread = FITTED.residuals().spread(filled)
     np.testing.assert_allclose(std, predicted * np.hypot(spread, change), rtol=1e-9)
 
 
@@ -411,7 +411,7 @@ def test_a_filled_temperature_costs_wherever_a_lag_reaches_it():
     std = lagged.predict(holed, True)[1]
     plain = lagged.predict(holed)
     inputs = lagged.mapper_[:-1].transform(pd.DataFrame(lagged.sensors_.fill(holed)[0], holed.index, holed.columns))
-    wider = (std > plain * lagged.residuals_.spread(inputs.to_numpy()) * (1 + 1e-9)).any(axis=1)
+    wider = (std > plain * lagged.residuals().spread(inputs.to_numpy()) * (1 + 1e-9)).any(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(wider), np.arange(100, 105))
 
 

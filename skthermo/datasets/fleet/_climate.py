@@ -24,30 +24,14 @@ def stream(*key: int) -> np.random.RandomState:
 
 @dataclass(frozen=True)
 class SiteClimate:
-    """Climate of a place.
+    """Climate of a place."""
 
-    Attributes
-    ----------
-    latitude : float
-        In degrees.
-    mean : float
-        Mean temperature of the year in C.
-    season : float
-        Amplitude of the seasonal cycle in C.
-    swing : float
-        Amplitude of the daily cycle in C, on average over the year.
-    scatter : float
-        Standard deviation of the weather about season and daily cycle in C.
-    memory_hours : float
-        Hours after which the correlation of the weather with itself has fallen to 1 / e.
-    """
-
-    latitude: float
-    mean: float
-    season: float
-    swing: float
-    scatter: float
-    memory_hours: float
+    latitude: float  # in degrees
+    mean: float  # mean temperature of the year in C
+    season: float  # amplitude of the seasonal cycle in C
+    swing: float  # amplitude of the daily cycle in C, on average over the year
+    scatter: float  # standard deviation of the weather about season and daily cycle in C
+    memory_hours: float  # after which the correlation of the weather with itself has fallen to 1 / e
 
     @classmethod
     def draw(cls, random: np.random.RandomState) -> "SiteClimate":

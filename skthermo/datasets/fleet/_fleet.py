@@ -35,9 +35,8 @@ class BridgeFleet(Mapping[str, FleetBridge]):
     Examples
     --------
     >>> from skthermo.datasets import make_fleet
-    >>> fleet = make_fleet(20, random_state=0)
-    >>> len(fleet), list(fleet)[:2], [name for name, bridge in fleet.items() if bridge.is_atypical]
-    (20, ['bridge 000', 'bridge 001'], ['bridge 007'])
+    >>> [name for name, bridge in make_fleet(20, random_state=0).items() if bridge.is_atypical]
+    ['bridge 007']
     """
 
     def __init__(self, bridges: Sequence[FleetBridge]):
@@ -99,7 +98,7 @@ def make_fleet(
     Raises
     ------
     ValueError
-        If the number of bridges is not a positive integer, a kind is unknown, or the share is not between 0 and 1.
+        If a kind is unknown, or the share is not between 0 and 1.
 
     Notes
     -----
@@ -115,14 +114,10 @@ def make_fleet(
     The user's model has a coarser mesh (but for the truss), stiffnesses that are 2 to 5 % off, masses that are 1 % off,
     and parameters that cut across the thermal zones of the truth.
 
-    Climates lie between 43 and 60 degrees of latitude, maritime to continental: seasonal and daily cycles, weather that
-    lasts for days, sunshine by the sun's elevation and clouds. Parts follow the air with thermal inertia (steel 2 h,
-    concrete 15 h, soil four days) and are warmed by the sun.
-
-    The logarithm of the stiffness of a part changes in proportion to its temperature. On top of that it rises gradually
-    below a knee near 0 C, up to a limit, where water freezes or elastomers stiffen (concrete, pavement, bearings,
-    soil).
-    The coefficients of a bridge scatter by 10 to 30 % about those of the material, the knee by 0.5 C.
+    Climates lie between 43 and 60 degrees of latitude, maritime to continental. Parts follow the air with thermal
+    inertia (steel 2 h, concrete 15 h, soil four days) and are warmed by the sun. The logarithm of the stiffness of a
+    part changes in proportion to its temperature, and rises below a knee near 0 C, up to a limit, where water freezes
+    or elastomers stiffen. The coefficients scatter by 10 to 30 % about those of the material, the knee by 0.5 C.
 
     Examples
     --------
@@ -135,10 +130,6 @@ def make_fleet(
     bridge 000   truss     steel  41.5     47.52
     bridge 001  girder  concrete  28.4     51.71
     bridge 002    arch     steel  90.6     53.14
-    >>> bridge = fleet["bridge 001"]
-    >>> records = bridge.records(365)
-    >>> records.frequencies.shape, bridge.roles
-    ((365, 5), {'air_1': 'air', 'deck_2': 'deck', 'deck_3': 'deck'})
     """
     n_bridges = positive_integer(n_bridges, "n_bridges")
     if isinstance(kinds, str) or not kinds or not set(kinds) <= set(KINDS):

@@ -14,33 +14,15 @@ ELSEWHERE = 14.0  # K, how far the knee of an alien law is moved
 
 @dataclass(frozen=True)
 class Law:
-    """Law of a stiffness over its temperature: an exponential, and a rise that levels off in frost.
+    """Law of a stiffness over its temperature: an exponential, and a rise that levels off in frost."""
 
-    Attributes
-    ----------
-    slope : float
-        Change above the knee, in 1/K.
-    gain : float
-        Further rise for each kelvin below the knee, in 1/K.
-    knee : float
-        Temperature below which the part stiffens, in C.
-    width : float
-        How gradually it does, in K.
-    limit : float
-        Largest rise by frost.
-    hours : float
-        Thermal inertia of the part.
-    sun : float
-        Warming by full sunshine in K.
-    """
-
-    slope: float
-    gain: float = 0.0
-    knee: float = 0.0
-    width: float = 1.0
-    limit: float = 1.0
-    hours: float = 0.0
-    sun: float = 0.0
+    slope: float  # change above the knee, in 1/K
+    gain: float = 0.0  # further rise for each kelvin below the knee, in 1/K
+    knee: float = 0.0  # temperature below which the part stiffens, in C
+    width: float = 1.0  # how gradually it does, in K
+    limit: float = 1.0  # largest rise by frost
+    hours: float = 0.0  # thermal inertia of the part
+    sun: float = 0.0  # warming by full sunshine in K
 
     def log_multiplier(self, temperature: Array) -> Array:
         """Logarithm of the multiplier at temperatures in C."""
@@ -49,7 +31,12 @@ class Law:
 
     def temperature(self, weather: pd.DataFrame) -> Array:
         """Hourly temperature of the part in C, from hourly "air" and "sun"."""
-        return memory((weather["air"] + self.sun * weather["sun"]).to_numpy(), self.hours)
+        return part_temperature(weather, self.hours, self.sun)
+
+
+def part_temperature(weather: pd.DataFrame, hours: float, sun: float) -> Array:
+    """Hourly temperature in C of a part with thermal inertia that full sunshine warms by ``sun`` K."""
+    return memory((weather["air"] + sun * weather["sun"]).to_numpy(), hours)
 
 
 LAWS = {

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from skthermo._tables.arrays import Array
-from skthermo.datasets._kw51_weather import memory
 from skthermo.datasets.fleet._climate import persistent
+from skthermo.datasets.fleet._laws import part_temperature
 
 STYLES = ("T{i}", "TH-{i:02d}", "{role}_{i}", "temperature {i}")
 OFFSET, READING_NOISE = 0.7, (0.1, 0.4)  # C
@@ -24,28 +24,18 @@ ERROR = (0.03, 0.10)  # of an outlier
 
 @dataclass(frozen=True)
 class Thermometer:
-    """A thermometer in the air or in the deck.
+    """A thermometer in the air or in the deck."""
 
-    Attributes
-    ----------
-    name, role : str
-        Name of its column, and "air" or "deck".
-    offset, noise : float
-        In C.
-    hours, sun : float
-        Thermal inertia of its place, and warming by full sunshine in K.
-    """
-
-    name: str
-    role: str
-    offset: float
-    noise: float
-    hours: float
-    sun: float
+    name: str  # of its column
+    role: str  # "air" or "deck"
+    offset: float  # in C
+    noise: float  # in C
+    hours: float  # thermal inertia of its place
+    sun: float  # warming by full sunshine in K
 
     def temperature(self, weather: pd.DataFrame) -> Array:
         """Hourly temperature of its place in C, as it would read it without noise."""
-        return self.offset + memory((weather["air"] + self.sun * weather["sun"]).to_numpy(), self.hours)
+        return self.offset + part_temperature(weather, self.hours, self.sun)
 
 
 def draw_thermometers(random: np.random.RandomState) -> list[Thermometer]:

@@ -19,32 +19,14 @@ PLANE = ("x", "y", "rz")  # fixed where a line of beams bends and twists but doe
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of bridge.
+    """A kind of bridge."""
 
-    Attributes
-    ----------
-    design : callable
-        ``design(span, material, random)`` draws stiffnesses and masses, in SI units.
-    build : callable
-        ``build(design, fine)`` gives the structure; the mesh of the truth is fine.
-    parameters : mapping
-        What theta multiplies in the user's model.
-    zones : mapping of str to str
-        Thermal zone -> material, where "own" is the bridge's. The zones cut across the parameters.
-    groups : tuple of str
-        What can be damaged.
-    spans : tuple of float
-        Shortest and longest span in m.
-    materials : tuple of str
-        What such bridges are made of.
-    """
-
-    design: Callable[[float, str, np.random.RandomState], Design]
-    build: Callable[[Design, bool], Structure]
-    parameters: Mapping[str, Any]
-    zones: Mapping[str, str]
-    groups: tuple[str, ...]
-    spans: tuple[float, float]
+    design: Callable[[float, str, np.random.RandomState], Design]  # draws stiffnesses and masses, in SI units
+    build: Callable[[Design, bool], Structure]  # the mesh of the truth is fine
+    parameters: Mapping[str, Any]  # what theta multiplies in the user's model
+    zones: Mapping[str, str]  # thermal zone -> material ("own": the bridge's); they cut across the parameters
+    groups: tuple[str, ...]  # what can be damaged
+    spans: tuple[float, float]  # shortest and longest span in m
     materials: tuple[str, ...]
     n_modes: int = 5
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Self
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._estimators.arguments import check_flag, check_theta
-from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState
+from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, positive_integer
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem._theta import nominal_theta
-from skthermo.fem.affine._base import AffineBase, Content
+from skthermo.fem.affine._base import AffineBase, Change, Content, Groups, Names
 from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._read_terms import (
     are_sparse,
     check_groups,
-    check_n_modes,
     check_names,
-    check_severities,
     exponents_of,
     read_terms,
 )
@@ -124,7 +121,7 @@ class AffineModel(AffineBase):
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
         self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
-        n_modes = check_n_modes(n_modes)
+        n_modes = positive_integer(n_modes, "n_modes")
         if contents and len(contents) != len(stiffness_keys):
             raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
         self._contents = tuple(map(tuple, contents))
@@ -147,68 +144,10 @@ class AffineModel(AffineBase):
             available=min(available, solvable),
         )
 
-    def damaged(self, damage: Mapping[str, float]) -> Self:
-        """A new model with less stiffness (or more) in some groups and the same mass.
-
-        Parameters
-        ----------
-        damage : mapping of str to float
-            Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half,
-            -0.15 a strengthening by 15 %. A term in several damaged groups is multiplied by all their factors.
-
-        Returns
-        -------
-        AffineModel
-            Its columns are the modes of this model's undamaged nominal state.
-
-        Raises
-        ------
-        ValueError
-            If a group is unknown, or a severity is 1 or more or not finite.
-        """
-        factors = np.ones(len(self._core.stiffness.factors))
-        for group, severity in check_severities(damage, self._groups).items():
-            factors[list(self._groups[group])] *= 1 - severity
-        return self._twin(_core=self._core.with_scaled_stiffness(factors))
-
     def rescaled(self, theta: ArrayLike) -> Self:
-        """A new model whose nominal state, theta = 1, is this model at a given theta.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_parameters,) or (1, n_parameters)
-            Multipliers that become the new nominal values.
-
-        Returns
-        -------
-        AffineModel
-            Its columns are the modes of this model's nominal state.
-
-        Raises
-        ------
-        ValueError
-            If theta has the wrong width or more than one row, or a value is not finite and positive.
-        """
-        row = check_theta(theta, self.parameter_names, one_row=True)
-        return self._twin(_core=self._core.rescaled(row))
+        return self._twin(_core=self._core.rescaled(check_theta(theta, self.parameter_names, one_row=True)))
 
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
-        """A small model that gives the same frequencies within a box, to a stated relative error.
-
-        Parameters
-        ----------
-        bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-            Box of multipliers: a half-width, or lowest and highest of each parameter.
-        tol : float, default=1e-5
-            Largest relative error of a frequency.
-        random_state : int, RandomState or None, default=None
-            Seed of the points at which the basis is built and checked.
-
-        Returns
-        -------
-        ReducedModel
-            With this model's interface.
-        """
         return ReducedModel(self, bounds, tol=tol, random_state=random_state)
 
     def reduction_pays(self, n_solves: int) -> bool:
@@ -250,13 +189,7 @@ class AffineModel(AffineBase):
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
 
-    def _changed(
-        self,
-        change: Callable[[AffineCore], AffineCore],
-        names: tuple[str, ...] | None = None,
-        bounds: Array | None = None,
-        groups: dict[str, tuple[int, ...]] | None = None,
-    ) -> Self:
+    def _changed(self, change: Change, names: Names = None, bounds: Array | None = None, groups: Groups = None) -> Self:
         names, groups = names or self._parameter_names, groups or self._groups
         return self._twin(_core=change(self._core), _parameter_names=names, _groups=groups)
 

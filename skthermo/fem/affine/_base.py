@@ -14,22 +14,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import check_dofs, check_flag, check_theta
 from skthermo._estimators.threads import map_on_blas_threads
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, MatrixLike, real_array, shape_array
+from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, real_array, shape_array
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.affine._read_terms import check_different, check_modes, read_mass, read_matrix
+from skthermo.fem.affine._read_terms import check_different, check_modes, check_severities, read_mass, read_matrix
 from skthermo.fem.modal import LocalModes
 
 Content = tuple[Hashable, tuple[str, ...]]
+Change = Callable[[AffineCore], AffineCore]
+Names = tuple[str, ...] | None
+Groups = dict[str, tuple[int, ...]] | None
 
 
 class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel, ABC):
     """Base of `AffineModel` and `ReducedModel`: the methods that both share.
 
-    A subclass stores ``_parameter_names``, ``_groups`` and ``_core``. ``_basis`` and `_bounds_warning` are for models
-    that are solved on a basis, within a box.
+    A subclass stores ``_parameter_names``, ``_groups`` and ``_core``, and ``_basis`` if it is solved on a basis.
     """
 
     _parameter_names: tuple[str, ...]
@@ -122,13 +123,10 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
         Returns
         -------
-        frequencies : ndarray of shape (n_samples, n_modes)
-            In Hz.
-        jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-            Derivatives d f / d theta in Hz.
+        tuple of ndarray
+            Frequencies and Jacobian, as `linearise` gives them.
         """
-        frequencies, jacobian = self._in_chunks(self._core.linearised, theta)
-        return frequencies, jacobian
+        return self._in_chunks(self._core.linearised, theta)  # type: ignore[return-value]
 
     def linearised_modes(self, theta: ArrayLike, dofs: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Natural frequencies and mode shapes at many theta, and their exact derivatives.
@@ -142,31 +140,19 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
         Returns
         -------
-        frequencies : ndarray of shape (n_samples, n_modes)
-            In Hz.
-        jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
-            Derivatives d f / d theta in Hz.
-        shapes : ndarray of shape (n_samples, n_dofs, n_modes)
-            Of unit modal mass; signs are arbitrary.
-        derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
-            Derivatives d phi / d theta of these shapes. Where eigenvalues repeat, they do not exist and the values are
-            arbitrary.
-
-        Raises
-        ------
-        ValueError
-            If theta has the wrong width or a value that is not finite and positive, or ``dofs`` are not different
-            degrees of freedom of the model.
+        tuple of ndarray
+            Frequencies, Jacobian, shapes of unit modal mass and their derivatives, as `linearise_modes` gives them;
+            derivatives are arbitrary where eigenvalues repeat.
         """
         places = check_dofs(dofs, self.n_dof)
         solve = partial(self._core.linearised_modes, dofs=places, basis=self._basis)
-        frequencies, jacobian, shapes, derivatives = self._in_chunks(solve, theta)
-        return frequencies, jacobian, shapes, derivatives
+        return self._in_chunks(solve, theta)  # type: ignore[return-value]
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
         row = check_theta(theta, self.parameter_names, one_row=True)
         check_flag(follow, "follow")
-        self._warn_of_bounds(row)
+        if not self._is_quiet:
+            self._warn_of_bounds(row)
         return self._core.local_modes(row, follow=follow, basis=self._basis)
 
     def nominal_mac(self, shapes: Array) -> Array:
@@ -199,16 +185,18 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
 
         Returns
         -------
-        stiffness : scipy.sparse.csc_array of shape (n_dof, n_dof)
-            In N/m.
-        mass : scipy.sparse.csc_array of shape (n_dof, n_dof)
-            In kg.
+        tuple of scipy.sparse.csc_array of shape (n_dof, n_dof)
+            Stiffness in N/m and mass in kg.
         """
-        row = check_theta(theta, self.parameter_names, one_row=True)
-        core = self._full_core
-        return scipy.sparse.csc_array(core.stiffness.assemble(row)[0]), scipy.sparse.csc_array(
-            core.mass.assemble(row)[0]
-        )
+        row, core = check_theta(theta, self.parameter_names, one_row=True), self._full_core
+        stiffness, mass = (scipy.sparse.csc_array(terms.assemble(row)[0]) for terms in (core.stiffness, core.mass))
+        return stiffness, mass
+
+    def damaged(self, damage: Mapping[str, float]) -> Self:
+        factors = np.ones(len(self._full_core.stiffness.factors))
+        for group, severity in check_severities(damage, self._groups).items():
+            factors[list(self._groups[group])] *= 1 - severity
+        return self._changed(lambda core: core.with_scaled_stiffness(factors))
 
     def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.
@@ -232,10 +220,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         Examples
         --------
         >>> from skthermo.datasets import make_truss
-        >>> truss = make_truss()
-        >>> truss.frequencies([1.0, 1.0, 1.0, 1.0])[0, :4].round(1)
-        array([ 7.5, 27.5, 37.8, 62.6])
-        >>> truss.with_modes([0, 1, 3, 2]).frequencies([1.0, 1.0, 1.0, 1.0]).round(1)
+        >>> make_truss().with_modes([0, 1, 3, 2]).frequencies([1.0, 1.0, 1.0, 1.0]).round(1)
         array([[ 7.5, 27.5, 62.6, 37.8]])
         """
         ranks = check_modes(modes, self._full_core.available)
@@ -258,13 +243,6 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         ------
         ValueError
             If a name is unknown or repeated, or ``names`` is empty.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss
-        >>> truss = make_truss().with_parameters(["top", "bottom"])
-        >>> truss.parameter_names
-        ('top', 'bottom')
         """
         kept = check_different(names)
         unknown = [name for name in kept if name not in self._parameter_names]
@@ -314,10 +292,8 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         scaled = np.zeros((len(self._full_core.stiffness.factors), len(chosen)), dtype=np.int64)
         for column, group in enumerate(chosen):
             scaled[list(self.groups[group]), column] = 1
-        range_of = real_array(severities, "severities")
-        if range_of.shape != (2,) or not -np.inf < range_of[0] < range_of[1] < 1:
-            raise ValueError(f"severities is {severities!r:.200}; expected the lowest and the highest, below 1")
-        bounds = np.tile([1 - range_of[1], 1 - range_of[0]], (len(chosen), 1))
+        lowest, highest = _range_of(severities, "severities", -np.inf, 1)
+        bounds = np.tile([1 - highest, 1 - lowest], (len(chosen), 1))
         return self._changed(lambda core: core.with_group_factors(scaled), names, bounds)
 
     def with_added(self, stiffness: MatrixLike | None = None, mass: MatrixLike | None = None) -> Self:
@@ -338,17 +314,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         Raises
         ------
         ValueError
-            If a matrix has the wrong shape, is not symmetric, or holds values that are not finite, or more mass is
-            taken away than there is.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skthermo.datasets import make_truss
-        >>> truss = make_truss()
-        >>> heavier = truss.with_added(mass=np.full(truss.n_dof, 100.0))
-        >>> bool(heavier.frequencies([[1, 1, 1, 1]])[0, 0] < truss.frequencies([[1, 1, 1, 1]])[0, 0])
-        True
+            If a matrix is not symmetric and finite, or more mass is taken away than there is.
         """
         stiff = None if stiffness is None else read_matrix(stiffness, "added stiffness", self.n_dof)
         heavy = None if mass is None else read_mass(mass, "added mass", self.n_dof)
@@ -377,28 +343,21 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         Raises
         ------
         ValueError
-            If a mass has the wrong shape, is not symmetric, or holds values that are not finite, if the name of a
-            parameter is taken, or the amounts are no range above -1.
+            If a mass is not symmetric and finite, a parameter's name is taken, or the amounts are no range above -1.
 
         Examples
         --------
         >>> import numpy as np
         >>> from skthermo.datasets import make_truss
         >>> truss = make_truss()
-        >>> loaded = truss.with_mass_parameters({"asphalt": np.full(truss.n_dof, 100.0)})
-        >>> loaded.parameter_names
+        >>> truss.with_mass_parameters({"asphalt": np.full(truss.n_dof, 100.0)}).parameter_names
         ('bottom', 'top', 'diagonal', 'vertical', '1 + asphalt')
-        >>> loaded.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 1.5]])[:, 0].round(3)
-        array([7.485, 7.269])
         """
         if not isinstance(masses, Mapping) or not masses:
             raise ValueError(f"masses is {masses!r:.200}; expected a mapping of name to mass in kg")
         names = check_different([*self.parameter_names, *(f"1 + {name}" for name in masses)])
         matrices = [read_mass(mass, f"mass {name!r}", self.n_dof) for name, mass in masses.items()]
-        range_of = real_array(amounts, "amounts")
-        if range_of.shape != (2,) or not -1 < range_of[0] < range_of[1] < np.inf:
-            raise ValueError(f"amounts is {amounts!r:.200}; expected the smallest and the largest, above -1")
-        bounds = np.tile(1 + range_of, (len(masses), 1))
+        bounds = np.tile(1 + _range_of(amounts, "amounts", -1, np.inf), (len(masses), 1))
         return self._changed(lambda core: core.with_mass_factors(matrices), names, bounds)
 
     def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
@@ -427,14 +386,10 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         --------
         Two springs in a row, of which one parameter is the stiffness of both:
 
-        >>> import numpy as np
         >>> from skthermo.fem import AffineModel
-        >>> model = AffineModel({("k",): [[800.0, -400.0], [-400.0, 400.0]]}, mass=np.eye(2), n_modes=2)
-        >>> divided = model.with_parts({"first": {0: [[400.0, 0.0], [0.0, 0.0]]}})
-        >>> divided.groups
+        >>> model = AffineModel({("k",): [[800.0, -400.0], [-400.0, 400.0]]}, mass=[[1.0, 0.0], [0.0, 1.0]], n_modes=2)
+        >>> model.with_parts({"first": {0: [[400.0, 0.0], [0.0, 0.0]]}}).groups
         {'k': (0, 1), 'first': (1,)}
-        >>> divided.damaged({"first": 0.5}).frequencies([[1.0]]).round(3)
-        array([[1.49 , 4.807]])
         """
         n_terms = len(self._full_core.stiffness.factors)
         groups = dict(self._groups)
@@ -460,29 +415,55 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         return self._twin(_is_quiet=True)
 
     def warn_of(self, theta: Array, frequencies: NDArray) -> None:
-        self._warn_of_bounds(theta)
         if not self._is_quiet:
+            self._warn_of_bounds(theta)
             warn_of_failures(theta, frequencies)
 
     def __sklearn_clone__(self) -> Self:
         return self
 
     @abstractmethod
-    def damaged(self, damage: Mapping[str, float]) -> Self:
-        """A new model with less stiffness (or more) in some groups."""
-
-    @abstractmethod
     def rescaled(self, theta: ArrayLike) -> Self:
-        """A new model whose nominal state, theta = 1, is this model at a given theta."""
+        """A new model whose nominal state, theta = 1, is this model at a given theta.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_parameters,) or (1, n_parameters)
+            Multipliers that become the new nominal values.
+
+        Returns
+        -------
+        AffineModel or ReducedModel
+            Its columns are the modes of this model's nominal state. A reduced model keeps its basis and its box, whose
+            bounds are now relative to theta.
+
+        Raises
+        ------
+        ValueError
+            If theta has the wrong width or more than one row, or a value is not finite and positive.
+        """
 
     @abstractmethod
-    def _changed(
-        self,
-        change: Callable[[AffineCore], AffineCore],
-        names: tuple[str, ...] | None = None,
-        bounds: Array | None = None,
-        groups: dict[str, tuple[int, ...]] | None = None,
-    ) -> Self:
+    def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> AffineBase:
+        """A small model that gives the full model's frequencies within a box, to a stated relative error.
+
+        Parameters
+        ----------
+        bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+            Box of multipliers: a half-width, or lowest and highest of each parameter.
+        tol : float, default=1e-5
+            Largest relative error of a frequency.
+        random_state : int, RandomState or None, default=None
+            Seed of the points at which the basis is built and checked.
+
+        Returns
+        -------
+        ReducedModel
+            With this model's interface.
+        """
+
+    @abstractmethod
+    def _changed(self, change: Change, names: Names = None, bounds: Array | None = None, groups: Groups = None) -> Self:
         """A model like this one with a changed full core, these parameter names, bounds of the new ones, and groups."""
 
     @property
@@ -496,14 +477,8 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         vars(twin).update(changes)
         return twin
 
-    def _bounds_warning(self, theta: Array) -> str:
-        """Hook: ReducedModel warns outside its box."""
-        return ""
-
     def _warn_of_bounds(self, theta: Array) -> None:
-        message = "" if self._is_quiet else self._bounds_warning(theta)
-        if message:
-            warn_user(message, "outside the reduced box")
+        """Hook: a reduced model warns of theta outside its box."""
 
     def _in_chunks(self, solve: Callable[[Array], tuple[Array, ...]], theta: ArrayLike) -> tuple[Array, ...]:
         rows = check_theta(theta, self.parameter_names)
@@ -512,3 +487,13 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         results = tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
         self.warn_of(rows, results[0])
         return results
+
+
+def _range_of(values: tuple[float, float], what: str, above: float, below: float) -> Array:
+    """The lowest and the highest value that a reduced model covers."""
+    array = real_array(values, what)
+    if array.shape != (2,) or not above < array[0] < array[1] < below:
+        raise ValueError(
+            f"{what} is {values!r:.200}; expected the lowest and the highest, above {above}, below {below}"
+        )
+    return array

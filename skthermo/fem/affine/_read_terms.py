@@ -7,7 +7,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._estimators.arguments import as_mapping, integer_row
-from skthermo._tables.arrays import Matrix, MatrixLike, is_real, positive_integer, real_array
+from skthermo._tables.arrays import Matrix, MatrixLike, is_real, real_array
 
 Key = tuple[str, ...]
 
@@ -148,11 +148,6 @@ def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]
                 f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
             )
     return damage
-
-
-def check_n_modes(n_modes: int) -> int:
-    """A number of modes as an integer of Python."""
-    return positive_integer(n_modes, "n_modes")
 
 
 def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from skthermo._estimators.arguments import check_bounds, check_theta
+from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, Bounds, RandomState
-from skthermo.fem.affine._base import AffineBase
+from skthermo.exceptions import ModelWarning
+from skthermo.fem.affine._base import AffineBase, Change, Groups, Names
 from skthermo.fem.affine._basis import Basis, grow_basis
 from skthermo.fem.affine._core import AffineCore
 
@@ -85,14 +86,7 @@ class ReducedModel(AffineBase):
 
     _basis: Array
 
-    def __init__(
-        self,
-        full: AffineBase,
-        bounds: Bounds = 0.3,
-        *,
-        tol: float = 1e-5,
-        random_state: RandomState = None,
-    ):
+    def __init__(self, full: AffineBase, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None):
         if not isinstance(full, AffineBase):
             raise ValueError(f"full is {full!r:.200}; expected an AffineModel, or a ReducedModel")
         if not isinstance(tol, int | float | np.floating) or not 0 < tol < 1:
@@ -113,53 +107,7 @@ class ReducedModel(AffineBase):
         """Number of basis vectors."""
         return self._core.stiffness.n_dof
 
-    def certified(self, theta: ArrayLike) -> NDArray[np.bool_]:
-        """Rows whose modes are found by iteration from the nominal modes, and certified to be the lowest.
-
-        The other rows, and all rows of a small basis or of a mass that varies, are solved by LAPACK, which takes about
-        five times as long. The results are the same within a hundredth of ``tol``.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
-
-        Returns
-        -------
-        ndarray of bool of shape (n_samples,)
-            True where the iteration is certified.
-        """
-        rows = check_theta(theta, self.parameter_names)
-        return self._core.certified(rows)
-
-    def damaged(self, damage: Mapping[str, float]) -> Self:
-        """A new model with less stiffness (or more) in some groups, with a basis checked for the damage.
-
-        Parameters
-        ----------
-        damage : mapping of str to float
-            Group -> severity s, which multiplies the group's stiffness by 1 - s.
-
-        Returns
-        -------
-        ReducedModel
-            Checked against the damaged full model, to the same tolerance.
-        """
-        return self._regrown(self._full.damaged(damage), self._bounds)
-
     def rescaled(self, theta: ArrayLike) -> Self:
-        """A new model on the same basis whose nominal state, theta = 1, is this model at a given theta.
-
-        Parameters
-        ----------
-        theta : array-like of shape (n_parameters,) or (1, n_parameters)
-            Multipliers that become the new nominal values.
-
-        Returns
-        -------
-        ReducedModel
-            For the same box; its bounds are now relative to theta.
-        """
         row = check_theta(theta, self.parameter_names, one_row=True)
         full = self._full.rescaled(row)
         return self._twin(
@@ -171,22 +119,6 @@ class ReducedModel(AffineBase):
         )
 
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
-        """The full model, reduced for another box.
-
-        Parameters
-        ----------
-        bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-            Box of multipliers: a half-width, or lowest and highest of each parameter.
-        tol : float, default=1e-5
-            Largest relative error of a frequency.
-        random_state : int, RandomState or None, default=None
-            Seed of the points at which the basis is made and checked.
-
-        Returns
-        -------
-        ReducedModel
-            Of the same full model.
-        """
         return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
 
     def __repr__(self) -> str:
@@ -196,13 +128,7 @@ class ReducedModel(AffineBase):
     def _full_core(self) -> AffineCore:
         return self._full._core
 
-    def _changed(
-        self,
-        change: Callable[[AffineCore], AffineCore],
-        names: tuple[str, ...] | None = None,
-        bounds: Array | None = None,
-        groups: dict[str, tuple[int, ...]] | None = None,
-    ) -> Self:
+    def _changed(self, change: Change, names: Names = None, bounds: Array | None = None, groups: Groups = None) -> Self:
         full = self._full._changed(change, names, groups=groups)
         known = dict(zip(self._parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
@@ -219,12 +145,13 @@ class ReducedModel(AffineBase):
         self._core, self._basis = basis.core, basis.vectors
         self.error_, self.check_points_, self.snapshot_points_ = basis.error, basis.check_points, basis.snapshot_points
 
-    def _bounds_warning(self, theta: Array) -> str:
+    def _warn_of_bounds(self, theta: Array) -> None:
         lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
         outside = ((theta < lowest) | (theta > highest)).any(axis=1)
-        if not outside.any():
-            return ""
-        return (
-            f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
-            f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}"
-        )
+        if outside.any():
+            warn_user(
+                f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
+                f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
+                ModelWarning,
+                "outside the reduced box",
+            )

@@ -86,8 +86,7 @@ class Structure:
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
-        self._groups = {group: _read_group(group, names) for group, names in (groups or {}).items()}
-        self._check_groups()
+        self._groups = {group: self._read_group(group, names) for group, names in (groups or {}).items()}
         self.dofs = self._free_dofs(supports)
         self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
 
@@ -195,22 +194,19 @@ class Structure:
         Raises
         ------
         ValueError
-            If the model was not assembled from this structure, or is divided already, a group or member is unknown, a
-            member is in two parts, or a name is taken.
+            If the model is of another structure or divided already, a group or member is unknown, a member is in two
+            parts, or a name is taken.
 
         Examples
         --------
         >>> from skthermo.fem import Bar, Structure
         >>> steel = dict(E=210e9, A=0.01, density=7850.0)
+        >>> bars = {"west": Bar("left", "apex", **steel), "east": Bar("apex", "right", **steel)}
         >>> nodes = {"left": (0, 0), "right": (6, 0), "apex": (3, 2)}
-        >>> ends = {"west": ("left", "apex"), "east": ("apex", "right"), "tie": ("left", "right")}
-        >>> bars = {name: Bar(*pair, **steel) for name, pair in ends.items()}
-        >>> supports = {"left": "xy", "right": "y"}
-        >>> structure = Structure(nodes, bars, supports, {"rafters": ["west", "east"], "tie": ["tie"]})
-        >>> model = structure.assemble(["rafters", "tie"], n_modes=2)
-        >>> divided = structure.divide(model, {"rafters": {"western rafter": ["west"]}})
-        >>> divided.damaged({"western rafter": 0.2}).frequencies([[1.0, 1.0]]).round(2)
-        array([[129.28, 227.74]])
+        >>> structure = Structure(nodes, bars, {"left": "xy", "right": "xy"}, {"rafters": ["west", "east"]})
+        >>> divided = structure.divide(structure.assemble("rafters", n_modes=2), {"rafters": {"western": ["west"]}})
+        >>> divided.groups
+        {'rafters': (0, 1), 'western': (1,)}
         """
         if not getattr(model, "contents", ()):
             raise ValueError(
@@ -273,16 +269,10 @@ class Structure:
 
     def _read_bindings(self, targets, what: str) -> dict[str, Target]:
         """Property, group and matrices of every parameter or damage group."""
-        if isinstance(targets, str):
-            targets = [targets]
         if not isinstance(targets, Mapping):
-            if not isinstance(targets, Iterable) or not all(isinstance(target, str) for target in targets):
-                raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
-            names = list(targets)
-            if not names:
-                raise ValueError(f"{what}s is {targets!r}; expected names of groups, or a mapping")
-            if len(set(names)) < len(names):
-                raise ValueError(f"{what}s are {names}; expected each group once")
+            names = [targets] if isinstance(targets, str) else list(targets) if isinstance(targets, Iterable) else []
+            if not names or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+                raise ValueError(f"{what}s is {targets!r}; expected names of groups, each once, or a mapping")
             targets = {group: group for group in names}
         bindings = {}
         for name, target in targets.items():
@@ -308,11 +298,14 @@ class Structure:
             raise ValueError(f"{what}: unknown group {group!r}; expected one of {sorted(self._groups)}")
         return group
 
-    def _check_groups(self) -> None:
-        for group, members in self._groups.items():
-            unknown = [member for member in members if member not in self._members]
-            if unknown or not members:
-                raise ValueError(f"group {group!r} holds {unknown or 'no member'}; expected names of members")
+    def _read_group(self, group: str, names: Any) -> frozenset:
+        if not isinstance(names, Collection):
+            raise ValueError(f"group {group!r} is {names!r}; expected names of members")
+        members = frozenset([names] if isinstance(names, str) else names)
+        unknown = members - self._members.keys()
+        if unknown or not members:
+            raise ValueError(f"group {group!r} holds {list(unknown) or 'no member'}; expected names of members")
+        return members
 
     def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
         directions = TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
@@ -347,12 +340,6 @@ class Structure:
             f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
             f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
         )
-
-
-def _read_group(group: str, names: Any) -> frozenset:
-    if not isinstance(names, Collection):
-        raise ValueError(f"group {group!r} is {names!r}; expected names of members")
-    return frozenset([names] if isinstance(names, str) else names)
 
 
 def _read_directions(along: Any, node: Hashable) -> list[str]:

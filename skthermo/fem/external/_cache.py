@@ -2,7 +2,6 @@
 
 import json
 import sqlite3
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from os import PathLike
@@ -18,19 +17,8 @@ SECONDS = 600  # a process waits so long while others write
 class SampleCache:
     """An SQLite database of frequencies by the bytes of their theta, to which several processes may add.
 
-    Parameters
-    ----------
-    path : str or path-like
-        The file. The file and its folder are created when the first sample is solved.
-    parameter_names : sequence of str
-        Columns of theta.
-    n_modes : int
-        Columns of the frequencies.
-
-    Raises
-    ------
-    ValueError
-        If the path is a folder, or its file belongs to other parameters, another number of modes or something else.
+    The file and its folder are created when the first sample is solved. A folder, or a file that belongs to other
+    parameters, another number of modes or something else, is an error.
     """
 
     def __init__(self, path: str | PathLike, parameter_names: Sequence[str], n_modes: int):
@@ -39,7 +27,7 @@ class SampleCache:
         self.read([])
 
     def read(self, keys: Sequence[bytes]) -> dict[bytes, Array]:
-        """Frequencies of the keys that are known; a record that was damaged on the disk is not."""
+        """Frequencies of the keys that are known."""
         if self.path.is_dir():
             raise ValueError(f"{self.path}: the cache is a folder; expected a file, such as {self.path / 'solved'}")
         if not self.path.exists():
@@ -47,9 +35,10 @@ class SampleCache:
         with self._opened() as database:
             if not self._is_begun(database):
                 return {}
-            query = "SELECT frequencies, checksum FROM solved WHERE theta = ?"
-            found = ((key, row) for key in keys if (row := database.execute(query, [key]).fetchone()))
-            return {key: np.frombuffer(f, "<f8") for key, (f, checksum) in found if checksum == zlib.crc32(key + f)}
+            found = (
+                (k, database.execute("SELECT frequencies FROM solved WHERE theta = ?", [k]).fetchone()) for k in keys
+            )
+            return {key: np.frombuffer(row[0], "<f8") for key, row in found if row}
 
     def add(self, solved: Mapping[bytes, Array]) -> None:
         """Write frequencies by their key; other processes wait meanwhile."""
@@ -58,12 +47,10 @@ class SampleCache:
             database.execute("BEGIN IMMEDIATE")
             if not self._is_begun(database):
                 database.execute("CREATE TABLE about (columns TEXT)")
-                columns = "theta BLOB PRIMARY KEY, frequencies BLOB, checksum INTEGER"
-                database.execute(f"CREATE TABLE solved ({columns}) WITHOUT ROWID")
+                database.execute("CREATE TABLE solved (theta BLOB PRIMARY KEY, frequencies BLOB) WITHOUT ROWID")
                 database.execute("INSERT INTO about VALUES (?)", [json.dumps(self._describes)])
-            records = ((key, frequencies.astype("<f8").tobytes()) for key, frequencies in solved.items())
-            rows = ((key, f, zlib.crc32(key + f)) for key, f in records)
-            database.executemany("INSERT OR REPLACE INTO solved VALUES (?, ?, ?)", rows)
+            rows = ((key, frequencies.astype("<f8").tobytes()) for key, frequencies in solved.items())
+            database.executemany("INSERT OR REPLACE INTO solved VALUES (?, ?)", rows)
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:

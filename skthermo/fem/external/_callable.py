@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from skthermo._estimators.arguments import check_flag, check_theta
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, real_array
+from skthermo._tables.arrays import Array, positive_integer, real_array
+from skthermo.exceptions import ModelWarning
 from skthermo.fem._theta import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
-from skthermo.fem.affine import check_different, check_n_modes
+from skthermo.fem.affine import check_different
 from skthermo.fem.external._cache import SampleCache
 
 ROWS_PER_TASK = 32
@@ -85,7 +86,7 @@ class CallableModel:
             raise ValueError(f"function is {function!r}; expected a callable")
         self.function = function
         self.parameter_names = check_different(parameter_names)
-        self.n_modes = check_n_modes(n_modes)
+        self.n_modes = positive_integer(n_modes, "n_modes")
         self.vectorized = check_flag(vectorized, "vectorized")
         self._is_quiet = False
         self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
@@ -111,22 +112,16 @@ class CallableModel:
         Returns
         -------
         ndarray of shape (n_samples, n_modes)
-            In Hz.
+            In Hz. Rows at which the function fails are NaN, with a warning, and are not cached. It fails if it raises
+            an error or returns a frequency that is neither NaN nor finite and positive.
 
         Raises
         ------
         ValueError
-            If theta has the wrong width or values, the function returns another shape or values that are not real
-            numbers, or the cache belongs to other parameters.
+            If the function returns another shape or values that are not real numbers.
         RuntimeError
-            If the function fails at all of several rows (cached rows count as solved), or, with ``vectorized=True``,
-            raises an error for several rows at once. A row fails if the function raises an error or returns a
-            frequency that is neither NaN nor finite and positive. The error names the first such theta.
-
-        Warns
-        -----
-        UserWarning
-            If the function fails at some rows, which become NaN and are not cached.
+            If the function fails at all of several rows (cached rows count as solved) or, with ``vectorized=True``,
+            raises an error for several rows at once. It names the first such theta.
         """
         rows = check_theta(theta, self.parameter_names)
         keys = [row.tobytes() for row in rows.astype("<f8")]
@@ -156,7 +151,7 @@ class CallableModel:
             if len(failures) > 1 and everywhere and not self._is_quiet:
                 raise first
             if not self._is_quiet:
-                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", "failing program")
+                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", ModelWarning, "failing program")
             solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
         found = [solved[key] if key in solved else known[key] for key in keys]
         return np.array(found).reshape(len(rows), self.n_modes)
@@ -192,7 +187,7 @@ class CallableModel:
         Returns
         -------
         CallableModel
-            For searches that may pass through rows at which the function fails.
+            For searches.
         """
         twin = copy.copy(self)
         twin._is_quiet = True
@@ -203,10 +198,8 @@ class CallableModel:
 
         Parameters
         ----------
-        theta : ndarray of shape (n_samples, n_parameters)
-            Multipliers.
-        frequencies : ndarray of shape (n_samples, n_modes)
-            The solution for each row.
+        theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
+            A table and its solution.
         """
         if not self._is_quiet:
             warn_of_failures(theta, frequencies)

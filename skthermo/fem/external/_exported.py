@@ -16,6 +16,7 @@ from skthermo._estimators.arguments import check_names, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_named_matrices
 from skthermo._tables.arrays import Matrix
+from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
 
 Key = tuple[str, ...]
@@ -82,13 +83,6 @@ def load_affine(
         Names the file and the variable that is damaged, missing, of another size than the mass, or not
         finite; or names the total if it holds less stiffness than the terms summed.
 
-    Warns
-    -----
-    UserWarning
-        If a total that was found by its name is more than the sum of the terms, so that the rest becomes a constant
-        part of the stiffness; if, without ``stiffness``, a matrix of another name equals the sum of all others and is
-        therefore taken as the total; or if a term is proportional to the mass or to the sum of the other terms.
-
     See Also
     --------
     AffineModel : From matrices in memory.
@@ -97,16 +91,16 @@ def load_affine(
 
     Notes
     -----
-    The role of each matrix is decided by these rules alone:
+    The role of each matrix is decided by these rules alone. Roles that were found and are doubtful, such as a total
+    that is more than the sum of the terms, or a term proportional to the mass, give a warning.
 
     - Text, structs, numbers, vectors and matrices that are not square are ignored. A square matrix of another
       size than the mass, not finite, skew-symmetric (gyroscopic), or of the mass's size and complex, is an error
       unless ``stiffness`` names the terms; an imaginary part of zeros is dropped. If ``stiffness`` names the terms,
       only the mass, the terms and the total are read from a folder.
     - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
-    - Files are read in a process of their own, which takes about half a second, so that a damaged one can do no harm.
-      The process may take a minute, and a second more for each MB; where the platform can limit memory, it may take ten
-      times the size of the files, and 256 MB in any case.
+    - Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
+      more for each MB, and ten times the memory of the files, or 256 MB.
     - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If the total is
       more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal, that is an
       error. If ``stiffness`` names only some of the terms in a file with a total, these terms vary and the others are
@@ -138,15 +132,17 @@ def load_affine(
     if mass is None:
         raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
     mass_matrix = _find(matrices, mass, file)
+    shape = mass_matrix.shape
     says_total = total is not None
     if total is None and stiffness is not None:
         unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
-        total = _usual([name for name in unnamed if _fits(matrices[name], mass_matrix)], TOTAL_NAMES, "total", file)
+        fitting = [name for name in unnamed if matrices[name].shape == shape and _is_finite(matrices[name])]
+        total = _usual(fitting, TOTAL_NAMES, "total", file)
     if stiffness is None:
         others = {
-            name: _find(matrices, name, file, mass_matrix.shape)
+            name: _find(matrices, name, file, shape)
             for name, matrix in matrices.items()
-            if name != mass and (name in square or _is_complex(matrix, mass_matrix.shape))
+            if name != mass and (name in square or (np.iscomplexobj(matrix) and matrix.shape == shape))
         }
         if total is None and len(others) > 1:
             total = _usual(others, TOTAL_NAMES, "total", file)
@@ -154,10 +150,10 @@ def load_affine(
     keys = _keys(stiffness)
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
-    terms = {name: _find(matrices, name, file, mass_matrix.shape) for name in keys}
+    terms = {name: _find(matrices, name, file, shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
     if total:
-        rest = _rest(_find(matrices, total, file, mass_matrix.shape), terms, f"{file}: {total!r}", says_total)
+        rest = _rest(_find(matrices, total, file, shape), terms, f"{file}: {total!r}", says_total)
         pairs += [] if rest is None else [((), rest)]
     try:
         return AffineModel(
@@ -172,14 +168,6 @@ def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
     real = {name: matrix for name, matrix in matrices.items() if matrix is not None and not np.iscomplexobj(matrix)}
     sizes = {name: m.shape[0] for name, m in real.items() if m.shape[0] == m.shape[1] > 0}
     return [name for name, size in sizes.items() if size > 1] or list(sizes)
-
-
-def _is_complex(matrix: Matrix | None, shape: tuple[int, ...]) -> bool:
-    return matrix is not None and np.iscomplexobj(matrix) and matrix.shape == shape
-
-
-def _fits(matrix: Matrix | None, mass: Matrix) -> bool:
-    return matrix is not None and matrix.shape == mass.shape and _is_finite(matrix)
 
 
 def _is_finite(matrix: Matrix) -> bool:
@@ -217,6 +205,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
             warn_user(
                 f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
                 f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
+                ModelWarning,
                 "doubtful matrices",
             )
     if len(springs) > 1 and has_pattern:
@@ -227,6 +216,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
     for name, what in similar.items():
         warn_user(
             f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
+            ModelWarning,
             "doubtful matrices",
         )
     return list(found)
@@ -301,6 +291,7 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
         warn_user(
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
             "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
+            ModelWarning,
             "doubtful matrices",
         )
     return rest

@@ -57,9 +57,9 @@ def probe(
     Raises
     ------
     ValueError
-        If the program is not affine; the error names the parameter, by how much a matrix differs, and the
-        power or product that it might be (found with at most 2 n_parameters more calls). If a parameter
-        changes neither matrix, or a matrix has another shape than at theta = 1.
+        If the program is not affine; the error names the parameter, or the two whose product it may hold, and by how
+        much a matrix differs (found with at most 2 n_parameters more calls). If a parameter changes neither matrix, or
+        a matrix has another shape than at theta = 1.
     RuntimeError
         If the program fails; the error says at which theta.
 

@@ -34,8 +34,7 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
         If the path does not exist.
     ValueError
         Names the file, if a line does not hold three numbers, rows or columns are not positive integers, there are
-        entries on both sides of the diagonal, or the matrix would need more than ten times the memory of the file (and
-        more than 256 MB).
+        entries on both sides of the diagonal, or the matrix would need too much memory (see `load_affine`).
 
     See Also
     --------

@@ -49,13 +49,8 @@ class LocalModes:
     Examples
     --------
     >>> from skthermo.datasets import make_truss
-    >>> modes = make_truss().local_modes([1.0, 1.0, 1.0, 1.0])
-    >>> modes.frequencies[:6].round(2)
+    >>> make_truss().local_modes([1.0, 1.0, 1.0, 1.0]).frequencies[:6].round(2)
     array([ 7.48, 27.5 , 37.84, 62.61, 67.17, 95.41])
-    >>> modes.ranks
-    array([0, 1, 2, 3, 4, 5])
-    >>> modes.shapes([0, 3]).shape
-    (2, 10)
     """
 
     def __init__(
@@ -95,11 +90,6 @@ class LocalModes:
         -------
         ndarray of shape (n_dofs, n_candidates)
             Of unit modal mass.
-
-        Raises
-        ------
-        ValueError
-            If these are not different degrees of freedom of the model.
         """
         return self._at_dofs(check_dofs(dofs, self._n_dof), self._shapes)
 
@@ -119,11 +109,6 @@ class LocalModes:
             In Hz.
         d_shapes : ndarray of shape (n_dofs, n_columns, n_parameters)
             Derivatives of the shapes with unit modal mass.
-
-        Raises
-        ------
-        ValueError
-            If these are none of the modes, or not different degrees of freedom of the model.
 
         Notes
         -----
@@ -193,13 +178,11 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     Raises
     ------
     ValueError
-        If the model has no method ``local_modes``, theta is not one row of positive multipliers, or ``dofs`` are not
-        different degrees of freedom of the model.
+        If the model has no method ``local_modes``, or theta or ``dofs`` are not valid.
 
     Notes
     -----
-    The derivative solves (K - lambda M) d phi = -(dK - lambda dM - d lambda M) phi with phi' M d phi =
-    -1/2 phi' dM phi: by superposition of the computed modes, and by conjugate gradients for what these do not span.
+    `LocalModes.derivatives` explains the method.
 
     References
     ----------

@@ -38,16 +38,11 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
         If ``model`` is not an FE model or returns another shape, or theta has the wrong width, or a value that is
         neither NaN nor finite and positive.
 
-    Warns
-    -----
-    UserWarning
-        Once, if rows have no solution.
-
     Notes
     -----
-    The chunks do not depend on ``n_jobs``, so that results are the same to the last bit. A chunk has
-    ``rows_per_chunk`` rows if the model states that number. With one job, a model that is ``thread_safe`` runs on as
-    many threads as BLAS may use.
+    Rows without a solution give one warning. The chunks, of ``model.rows_per_chunk`` rows where it has that attribute,
+    do not depend on ``n_jobs``, so that results are the same to the last bit. With one job, a model that is
+    ``thread_safe`` runs on as many threads as BLAS may use.
 
     Examples
     --------
@@ -87,13 +82,8 @@ def evaluate_modes(
     Raises
     ------
     ValueError
-        If the model has no method ``modes``, theta has the wrong width or a value that is neither NaN nor finite and
-        positive, or ``dofs`` are not different degrees of freedom of the model.
-
-    Warns
-    -----
-    UserWarning
-        Once, if rows have no solution.
+        If the model has no method ``modes``, theta is refused as by `evaluate`, or ``dofs`` are not different degrees
+        of freedom of the model.
 
     Examples
     --------

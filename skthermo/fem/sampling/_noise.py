@@ -11,11 +11,7 @@ from skthermo._tables.arrays import RandomState, as_random_state, real_array
 
 
 def add_noise(
-    frequencies: ArrayLike,
-    noise: ArrayLike,
-    *,
-    correlation: float = 0.0,
-    random_state: RandomState = None,
+    frequencies: ArrayLike, noise: ArrayLike, *, correlation: float = 0.0, random_state: RandomState = None
 ) -> NDArray[np.float64]:
     """Frequencies times (1 + noise * standard Gaussian).
 
@@ -49,10 +45,6 @@ def add_noise(
     >>> noisy = add_noise(np.full((10_000, 2), 4.0), [0.0, 0.01], random_state=0)
     >>> noisy.std(axis=0).round(2)
     array([0.  , 0.04])
-    >>> lasting = add_noise(np.full((10_000, 1), 4.0), 0.01, correlation=0.9, random_state=0)[:, 0]
-    >>> np.corrcoef(lasting[1:], lasting[:-1]).round(1)
-    array([[1. , 0.9],
-           [0.9, 1. ]])
     """
     clean, names = real_array(frequencies, "frequencies"), getattr(frequencies, "columns", None)
     if np.isinf(clean).any():

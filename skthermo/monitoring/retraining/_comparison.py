@@ -43,7 +43,7 @@ class DetectorComparison:
     ) -> DetectorComparison:
         """On the overlap: false alarms, scatter, the smallest changes found, weather, and records of past events.
 
-        ``spread`` holds standard deviations of the frequencies, weather taken out, in Hz.
+        ``spread`` holds standard deviations of the responses, weather taken out, in their units.
         """
         blocks = blocks_of(overlap.index)
         rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
@@ -104,8 +104,9 @@ def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: lis
     blocks = blocks_of(records.index)
     found, start = np.full((len(targets), blocks.max() + 2), np.nan), active.ratio(records)
     for mode, target in enumerate(targets):
-        steps = spread[target] / records[target].mean() * np.array(STEPS)
-        ratios = [active.ratio(records.assign(**{target: records[target] * (1 - step)})) for step in steps[1:]]
+        lowered = (records.assign(**{target: records[target] - step * spread[target]}) for step in STEPS[1:])
+        steps = np.array(STEPS) * (spread[target] / (records[target].mean() if records[target].min() > 0 else 1.0))
+        ratios = [active.ratio(one) for one in lowered]
         curve = np.array([start, *ratios])
         found[mode, -1] = _crossing(steps, curve)
         for block in range(blocks.max() + 1):

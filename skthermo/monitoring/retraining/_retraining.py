@@ -49,8 +49,8 @@ class Retraining:
         above the threshold (share), median index over threshold, smallest change found (relative change of one mode by
         which half of the records come above the threshold; differences are of logarithms), records in unknown
         weather (share), and peaks of past events over the threshold. For a new baseline, by mode: ``change`` of the
-        level (relative), its ``standard_error``, ``n_records`` since, and the smallest change found, ``old`` and
-        ``new``.
+        level (relative; of responses that are not positive, in their unit), its ``standard_error``, ``n_records``
+        since, and the smallest change found, ``old`` and ``new``.
     excluded : DataFrame
         What did not train: ``start``, ``end`` (NaT: up to the last record), ``columns``, ``n_records`` and ``reason``.
     baseline : DataFrame or None
@@ -142,7 +142,7 @@ def retrained(
     new = _candidate(monitor, baseline, activated)
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
-    spread = free.residuals.std() * baseline[targets].mean()
+    spread = free.residuals.std() * free.scale
     found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
     reasons, notes = [f"clearly worse: {name}" for name in found.worse()], []
     clearest = changes.clearest
@@ -198,7 +198,7 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
     moved = level.prior(prior, own, monitor.random_state)
     baseline = pd.concat([moved, own])
     new = _candidate(monitor, baseline, activated)
-    spread = level.old.residuals.std() * prior[targets].mean()
+    spread = level.old.residuals.std() * level.old.scale
     found = [smallest_changes(one, one.trained, targets, spread)[:, -1] for one in (old, new)]
     table = level.table.assign(old=found[0], new=found[1])
     notes = [
@@ -310,7 +310,8 @@ class Harvest:
         masked = records.copy()
         told = faults if faults is not None else pd.DataFrame()
         for fault in told.itertuples():
-            if fault.kind == "disagree" or (are_put_back and fault.kind == "swapped"):  # nothing is left out
+            is_kept = fault.kind == "disagree" or (are_put_back and fault.kind == "swapped")
+            if is_kept or fault.column not in records:  # nothing is left out, or the sensor is a reference
                 continue
             inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
             masked.loc[inside, fault.column] = np.nan
@@ -373,10 +374,10 @@ class NewLevel:
         blocks = blocks_of(records.index)
         kept = _season_not_covered(records.index, new.index)[blocks]
         missed = self._missed(blocks.max() + 1, random_state)[blocks]
-        factors = (1 + self.table["change"].to_numpy()) / (1 + missed)
-        moved = records.copy()
-        targets = list(self.table.index)
-        moved[targets] = records[targets].to_numpy() * factors
+        change, is_relative = self.table["change"].to_numpy(), self.old.is_relative.to_numpy()
+        moved, targets = records.copy(), list(self.table.index)
+        values = records[targets].to_numpy()
+        moved[targets] = np.where(is_relative, values * (1 + change) / (1 + missed), values + change - missed)
         return moved[kept]
 
     def _missed(self, n_blocks: int, random_state: int | None) -> Array:

@@ -49,40 +49,51 @@ def block_mean(values: Array, blocks: NDArray[np.intp]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class WeatherFree:
-    """Relative residuals of a baseline's frequencies, each record predicted by others from its weather."""
+    """Residuals of a baseline's responses, each record predicted by others from its weather.
+
+    They are relative where a response is positive throughout, and in its own unit elsewhere.
+    """
 
     residuals: pd.DataFrame
     level: pd.Series
+    is_relative: pd.Series
     compensator: TemperatureCompensator | None
     block: pd.Timedelta
 
     @classmethod
     def of(cls, detector: BaseEstimator, records: pd.DataFrame, targets: list[Any]) -> WeatherFree:
         """By the regression within a detector, by broken lines if it has none, by the mean if there is no weather."""
-        level = records[targets].mean()
+        level, is_relative = records[targets].mean(), records[targets].min() > 0
         if len(records.columns) == len(targets):
-            return cls(records[targets] / level - 1, level, None, WEEK)
+            return cls((records[targets] - level) / level.where(is_relative, 1.0), level, is_relative, None, WEEK)
         within = [one for one in detector.get_params().values() if isinstance(one, TemperatureCompensator)]
         plain = clone(within[0]).set_params(whiten=None) if within else _broken_lines(targets)
         with without_warnings():
             left = np.asarray(plain.fit_transform(records))
         named = pd.DataFrame(left, records.index, list(plain.get_feature_names_out()))[targets]
         block = plain.block_ if isinstance(plain.block_, np.timedelta64) else WEEK
-        return cls(_relative(records[targets], named), level, plain, max(pd.Timedelta(block), WEEK))
+        rest = _relative(records[targets], named, is_relative)
+        return cls(rest, level, is_relative, plain, max(pd.Timedelta(block), WEEK))
+
+    @property
+    def scale(self) -> pd.Series:
+        """What residuals are multiples of, in units of the responses."""
+        return self.level.where(self.is_relative, 1.0)
 
     def of_new(self, records: pd.DataFrame) -> pd.DataFrame:
-        """Relative residuals of other records."""
+        """The same of other records."""
         targets = list(self.residuals.columns)
         if self.compensator is None:
-            return records[targets] / self.level - 1
+            return (records[targets] - self.level) / self.scale
         with without_warnings():
             left = np.asarray(self.compensator.transform(records))
         named = pd.DataFrame(left, records.index, list(self.compensator.get_feature_names_out()))
-        return _relative(records[targets], named[targets])
+        return _relative(records[targets], named[targets], self.is_relative)
 
 
-def _relative(measured: pd.DataFrame, residuals: pd.DataFrame) -> pd.DataFrame:
-    return residuals / (measured - residuals)
+def _relative(measured: pd.DataFrame, residuals: pd.DataFrame, is_relative: pd.Series) -> pd.DataFrame:
+    """Residuals, over predictions where they are relative."""
+    return residuals / np.where(is_relative, measured - residuals, 1.0)
 
 
 def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
@@ -93,14 +104,16 @@ def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
 class LevelShift:
     """A change of frequencies along a course in time, from 0 to 1, that weather does not explain.
 
-    ``change`` and ``standard_error`` are relative, by mode; ``size`` is the length of the change in standard deviations
-    of single records, ``p_value`` the probability of one as large if nothing has changed (NaN with too few weeks).
+    ``change`` and ``standard_error`` are those of `WeatherFree` by mode; ``size`` is the length of the change in
+    standard deviations of single records, ``p_value`` the probability of one as large if nothing has changed (NaN with
+    too few weeks).
     """
 
     what: str
     change: pd.Series
     standard_error: pd.Series
     scatter: pd.Series
+    is_relative: pd.Series
     size: float
     p_value: float
 
@@ -147,15 +160,16 @@ class LevelShift:
             pd.Series(one, free.residuals.columns)
             for one in (change, np.sqrt(np.diag(covariance)), np.sqrt(np.diag(scatter)))
         )
-        return cls(what, *of_mode, size, _p_value(change, covariance, n_independent))
+        return cls(what, *of_mode, free.is_relative, size, _p_value(change, covariance, n_independent))
 
     def sentence(self) -> str:
         """The change in words."""
         worst = (self.change / self.standard_error).abs().idxmax()
+        factor, unit = (100, " %") if self.is_relative[worst] else (1, " (its unit)")
         return (
-            f"{self.what}, weather apart, {worst} changes by {100 * self.change[worst]:+.2g} +- "
-            f"{100 * self.standard_error[worst]:.1g} %, all modes together by {self.size:.2g} standard deviations of a "
-            f"record (probability by chance {probability_text(self.p_value)})"
+            f"{self.what}, with the weather taken out, {worst} changes by {factor * self.change[worst]:+.2g} +- "
+            f"{factor * self.standard_error[worst]:.1g}{unit}, all modes together by {self.size:.2g} standard "
+            f"deviations of a record (probability by chance {probability_text(self.p_value)})"
         )
 
 

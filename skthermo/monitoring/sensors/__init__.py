@@ -1,5 +1,5 @@
-"""Faults of sensors in service, told from damage where the data can."""
+"""Faults of sensors in service, distinguished from damage where the data can."""
 
-from skthermo.monitoring.sensors._watch import SensorWatch, WatchState
+from skthermo.monitoring.sensors._watch import SensorWatch, Watched, WatchState
 
-__all__ = ["SensorWatch", "WatchState"]
+__all__ = ["SensorWatch", "WatchState", "Watched"]

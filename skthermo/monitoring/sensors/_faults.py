@@ -40,7 +40,7 @@ class SensorFaults:
     def none(cls) -> SensorFaults:
         """No fault."""
         whole, real = np.empty(0, dtype=np.int64), np.empty(0)
-        return cls(whole, whole, np.empty(0, dtype="<U8"), whole, whole, whole, real, real)
+        return cls(whole, whole, np.empty(0, dtype="<U11"), whole, whole, whole, real, real)
 
     def lasting(self, *kinds: str) -> list[int]:
         """Positions of the faults that last, of these kinds."""
@@ -80,31 +80,44 @@ class SensorFaults:
             changed[name][fault] = value
         return replace(self, **changed)
 
-    def table(self, names: Sequence[Hashable], zone: str) -> pd.DataFrame:
+    def notes(self, names: Sequence[Hashable]) -> list[str]:
+        """What is left out or put back in place for the faults that last."""
+        texts = []
+        for fault in self.lasting(*LEFT_OUT, "swapped"):
+            name, kind, since = names[self.column[fault]], self.kind[fault], pd.Timestamp(int(self.since[fault]))
+            if kind == "swapped":
+                texts.append(f"{name} and {names[self.other[fault]]} are exchanged and were put back in place")
+            else:
+                texts.append(f"{name} is left out ({kind} since {since:%Y-%m-%d})")
+        return texts
+
+    def table(self, names: Sequence[Hashable], zone: str, units: Sequence[str]) -> pd.DataFrame:
         """One row a fault, two where two columns are concerned."""
         rows = []
         for fault in range(len(self.column)):
             ours, other = int(self.column[fault]), int(self.other[fault])
             for column, partner in [(ours, other), (other, ours)][: 1 if other < 0 else 2]:
                 times = (int(part[fault]) for part in (self.since, self.detected, self.until))
-                rows.append([names[column], str(self.kind[fault]), *times, self._detail(fault, names, partner)])
+                rows.append(
+                    [names[column], str(self.kind[fault]), *times, self._detail(fault, names, partner, units[column])]
+                )
         table = pd.DataFrame(rows, columns=COLUMNS)
         for name in ("since", "detected", "until"):
             stamps = pd.DatetimeIndex(np.array(table[name].tolist(), dtype="datetime64[ns]"))
             table[name] = stamps if not zone else stamps.tz_localize("UTC").tz_convert(zone)
         return table
 
-    def _detail(self, fault: int, names: Sequence[Hashable], partner: int) -> str:
+    def _detail(self, fault: int, names: Sequence[Hashable], partner: int, unit: str) -> str:
         """What was seen, and what is done about it."""
         size, rate = self.size[fault], self.rate[fault]
         return {
             "dead": "has had no value for longer than gaps of the baseline",
-            "stuck": f"repeats {size:.6g}; left out",
-            "implausible": f"shows what cannot be, such as {size:.6g}; left out",
-            "offset": f"{size:+.1f} degrees beside what the other thermometers foretell; left out",
+            "stuck": f"repeats {f'{size:.6g} {unit}'.rstrip()}; left out",
+            "implausible": f"shows implausible values, such as {f'{size:.6g} {unit}'.rstrip()}; left out",
+            "offset": f"{size:+.1f} degrees beside what the other thermometers predict; left out",
             "drift": f"{rate * MONTH:+.2f} degrees a month, {size:+.1f} so far, beside what the other thermometers "
-            "foretell; left out",
-            "disagree": f"{abs(size):.1f} degrees between what it, {names[partner]!r} and any others foretell: which "
+            "predict; left out",
+            "disagree": f"{abs(size):.1f} degrees between what it, {names[partner]!r} and any others predict: which "
             "is wrong is not known, none is left out",
             "swapped": f"its values are in the column of {names[partner]!r}; put back in place",
         }[str(self.kind[fault])]

@@ -70,6 +70,7 @@ class Thermometers:
     lowest: Array
     highest: Array
     noises: tuple[ThermometerNoise, ...]
+    records: Gaussian
 
     @classmethod
     def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, per_year: float) -> Thermometers | None:
@@ -103,13 +104,17 @@ class Thermometers:
     ) -> Thermometers:
         """Usual weather and covariance from some records."""
         climate = UsualWeather.of(stamps, temperatures, *options)
-        bare = cls(climate, Gaussian(np.empty(0), np.empty((0, 0))), least, 0, np.empty(0), np.empty(0), ())
+        gaussian = Gaussian(np.empty(0), np.empty((0, 0)))
+        bare = cls(climate, gaussian, least, 0, np.empty(0), np.empty(0), (), gaussian)
         means = bare.daily_means(stamps, temperatures)
         found = Gaussian.of(means[~np.isnan(means).all(axis=1)])
         own = np.diag(JITTER * np.diag(found.covariance) + LEAST_DEVIATION**2)
         lowest, highest = np.fmin.reduce(means), np.fmax.reduce(means)
         gaussian = Gaussian(found.mean, found.covariance + own)
-        return cls(climate, gaussian, least, len(means), lowest, highest, ())
+        anomalies = climate.anomalies(stamps, temperatures)
+        together = Gaussian.of(anomalies[~np.isnan(anomalies).all(axis=1)])
+        together = Gaussian(together.mean, together.covariance + own)
+        return cls(climate, gaussian, least, len(means), lowest, highest, (), together)
 
     def daily_means(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
         """Mean anomaly of each day that has records, in order; NaN where a thermometer has few of them."""
@@ -121,6 +126,11 @@ class Thermometers:
             for table in (known.astype(float), np.where(known, anomalies, 0.0))
         )
         return np.where(counts >= max(self.least, 1.0), sums / np.maximum(counts, 1.0), np.nan)
+
+    def filled(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
+        """Temperatures whose gaps hold what the other thermometers of their record predict."""
+        usual = self.climate.inputs(stamps) @ self.climate.coefficients
+        return usual + self.records.completed(temperatures - usual)[0]
 
     def departures(self, means: Array, trusted: NDArray[np.bool_]) -> Array:
         """Values, deviations, errors and what lies beyond the baseline, of `Departures`, (4, n_days, n_thermometers).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from skthermo._tables.frames import columns_by_sensor, frame_like
 from skthermo._tables.times import DAY_NS
 from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
 from skthermo.monitoring.sensors._faults import DEPARTURES, SensorFaults
-from skthermo.monitoring.sensors._modes import CERTAIN, Modes
+from skthermo.monitoring.sensors._responses import CERTAIN, Responses
 from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
 from skthermo.preprocessing.checks import Plausible, equal_runs
 
@@ -25,12 +25,15 @@ CLEAR = 4.6  # logarithm of the odds that one thermometer is at fault, against e
 ENDED = 7.0  # logarithm of the odds that an offset or a drift has ended
 RECENT = 7  # days that may already be without a fault, or not tell yet which thermometer has it
 Counts = NDArray[np.int64]
-MISSING, REPEATED, ABSURD = range(3)
+MISSING, REPEATED, IMPLAUSIBLE = range(3)
 FEWEST = np.array([3, 5, 3])  # records of a run of each kind that may be a fault
 USUAL_RANK = 3  # the usual run is the longest but so many: faults of the baseline are no rule
 TIMES_LONGEST = (1.7, 4.0)  # times the longest run of the baseline that faults exceed
 TIMES_USUAL = (3.0, 4.0)  # times its usual run
-KINDS_OF_RUNS = {"implausible": ABSURD, "stuck": REPEATED, "dead": MISSING}
+KINDS_OF_RUNS = {"implausible": IMPLAUSIBLE, "stuck": REPEATED, "dead": MISSING}
+HELD = ("stuck", "implausible")  # faults of a response that may be a change of the structure
+RARER = 3.0  # times, a healthy thermometer is called faulty where a reference alone can say so
+REFERENCE = 2.0  # times `CLEAR`, the logarithm of the odds that a thermometer is at fault and not a reference
 
 
 @dataclass(frozen=True)
@@ -46,14 +49,14 @@ class Runs:
         """No run yet, after these last values."""
         return cls(last, np.zeros((3, len(last)), dtype=np.int64), np.zeros((3, len(last)), dtype=np.int64))
 
-    def after(self, stamps: Counts, values: Array, absurd: NDArray[np.bool_]) -> Runs:
+    def after(self, stamps: Counts, values: Array, implausible: NDArray[np.bool_]) -> Runs:
         """Runs after more records; those without any value tell nothing of a single column."""
         runs = self
-        for stamp, row, is_absurd in zip(stamps, values, absurd, strict=True):
-            runs = runs._next(stamp, row, is_absurd)
+        for stamp, row, is_implausible in zip(stamps, values, implausible, strict=True):
+            runs = runs._next(stamp, row, is_implausible)
         return runs
 
-    def _next(self, stamp: np.int64, row: Array, absurd: NDArray[np.bool_]) -> Runs:
+    def _next(self, stamp: np.int64, row: Array, implausible: NDArray[np.bool_]) -> Runs:
         """Runs after one more record."""
         seen = ~np.isnan(row)
         if not seen.any():
@@ -63,11 +66,15 @@ class Runs:
             [
                 np.where(seen | ~begun, 0, self.counts[MISSING] + 1),
                 np.where(seen, np.where(row == self.last, self.counts[REPEATED] + 1, 1), self.counts[REPEATED]),
-                np.where(seen, np.where(absurd, self.counts[ABSURD] + 1, 0), self.counts[ABSURD]),
+                self.implausible(seen, implausible),
             ]
         )
         fresh = (counts == 1) & ((self.counts != 1) | np.array([~seen, seen, seen]))
         return Runs(np.where(seen, row, self.last), counts, np.where(fresh, stamp, self.since))
+
+    def implausible(self, seen: NDArray[np.bool_], implausible: NDArray[np.bool_]) -> Counts:
+        """Length of the run of implausible values of each column after one more record."""
+        return np.where(seen, np.where(implausible, self.counts[IMPLAUSIBLE] + 1, 0), self.counts[IMPLAUSIBLE])
 
 
 @dataclass(frozen=True)
@@ -113,52 +120,85 @@ class WatchState:
 
 
 @dataclass(frozen=True)
-class SensorWatch:
-    """Watches thermometers and modes in service, and tells faults of sensors from damage where the data can.
+class Watched:
+    """Records without what sensors at fault show, and what became of their values.
 
-    Damage moves no thermometer: one that departs from what the others foretell is at fault, unless most depart at once,
-    as in weather that the baseline does not have. A mode that moves may be damaged: it is left out only where no damage
-    explains what it shows.
+    ``held`` are responses that were set aside although the structure may have moved them, (n_records, n_responses), and
+    ``opens`` how many of them have been for long enough for an event (NaN: for less). ``notes`` say of each record what
+    was left out, ``n_left_out`` how many of its values.
+    """
+
+    T: pd.DataFrame
+    F: pd.DataFrame
+    held: NDArray[np.bool_]
+    opens: Array
+    notes: list[str]
+    n_left_out: Counts
+
+
+@dataclass(frozen=True)
+class SensorWatch:
+    """Watches thermometers and responses in service, and distinguishes faults of sensors from damage where data can.
+
+    Damage moves no thermometer: one that departs from what the others predict is at fault, unless most depart at once,
+    as in weather that the baseline does not have. A response that moves may be damaged: it is set aside only where no
+    damage explains what it shows. References check thermometers and fill their gaps.
 
     Make one by `of`; the state is immutable and small, and what it says depends on complete days alone.
     """
 
     sensors: list[Hashable]
     columns: list[list[int]]
+    is_reference: NDArray[np.bool_]
     modes: list[Hashable]
+    units: list[str]
     zone: str
     weather: Plausible
     run_limits: RunLimits
     thermometers: Thermometers | None
-    expected: Modes
+    expected: Responses
 
     @classmethod
-    def of(cls, T: pd.DataFrame, F: pd.DataFrame, *, per_year: float = 0.1) -> SensorWatch:
+    def of(
+        cls,
+        T: pd.DataFrame,
+        F: pd.DataFrame,
+        *,
+        reference: Sequence[Hashable] = (),
+        units: Mapping[Hashable, str] | None = None,
+        per_year: float = 0.1,
+    ) -> SensorWatch:
         """Learn from the baseline; lags of a sensor may have columns of their own.
 
-        ``per_year`` offsets and drifts of healthy thermometers may be reported in a year, over all of them.
+        ``reference`` names columns of T, ``units`` are texts by column. ``per_year`` offsets and drifts of healthy
+        thermometers may be reported in a year, over all of them, and a
+        third of it with references.
         """
         by_sensor = columns_by_sensor(T)
         order = np.argsort(T.index.asi8, kind="stable")
         stamps = T.index[order]
         columns = list(by_sensor.values())
         temperatures = as_floats(T)[order][:, [own[0] for own in columns]]
-        frequencies = as_floats(F)[order]
+        responses = as_floats(F)[order]
+        is_reference = np.array([sensor in set(reference) for sensor in by_sensor], dtype=bool)
+        texts = [dict(units or {}).get(name, "") for name in (*by_sensor, *F.columns)]
         per_day = len(stamps) / max(len(np.unique(local_days(stamps))), 1)
         return cls(
             list(by_sensor),
             columns,
+            is_reference,
             list(F.columns),
+            texts,
             "" if stamps.tz is None else str(stamps.tz),
             Plausible.of_weather(temperatures),
-            RunLimits.of(np.hstack([temperatures, frequencies]), per_day),
-            Thermometers.of(stamps, temperatures, per_year),
-            Modes.of(temperatures, frequencies, stamps),
+            RunLimits.of(np.hstack([temperatures, responses]), per_day),
+            Thermometers.of(stamps, temperatures, per_year / (RARER if is_reference.any() else 1.0)),
+            Responses.of(temperatures, responses, stamps, texts[len(by_sensor) :]),
         )
 
     def start(self) -> WatchState:
         """The state before the first day."""
-        n_sensors, n_pairs = len(self.sensors), len(self.expected.pairs())
+        n_sensors, n_pairs = len(self.sensors), len(self.expected.pairs)
         return WatchState(
             Runs.none(self.run_limits.last),
             np.empty(0, dtype=np.int64),
@@ -171,20 +211,88 @@ class SensorWatch:
 
     def faults(self, state: WatchState) -> pd.DataFrame:
         """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
-        return state.faults.table([*self.sensors, *self.modes], self.zone)
+        return state.faults.table([*self.sensors, *self.modes], self.zone, self.units)
 
-    def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Records without what sensors at fault show: NaN there, and exchanged modes back in place."""
-        temperatures, frequencies = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
-        own = [columns[0] for columns in self.columns]
-        impossible, absurd, _, _ = self._evaluated(temperatures[:, own], frequencies)
+    def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Watched:
+        """Records without what sensors at fault show: NaN there, and exchanged responses back in place.
+
+        What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
+        """
+        n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
+        temperatures, responses = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
+        impossible, far, _, expected = self._evaluated(temperatures[:, own], responses)
+        given = np.hstack([temperatures[:, own], responses])
         out = self._left_out(state.faults)
+        removed = (np.hstack([impossible, far]) | out) & ~np.isnan(given)
+        held, opens = self._held(state, ~np.isnan(responses), far, T.index.as_unit("ns").asi8, acknowledged)
+        notes = self._notes(state.faults, given, np.hstack([impossible, far]), held, expected)
         for sensor, columns in enumerate(self.columns):
-            temperatures[impossible[:, sensor], columns[0]] = np.nan
+            temperatures[removed[:, sensor], columns[0]] = np.nan
             if out[sensor]:
                 temperatures[:, columns] = np.nan
-        frequencies = np.where(absurd | out[len(self.sensors) :], np.nan, frequencies)
-        return frame_like(T, temperatures), frame_like(F, frequencies)
+        if self.thermometers is not None and self.is_reference.any():
+            filled = self.thermometers.filled(T.index, temperatures[:, own])
+            temperatures[:, own] = np.where(np.isnan(temperatures[:, own]), filled, temperatures[:, own])
+        kept = T.columns[~np.isin(np.arange(T.shape[1]), [own[n] for n in np.flatnonzero(self.is_reference)])]
+        responses = np.where(removed[:, n_sensors:], np.nan, responses)
+        return Watched(frame_like(T, temperatures)[kept], frame_like(F, responses), held, opens, notes, removed.sum(1))
+
+    def _held(
+        self,
+        state: WatchState,
+        seen: NDArray[np.bool_],
+        far: NDArray[np.bool_],
+        moments: Counts,
+        acknowledged: Sequence[int],
+    ) -> tuple[NDArray[np.bool_], Array]:
+        """Responses set aside that the structure may have moved, and how many of them are so for long."""
+        n_sensors, faults = len(self.sensors), state.faults
+        of_mode = faults.left_out(n_sensors + len(self.modes))[n_sensors:]
+        is_fault = np.array([fault >= 0 and faults.kind[fault] in HELD for fault in of_mode], dtype=bool)
+        runs = replace(state.runs, counts=state.runs.counts[:, n_sensors:])
+        lengths = np.zeros(far.shape, dtype=np.int64)
+        if far.any() or runs.counts[IMPLAUSIBLE].any():
+            for row in range(len(far)):
+                lengths[row] = runs.implausible(seen[row], far[row])
+                runs = replace(runs, counts=np.array([*runs.counts[:IMPLAUSIBLE], lengths[row]]))
+        held, certain = (lengths > 0) | is_fault, (lengths >= FEWEST[IMPLAUSIBLE]) | is_fault
+        for mode in np.flatnonzero(is_fault):
+            said = [time for time in acknowledged if time >= faults.since[of_mode[mode]]]
+            if said:
+                held[moments > min(said), mode] = False
+        opens = (held & certain).sum(axis=1).astype(float)
+        return held, np.where((opens == 0) & held.any(axis=1), np.nan, opens)
+
+    def _notes(
+        self,
+        faults: SensorFaults,
+        given: Array,
+        far: NDArray[np.bool_],
+        held: NDArray[np.bool_],
+        expected: Array,
+    ) -> list[str]:
+        """What was left out of each record, and why."""
+        names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
+        out = self._left_out(faults)
+        lasting = faults.notes(names)
+        notes = ["; ".join(lasting)] * len(given)
+        unseen = np.isnan(given[:, n_sensors:]) & held & ~out[n_sensors:]
+        for row in np.flatnonzero((far & ~out).any(axis=1) | unseen.any(axis=1)):
+            parts = [
+                f"{names[k]} is {_quantity(given[row, k], self.units[k])}"
+                + (
+                    f", expected about {_quantity(expected[row, k - n_sensors], self.units[k])}"
+                    if k >= n_sensors
+                    else ""
+                )
+                + ": implausible, left out"
+                for k in np.flatnonzero(far[row] & ~out)
+            ]
+            parts += [
+                f"{names[n_sensors + k]} was implausible before it went missing" for k in np.flatnonzero(unseen[row])
+            ]
+            notes[row] = "; ".join([*parts, *lasting])
+        return notes
 
     def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
         """The state after one complete day with these records, if any."""
@@ -194,12 +302,12 @@ class SensorWatch:
         day = int(local_days(stamps[:1])[0])
         moments = stamps.as_unit("ns").asi8
         temperatures = as_floats(T_day)[:, [own[0] for own in self.columns]]
-        frequencies = self._in_place(state.faults, as_floats(F_day))
-        impossible, absurd, rest, expected = self._evaluated(temperatures, frequencies)
-        runs = state.runs.after(moments, np.hstack([temperatures, frequencies]), np.hstack([impossible, absurd]))
-        midnight = int(self._midnight(day))
-        before, state = state.faults, replace(state, runs=runs)
+        midnight, before = int(self._midnight(day)), state.faults
+        impossible, _, rest, expected = self._evaluated(temperatures, self._in_place(before, as_floats(F_day)))
         state = self._with_exchanges(state, rest, expected, midnight)
+        responses = self._in_place(state.faults, as_floats(F_day))
+        far = np.hstack([impossible, self._evaluated(temperatures, responses)[1]])
+        state = replace(state, runs=state.runs.after(moments, np.hstack([temperatures, responses]), far))
         state = self._with_runs(state, midnight)
         if self.thermometers is None:
             return state
@@ -224,20 +332,20 @@ class SensorWatch:
         )
 
     def _evaluated(
-        self, temperatures: Array, frequencies: Array
+        self, temperatures: Array, responses: Array
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array]:
-        """Impossible temperatures, absurd frequencies, and logarithms of frequencies beside expected ones and these."""
+        """Impossible temperatures, implausible responses, these minus the expected ones, and the expected ones."""
         impossible = self.weather.implausible(temperatures)
-        rest, expected = self.expected.logarithms(np.where(impossible, np.nan, temperatures), frequencies)
-        return impossible, self.expected.absurd(rest), rest, expected
+        rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
+        return impossible, self.expected.implausible(responses, rest), rest, expected
 
-    def _in_place(self, faults: SensorFaults, frequencies: Array) -> Array:
-        """Frequencies with exchanged modes back in their columns."""
-        frequencies = frequencies.copy()
+    def _in_place(self, faults: SensorFaults, responses: Array) -> Array:
+        """Responses with exchanged ones back in their columns."""
+        responses = responses.copy()
         for fault in faults.lasting("swapped"):
             pair = np.array([faults.column[fault], faults.other[fault]]) - len(self.sensors)
-            frequencies[:, pair] = frequencies[:, pair[::-1]]
-        return frequencies
+            responses[:, pair] = responses[:, pair[::-1]]
+        return responses
 
     def _with_exchanges(self, state: WatchState, rest: Array, expected: Array, midnight: int) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
@@ -246,7 +354,7 @@ class SensorWatch:
         since = np.where((state.exchanged == 0) & (evidence > 0), midnight, state.exchanged_since)
         faults = state.faults
         for pair in np.flatnonzero(evidence > CERTAIN):
-            first, second = (len(self.sensors) + mode for mode in self.expected.pairs()[pair])
+            first, second = (len(self.sensors) + mode for mode in self.expected.pairs[pair])
             known = [
                 fault
                 for fault in faults.lasting("swapped")
@@ -260,7 +368,7 @@ class SensorWatch:
         return replace(state, exchanged=evidence, exchanged_since=since, faults=faults)
 
     def _with_runs(self, state: WatchState, midnight: int) -> WatchState:
-        """Columns that are dead, stuck or absurd, or no longer."""
+        """Columns that are dead, stuck or implausible, or no longer."""
         faults, runs = state.faults, state.runs
         is_run = runs.counts >= self.run_limits.limits
         out = faults.left_out(is_run.shape[1])
@@ -344,18 +452,17 @@ class SensorWatch:
         detected = {sensor: found for sensor, found in changes.items() if self._is_fault(sensor, found)}
         if not detected or len(changes) < 2:
             return state
-        worst = max(detected, key=lambda sensor: detected[sensor].weight)
+        worst = max(detected, key=lambda sensor: self._blame(sensor, detected[sensor]))
         found = self._described(detected[worst])
         without = self._departing(replace(state, faults=state.faults.opened(column=worst, detected=midnight, **found)))
         left = self._changes(without)
         also = [sensor for sensor in left if self._is_fault(sensor, left[sensor])]
-        rivals = [
-            sensor
-            for sensor in left
-            if sensor not in also and changes[sensor].weight ** 2 + 2 * CLEAR > detected[worst].weight ** 2
-        ]
+        blame = self._blame(worst, detected[worst])
+        rivals = [s for s in left if s not in also and self._blame(s, changes[s]) + 2 * CLEAR > blame]
         n_departing = 1 + len(also) + len(state.faults.lasting("offset", "drift"))
         is_clear = len(changes) > LEAST_OTHERS and 2 * n_departing < len(self.sensors)
+        if not self.is_reference[worst] and any(self.is_reference[sensor] for sensor in set(changes) - {worst, *also}):
+            is_clear |= n_departing == 1
         if is_clear and not rivals:
             faults = without.faults
             for fault in faults.lasting("disagree"):  # the one at fault has been found
@@ -367,7 +474,15 @@ class SensorWatch:
         found |= {"kind": "disagree", "rate": 0.0}
         return replace(state, faults=state.faults.opened(column=worst, other=other, detected=midnight, **found))
 
+    def _blame(self, sensor: int, change: Change) -> float:
+        """Twice the logarithm of the odds of a change; a reference is less likely at fault than a thermometer."""
+        return change.weight**2 - 2 * REFERENCE * CLEAR * float(self.is_reference[sensor])
+
     def _changes(self, state: WatchState) -> dict[int, Change]:
         """The most likely change of each thermometer that is not left out and has a value."""
         free = np.flatnonzero(self._trusted(state.faults) & ~np.isnan(state.means[-1]))
         return {int(sensor): found for sensor in free if (found := self._change(state, sensor)) is not None}
+
+
+def _quantity(value: float, unit: str) -> str:
+    return f"{value:.2g} {unit}".rstrip()

@@ -18,46 +18,38 @@ NO_WEATHER = 30.0  # degrees, or the range of known ones, outside that range, wh
 
 @dataclass(frozen=True)
 class Plausible:
-    """Which values can be measured: between bounds by column, and none that loggers write for a missing one."""
+    """Which values can be measured: between bounds by column, and none that loggers write for a missing one.
+
+    A number such as -99 stands for a missing value only where the others of the baseline's column do not reach it.
+    """
 
     lowest: Array
     highest: Array
+    least: Array
+    most: Array
 
     @classmethod
     def of(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
-        """No frequency of zero or below, no temperature in kelvin; missing values of the baseline are NaN.
-
-        What is 100 degrees beyond the baseline is no temperature.
-        """
+        """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
         is_target = baseline.columns.isin(targets)
-        values = baseline.to_numpy()
-        least, most = np.fmin.reduce(values), np.fmax.reduce(values)
-        positive = np.where(least > 0, np.nextafter(0, 1), -np.inf)
-        lowest = np.where(is_target, positive, np.fmin(least - 100, -80))
-        return cls(lowest, np.where(is_target, np.inf, np.fmax(most + 100, 100)))
+        least, most = _range(baseline.to_numpy())
+        lowest = np.where(is_target, -np.inf, np.fmin(least - 100, -80))
+        return cls(lowest, np.where(is_target, np.inf, np.fmax(most + 100, 100)), least, most)
 
     @classmethod
     def of_weather(cls, temperatures: Array) -> Plausible:
         """Temperatures that weather may bring where these are known."""
-        lowest, highest = np.fmin.reduce(temperatures), np.fmax.reduce(temperatures)
-        beyond = np.maximum(highest - lowest, NO_WEATHER)
-        return cls(lowest - beyond, highest + beyond)
-
-    @classmethod
-    def of_anything(cls, n_columns: int) -> Plausible:
-        """All values but those that loggers write for a missing one."""
-        return cls(np.full(n_columns, -np.inf), np.full(n_columns, np.inf))
+        least, most = _range(temperatures)
+        beyond = np.maximum(most - least, NO_WEATHER)
+        return cls(least - beyond, most + beyond, least, most)
 
     def implausible(self, values: Array) -> NDArray[np.bool_]:
         """Which values no sensor measures."""
-        return np.isin(values, MARKERS) | (values < self.lowest) | (values > self.highest)
+        is_marker = np.isin(values, MARKERS) & ~((values >= self.least) & (values <= self.most))
+        return is_marker | (values < self.lowest) | (values > self.highest)
 
-    def cleaned(self, records: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
-        """Records with NaN for what no sensor measures, and a phrase about each that had such values."""
-        values = records.to_numpy()
-        wrong = self.implausible(values)
-        told = [""] * len(records)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            parts = [f"{records.columns[k]} is {values[row, k]:g}" for k in np.flatnonzero(wrong[row])]
-            told[row] = f"{', '.join(parts)}: taken as missing"
-        return records.mask(wrong) if wrong.any() else records, told
+
+def _range(values: Array) -> tuple[Array, Array]:
+    """Least and most of each column, numbers that may stand for missing values left out."""
+    known = np.where(np.isin(values, MARKERS), np.nan, values)
+    return np.fmin.reduce(known), np.fmax.reduce(known)

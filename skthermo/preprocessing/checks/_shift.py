@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, spread_evenly
+from skthermo._tables.arrays import Array, range_sums, spread_evenly
 from skthermo.preprocessing._weather_regression import out_of_fold
 
 MOST_ROWS = 4000  # that are predicted for each shift
@@ -75,12 +75,11 @@ def unexplained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> A
 def with_past(places: Array) -> Array:
     """Coordinates of the weather a row before, and their means over more of the past, side by side."""
     n_rows, filled = len(places), np.nan_to_num(places)
-    sums = np.vstack([np.zeros((1, places.shape[1])), np.cumsum(filled, axis=0)])
     ends, columns = np.arange(1, n_rows + 1), [np.vstack([filled[:1], filled[:-1]])]
     for period in PAST:
         if period * LEAST_MEANS <= n_rows:
             starts = np.maximum(ends - period, 0)
-            columns.append((sums[ends] - sums[starts]) / (ends - starts)[:, np.newaxis])
+            columns.append(range_sums(filled, starts, ends) / (ends - starts)[:, np.newaxis])
     return np.hstack(columns)
 
 

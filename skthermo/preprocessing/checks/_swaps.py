@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import NORMAL, Array, median
+from skthermo._tables.arrays import Array, robust_deviation
 from skthermo.preprocessing._weather_regression import out_of_fold
 
 LEAST_ROWS = 3
@@ -37,7 +37,7 @@ def swapped_modes(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) ->
         ordered[~known], given = np.nan, np.where(known[:, np.newaxis], pair, np.nan)
         predicted = out_of_fold(inputs, ordered, folds)
         rest = ordered - predicted
-        deviation = NORMAL * median(np.abs(rest - median(rest)))
+        deviation = robust_deviation(rest)
         with np.errstate(invalid="ignore"):
             is_near = (np.abs(rest) < FAR * deviation).all(axis=1)
             was_far = (np.abs(given - predicted) > FAR * deviation).any(axis=1)

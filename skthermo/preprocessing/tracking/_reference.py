@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, real_array, rows_by_pattern, shape_array
+from skthermo.exceptions import RecordsWarning
 
 
 class ReferenceModes(NamedTuple):
@@ -42,6 +43,7 @@ class ReferenceModes(NamedTuple):
                 f"{similar.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
                 f"frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift or "
                 "more sensors",
+                RecordsWarning,
                 "modes that can be confused",
             )
 

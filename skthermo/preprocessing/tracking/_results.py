@@ -7,6 +7,7 @@ from sklearn.utils import Bunch
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing.tracking._assignment import Pairs
 from skthermo.preprocessing.tracking._poles import Poles
 from skthermo.preprocessing.tracking._reference import ReferenceModes, shape_agreement
@@ -115,6 +116,7 @@ def warn_of_doubts(
         warn_user(
             f"{n_without} of {len(poles.record)} poles have a frequency but no shape: zero, or NaN at all sensors but "
             "one; they are left over",
+            UnevaluatedRowsWarning,
             "poles without shape",
         )
 
@@ -151,7 +153,7 @@ def _warn_of_losses(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names:
             )
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
-        warn_user("; ".join(problems[:3]) + more, "modes not found")
+        warn_user("; ".join(problems[:3]) + more, UnevaluatedRowsWarning, "modes not found")
 
 
 def _warn_of_other_shapes(
@@ -176,5 +178,6 @@ def _warn_of_other_shapes(
         warn_user(
             "; ".join(problems[:3]) + f"{more}: expected the sensors of the reference in their order, with their signs "
             "and gains, or a lower min_mac for noisy shapes",
+            RecordsWarning,
             "modes of other shapes",
         )

@@ -100,7 +100,8 @@ def not_evaluated(standing: Standing) -> Section:
         "n_repeated": "that came again, and were counted once",
         "n_late": "that came late, and were evaluated all the same",
         "n_too_late": "that came too late to be evaluated",
-        "n_implausible": "(single values) that no sensor measures, and were taken as missing",
+        "n_ahead": "that are stamped too far ahead, and are set aside",
+        "n_left_out": "(single values) that came and were left out",
     }
     rows = [[f"Records {text}", f"{int(counts[name]):,}"] for name, text in names.items() if counts.get(name)]
     parts.append(table("What else was noticed.", ["What", "Number"], rows) if rows else Html())

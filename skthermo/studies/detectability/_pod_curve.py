@@ -1,19 +1,24 @@
-"""Probability of detection (POD) as a function of severity."""
+"""Probability of detection (POD) as a function of severity, and families of scenarios, of which it is known."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
 from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, is_real, real_array
-from skthermo.studies.detectability._intervals import clopper_pearson
+from skthermo._tables.arrays import Array, real_array
+from skthermo.exceptions import ResultWarning
+from skthermo.metrics import minimum_detectable_damage
+from skthermo.studies.detectability._intervals import check_probability, clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
 MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
@@ -263,6 +268,7 @@ def pod_curve(
         warn_user(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
             f"unknown, and a90 lies {place}; expected {expected}",
+            ResultWarning,
             "separated severities",
         )
     else:
@@ -282,16 +288,10 @@ def pod_curve(
             f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
             f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
             "severities near a90 and fit those alone",
+            ResultWarning,
             "curve beside its points",
         )
     return curve
-
-
-def check_probability(value: Any, what: str) -> float:
-    """A probability strictly between 0 and 1, or an error."""
-    if not is_real(value) or not 0 < float(value) < 1:
-        raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
-    return float(value)
 
 
 def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike) -> tuple[Array, Array, Array]:
@@ -349,3 +349,78 @@ def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:
         coefficients = coefficients + step
     to_severities = np.array([[1.0, -centre / width], [0.0, 1 / width]])
     return to_severities @ coefficients, to_severities @ np.linalg.inv(information) @ to_severities.T
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyRates:
+    """Results of one detector for one family and source, with the highest upper bound of its false alarms there."""
+
+    name: str
+    source: str
+    rows: pd.DataFrame
+    false_alarms: float
+    confidence: float
+
+    @property
+    def tested(self) -> pd.DataFrame:
+        """Rows with a severity, which have a place on a curve."""
+        return self.rows[self.rows["severity"].notna()]
+
+    @property
+    def is_undetected(self) -> bool:
+        """Whether no rate is above that bound."""
+        return bool((self.rows["rate"] <= self.false_alarms).all())
+
+    def curve(self, log: bool = False) -> PODCurve:
+        """Probability of detection over severity, with records as their effective numbers."""
+        rows = self.tested
+        detected, n_effective = rows["rate"] * rows["n_effective"], rows["n_effective"]
+        with self._named():
+            return pod_curve(rows["severity"], detected, n_effective, log=log, confidence=self.confidence)
+
+    def on_grid(self, level: float) -> tuple[float, float, float]:
+        """Smallest tested severity from which the rate stays at or above a level, and that of its bounds."""
+        with self._named():
+            mdd, lowest, highest = (
+                minimum_detectable_damage(self.tested["severity"], self.tested[rate], level)
+                for rate in ("rate", "ci_high", "ci_low")
+            )
+        return mdd, lowest, highest
+
+    def on_curve(self, level: float) -> tuple[float, float, float]:
+        """Severity at which the curve and its bounds reach a level; without a finite slope, NaN and the bracket."""
+        severities, rates = self.tested["severity"], self.tested["rate"]
+        bracket = float("nan"), *bracket_of(severities.abs().to_numpy(), rates.to_numpy(), level)
+        if len(severities) < 2:
+            return bracket
+        try:
+            curve = self.curve()
+        except ValueError as error:
+            if severities.min() < 0 < severities.max():
+                raise
+            rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
+            cause = f"{rare}baseline raise the threshold" if self.is_undetected else ""
+            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "family without a curve")
+            return bracket
+        if np.isnan(curve.slope):
+            return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)
+        tail = (1 - self.confidence) / 2
+        return curve.severity_at(level), curve.severity_at(level, tail), curve.severity_at(level, 1 - tail)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Begin the text of errors with the family's name."""
+        try:
+            yield
+        except ValueError as error:
+            raise ValueError(f"family {self.name!r}: {error}") from error
+
+
+def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], FamilyRates]:
+    """Families by detector, name and source."""
+    healthy = results[results["measure"] == "PFA"].groupby(["detector", "source"])["ci_high"].max()
+    damaged = results[(results["measure"] == "POD") & results["family"].notna()]
+    return {
+        key: FamilyRates(key[1], key[2], rows, float(healthy.get((key[0], key[2]), np.nan)), confidence)
+        for key, rows in damaged.groupby(["detector", "family", "source"], sort=False)
+    }

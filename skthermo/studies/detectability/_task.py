@@ -1,30 +1,152 @@
-"""detection_task: labelled records on which the searches of scikit-learn tune a detector."""
+"""detection_task: labelled records on which the searches of scikit-learn tune a detector, and their score."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
+from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
 from skthermo._estimators.arguments import check_names, check_size
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once
-from skthermo._tables.arrays import as_columns, as_floats, as_random_state, positive_integer
-from skthermo._tables.frames import column_names
+from skthermo._tables.arrays import Array, as_columns, as_floats, as_random_state, positive_integer
+from skthermo._tables.frames import Table, column_names
 from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
-from skthermo.studies.detectability._candidates import SeenColumns
-from skthermo.studies.detectability._intervals import rate_of
-from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.exceptions import ResultWarning, WeatherWarning
+from skthermo.studies.detectability._candidates import SeenColumns, has_targets
+from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
-from skthermo.studies.detectability._task_scorer import TaskScorer
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.surrogate import FittedChain
+
+FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
+
+
+@dataclass(frozen=True, eq=False)
+class Decisions:
+    """A detector's decisions on simulated records in order of time, with the label of each and the numbers of its
+    scenario and its repeat.
+
+    Negative decisions are alarms, NaN where a record is not evaluated; labels are +1 (healthy) and -1 (damaged).
+    """
+
+    values: Array
+    labels: NDArray[np.intp]
+    scenario: NDArray[np.intp]
+    repeat: NDArray[np.intp]
+
+    def score(self, limit: float) -> float:
+        """Share of the damaged records found within the limit, times what the detector is worth."""
+        return self.found(limit) * self.worth(limit)
+
+    def worth(self, limit: float) -> float:
+        """1, or the limit over the lower bound of the false alarms where this is more: the detector will work with its
+        own threshold, not with a raised one."""
+        return limit / max(self.false_alarms().lowest, limit)
+
+    def found(self, limit: float) -> float:
+        """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
+        raised = self.raised(limit)
+        return float(np.mean([np.mean(self.values[rows] < raised) for rows in self.damaged()]))
+
+    def raised(self, limit: float) -> float:
+        """Decision below which there is an alarm: 0, or less where more healthy records than the limit lie below."""
+        healthy = self.values[self.healthy()]
+        evaluated = np.sort(healthy[~np.isnan(healthy)])
+        if not evaluated.size:
+            raise ValueError(
+                f"none of {len(healthy)} healthy records is evaluated; expected a detector that evaluates some"
+            )
+        return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
+
+    def false_alarms(self, confidence: float = 0.95) -> Rate:
+        """Share of the evaluated healthy records beyond the detector's own threshold, with bounds."""
+        return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
+
+    def healthy(self) -> NDArray[np.intp]:
+        """Healthy records of the scenario that has most; those of others are the same records with the same noise."""
+        first = np.bincount(self.scenario[self.labels == 1]).argmax()
+        return np.flatnonzero((self.labels == 1) & (self.scenario == first))
+
+    def damaged(self) -> list[NDArray[np.intp]]:
+        """Damaged records of each scenario that has some."""
+        damaged = np.unique(self.scenario[self.labels == -1])
+        return [np.flatnonzero((self.labels == -1) & (self.scenario == one)) for one in damaged]
+
+    def by_repeat(self, values: Array, rows: NDArray[np.intp]) -> Array:
+        """Values of some records, (n_repeats, n_records); in one row where repeats differ in number."""
+        counts = np.unique(self.repeat[rows], return_counts=True)[1]
+        return values[rows].reshape(len(counts) if np.ptp(counts) == 0 else 1, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class TaskScorer:
+    """Scores a fitted detector on simulated records of a task, each state by itself.
+
+    Labels are those of all simulated records; the number of the state of each counts through the scenarios of the first
+    repeat, then through those of the second.
+    """
+
+    labels: pd.Series
+    state: NDArray[np.intp]
+    n_scenarios: int
+    sensors: Sequence[Hashable]
+    max_false_alarms: float
+
+    def __call__(self, estimator: BaseEstimator, X: pd.DataFrame, y: ArrayLike | None = None) -> float:
+        """Share of the damaged records that are found within the limit of false alarms."""
+        return self.decisions(estimator, X, y).score(self.max_false_alarms)
+
+    def decisions(self, estimator: BaseEstimator, X: pd.DataFrame, y: ArrayLike | None = None) -> Decisions:
+        """Decisions on rows of the task; lags and windows of a state see no record of another."""
+        check_detector(estimator, "the detector")
+        self._check_columns(estimator, X)
+        rows = self._rows(X)
+        labels = self.labels.to_numpy()[rows] if y is None else np.asarray(y)
+        missing = [name for name, label in (("healthy", 1), ("damaged", -1)) if not (labels == label).any()]
+        if missing:
+            raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
+        order = np.argsort(rows, kind="stable")
+        state, values = self.state[rows[order]], []
+        with warnings_once("in other states of the task"):
+            warnings.filterwarnings("ignore", FIRST_ROWS)
+            for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+                values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
+        repeat, scenario = np.divmod(state, self.n_scenarios)
+        return Decisions(np.concatenate(values), labels[order], scenario, repeat)
+
+    def _rows(self, X: Table) -> NDArray[np.intp]:
+        """Positions of the rows among the simulated ones."""
+        if not isinstance(X, pd.DataFrame):
+            raise ValueError(f"X is of type {type(X).__name__}; expected a frame: rows of the task's X, with its index")
+        rows = self.labels.index.get_indexer(X.index)
+        if (rows < 0).any():
+            raise ValueError(
+                f"{(rows < 0).sum()} of {len(rows)} rows are no simulated records of the task, the first "
+                f"{X.index[(rows < 0).argmax()]}; expected rows of the task's X, split by its cv, and no score of the "
+                "baseline on which a detector is fitted (return_train_score=False)"
+            )
+        return rows
+
+    def _check_columns(self, estimator: BaseEstimator, X: Table) -> None:
+        """Refuse a detector that would take temperatures for frequencies."""
+        seen = [name for name in self.sensors if name in getattr(X, "columns", ())]
+        if seen and not (has_targets(estimator) or isinstance(estimator, Pipeline)):
+            raise ValueError(
+                f"X has the temperatures {seen}, and the detector {estimator!r:.200} would take them for "
+                "frequencies; expected a task with columns=modes, or a pipeline with a TemperatureCompensator"
+            )
+
 
 YEAR = 365.2425  # days
 SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
@@ -88,7 +210,7 @@ class DetectionTask(Bunch):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
 
-    def refit(self, detector: Any) -> Any:
+    def refit(self, detector: BaseEstimator) -> Any:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
         Parameters
@@ -118,6 +240,7 @@ class DetectionTask(Bunch):
                 warn_user(
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
                     "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
+                    ResultWarning,
                     "search that refits",
                 )
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
@@ -184,6 +307,7 @@ class DetectionTask(Bunch):
             warn_user(
                 "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
                 "was tuned",
+                WeatherWarning,
                 "same weather",
             )
         rows = []
@@ -196,7 +320,7 @@ class DetectionTask(Bunch):
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
         return table
 
-    def _rates(self, detector: Any, confidence: float) -> dict[str, Any]:
+    def _rates(self, detector: BaseEstimator, confidence: float) -> dict[str, Any]:
         """Score and false alarms of a fitted detector on all simulated records, with bounds."""
         limit = self.scoring.max_false_alarms
         found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
@@ -220,7 +344,7 @@ class DetectionTask(Bunch):
 
 
 def detection_task(
-    fem: Any,
+    fem: FittedChain,
     T: ArrayLike,
     scenarios: Sequence[BaseScenario | Mapping[str, float]],
     *,
@@ -295,24 +419,20 @@ def detection_task(
     Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
     among them. ``task.refit(search)`` fits it to the baseline.
 
-    The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
+    The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
+    from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
-    until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
-    scenarios, which count alike. A damaged record that is not evaluated is not found. Where false alarms by the own
-    threshold exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound.
-
-    All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
-    settings are compared more certainly than each is known.
+    until no more do. A damaged record that is not evaluated is not found. Where false alarms by the own threshold
+    exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound. All
+    scenarios have the same weather, and a repeat the same noise in all of them (common random numbers).
 
     Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
-    into another. Its first records, for which lags and windows lack records before, may not be evaluated: T should be
-    long beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days,
-    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart
-    in a single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+    into another. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
+    so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
+    records, and lags of rows without stamps, do so only in ``scoring``.
 
-    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
-    regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
-    records.
+    A compensator of the kind that the chain is looks better in its simulations than it is: choose the kind of
+    regression by measured records.
 
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
     with noise that took no part.
@@ -355,14 +475,14 @@ def detection_task(
 
 
 def _task(
-    fem: Any,
-    T: Any,
+    fem: FittedChain,
+    T: Table,
     scenarios: Any,
     baseline: pd.DataFrame,
     measurement: Measurement,
     limit: float,
     n_splits: int,
-    seeds: Any,
+    seeds: Sequence[int],
 ) -> DetectionTask:
     """A task with the noise of some seeds."""
     names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
@@ -401,7 +521,7 @@ def _task(
     )
 
 
-def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
+def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
     """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
     T, F = fem.training_records_
     names, n_sensors = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_
@@ -414,7 +534,7 @@ def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
     return pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
 
 
-def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
+def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     """Rows of all states, one after the other: stamps of T moved into the future, or numbers after the baseline's."""
     if not has_stamps(baseline):
         return pd.RangeIndex(len(baseline), len(baseline) + n_states * _num_samples(T))
@@ -443,7 +563,7 @@ def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     )
 
 
-def _labels(scenarios: Sequence[BaseScenario], T: Any) -> NDArray[np.intp]:
+def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
     """+1 where a scenario is healthy or its damage has not begun, else -1, (n_scenarios, n_records)."""
     times = row_times(T)
     labels = np.ones((len(scenarios), len(times)), dtype=int)
@@ -468,7 +588,7 @@ def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) ->
     return [name for name in baseline.columns if name in chosen]
 
 
-def _seeds(n_repeats: Any, random_state: Any) -> NDArray[np.intp]:
+def _seeds(n_repeats: Any, random_state: np.random.RandomState | None) -> NDArray[np.intp]:
     """Seeds of the noise of each repeat: of a task, and of its confirmation."""
     size = positive_integer(n_repeats, "n_repeats"), 2
     return as_random_state(random_state).randint(LARGEST_SEED, size=size)

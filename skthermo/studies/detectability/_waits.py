@@ -9,15 +9,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, is_real
+from skthermo._tables.frames import Table
 from skthermo._tables.text import counted, duration_text
 from skthermo._tables.times import has_stamps, row_times, time_of
-from skthermo.studies.detectability._evaluation import EvaluatedRecords
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
+from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_of
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
 FEW = 10  # number of cases found, or not found, below which their dependence is not estimated
-TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time tells little
+TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time says little
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class Clock:
     length: pd.Timedelta | None
 
     @classmethod
-    def of(cls, rows: Any) -> "Clock":
+    def of(cls, rows: Table) -> "Clock":
         """The median time between records, or their numbers where they have no stamps."""
         times = row_times(rows)
         if not has_stamps(rows):
@@ -42,7 +43,7 @@ class Clock:
         """Number of steps from the first record to the last."""
         return int(self.steps.max()) + 1
 
-    def count(self, within: Any) -> int:
+    def count(self, within: Sequence[str | int] | None) -> int:
         """Number of records that come within a time; 0 if that is shorter than a step."""
         if self.length is None:
             return int(within)
@@ -128,25 +129,7 @@ class Waits:
         return float(highest) if highest <= self.clock.n_steps else float("inf")
 
 
-def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
-    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
-    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
-    return onsets if onsets.size else np.array([n_records // 2])
-
-
-def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
-    """Which records are damaged, a window after each of these onsets."""
-    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
-    return ((after >= 0) & (after < n_window)).any(axis=1)
-
-
-def transitions_of(decisions: Array, n_window: int) -> Array:
-    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
-    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
-    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
-
-
-def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:
+def read_within(within: Sequence[str | int] | None, is_stamped: bool) -> dict[str, Any]:
     """Times by their names in a table: durations, or numbers of records where there are no stamps."""
     if within is None:
         within = ("1D", "7D", "30D") if is_stamped else (1, 7, 30)
@@ -172,7 +155,7 @@ def _time(one: Any, is_stamped: bool) -> Any:
 def waits_table(
     records: Mapping[tuple[str, str, str], EvaluatedRecords],
     transitions: Mapping[tuple[str, str, str], Array],
-    within: Any,
+    within: Sequence[str | int] | None,
     level: float,
     confidence: float,
 ) -> pd.DataFrame:
@@ -231,10 +214,10 @@ def waits_told(waits: Waits, false: Waits | None, level: float) -> str:
         return f"{text}; how often a healthy structure alarms by then is not known"
     by_chance = false.found(min(int(number), clock.n_steps), level)[0]
     text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
-    return f"{text}, so that such an alarm tells little" if by_chance > TELLS_LITTLE else text
+    return f"{text}, so that such an alarm says little" if by_chance > TELLS_LITTLE else text
 
 
-def soonest(table: pd.DataFrame, within: Any) -> pd.DataFrame:
+def soonest(table: pd.DataFrame, within: Sequence[str | int] | None) -> pd.DataFrame:
     """Of each detector and family, the row of the smallest severity that is found reliably, or of the largest.
 
     It is found within the longest of some times.

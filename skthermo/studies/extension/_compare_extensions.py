@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -18,11 +18,85 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_floats, as_random_state, positive_integer, real_array
-from skthermo._tables.frames import check_same_rows, column_names
-from skthermo.fem import linearise
+from skthermo._tables.frames import Table, check_same_rows, column_names
+from skthermo.exceptions import ResultWarning
+from skthermo.fem import FEModel, linearise
 from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
-from skthermo.studies.extension._campaign import LARGEST_SEED, CampaignSimulator, ChangesBySeverity, mode_name
 from skthermo.studies.scenarios import Scenario
+from skthermo.surrogate import FittedChain
+
+ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
+"""What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
+
+LARGEST_SEED = np.iinfo(np.int32).max
+
+
+@dataclass(frozen=True)
+class CampaignSimulator:
+    """A chain that stands for the true structure: healthy records to learn from, and records of every severity.
+
+    The weather of the training begins again where ``n_baseline`` is longer. ``modes`` are the ranks of further modes of
+    the model, and ``scatter`` the relative standard deviations of their noise; they are missing where all others are.
+    """
+
+    fem: FittedChain
+    T: Table
+    changes: ChangesBySeverity
+    measurement: Measurement
+    n_baseline: int
+    modes: Sequence[int] = ()
+    scatter: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def names(self) -> list[Hashable]:
+        """Columns of the tables: temperatures, measured modes, further modes."""
+        sensors = column_names(self.fem.training_records_[0], "T")
+        return [*sensors, *self.fem.mode_names_, *(mode_name(mode) for mode in self.modes)]
+
+    def clean(self) -> tuple[Array, dict[tuple[str, float], Array]]:
+        """Frequencies without noise: healthy in the weather of the training, and by family and severity in the new."""
+        weather = self.fem.training_records_[0]
+        return self._clean(weather, {}), {key: self._clean(self.T, changes) for key, changes in self.changes.items()}
+
+    def draw(self, clean: tuple[Array, Mapping[Any, Array]], seed: int) -> tuple[pd.DataFrame, dict]:
+        """Records with noise: a baseline, and frames by family and severity, all of which have the same noise."""
+        (healthy, changed), weather = clean, self.fem.training_records_[0]
+        seeds = np.random.RandomState(seed).randint(LARGEST_SEED, size=(1 + -(-self.n_baseline // len(weather)), 2))
+        factors, seen = self._measured(self.T, seeds[0])
+        periods = []
+        for period, pair in enumerate(seeds[1:]):
+            noise, T = self._measured(weather, pair)
+            periods.append(self._table(T, healthy * noise, period))
+        tables = {key: self._table(seen, frequencies * factors) for key, frequencies in changed.items()}
+        return pd.concat(periods).iloc[: self.n_baseline], tables
+
+    def _clean(self, T: Table, changes: Mapping[str, Any]) -> Array:
+        measured = as_floats(self.fem.simulate(T, **changes))
+        if not self.modes:
+            return measured
+        return np.hstack([measured, self.fem.thermal_.simulated(self.fem.weather(T), self.modes, **changes)])
+
+    def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Any]:
+        """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
+        measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
+        further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
+        further[np.isnan(measured).all(axis=1)] = np.nan
+        return 1 + np.hstack([measured, further]), seen
+
+    def _table(self, T: Table, frequencies: Array, period: int = 0) -> pd.DataFrame:
+        """Temperatures and frequencies side by side; a later period repeats the weather of the first."""
+        table = pd.DataFrame(np.hstack([as_floats(T), frequencies]), columns=self.names)
+        index = getattr(T, "index", None)
+        if not isinstance(index, pd.DatetimeIndex):
+            return table.set_index(table.index + period * len(table))
+        step = (index[-1] - index[0]) / max(len(index) - 1, 1)
+        return table.set_index(index + period * (index[-1] - index[0] + step))
+
+
+def mode_name(rank: int) -> str:
+    """Name of a mode that was not measured, counted from 1."""
+    return f"mode {rank + 1}"
+
 
 SEVERITY_FACTORS = np.linspace(0.3, 1.5, 13)  # severities at which a family is simulated, in units of its present a90
 HIGHEST_SEVERITY = 0.95  # of those that are simulated
@@ -39,7 +113,9 @@ class Trials:
     present: Arrangement
     candidates: dict[tuple[str, str], Arrangement]
 
-    def repeats(self, seeds: Any, n_jobs: int | None) -> dict[tuple[str, str], list[dict[str, tuple[float, float]]]]:
+    def repeats(
+        self, seeds: Sequence[int], n_jobs: int | None
+    ) -> dict[tuple[str, str], list[dict[str, tuple[float, float]]]]:
         """For each candidate and repeat, the smallest detectable severity of each family now and then."""
         with single_blas_thread():
             clean = self.simulator.clean()
@@ -185,6 +261,7 @@ def compare_extensions(
         warn_user(
             f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
             "the study; expected a study with larger severities",
+            ResultWarning,
             "families that are not found",
         )
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
@@ -211,7 +288,7 @@ def changes_by_severity(study: DetectabilityStudy, detector: str | None = None) 
     return changes
 
 
-def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
+def _further_modes(model: FEModel, modes: Sequence[int] | None) -> list[int]:
     """Ranks of modes that are not measured yet."""
     if not hasattr(model, "with_modes"):
         if modes is None:
@@ -227,7 +304,7 @@ def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
     return [int(mode) for mode in modes]
 
 
-def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
+def _warn_of_unknown_modes(fem: FittedChain, ranks: Sequence[int]) -> None:
     """Warn of modes whose frequencies the parameters of the chain predict badly."""
     theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
     measured, further = (
@@ -240,6 +317,7 @@ def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
             warn_user(
                 f"{mode_name(rank)} depends on parameters that the measured modes hardly determine: predicted from one "
                 f"record, its frequency scatters {ratio:.1f} times as much as theirs, and its gain is doubtful",
+                ResultWarning,
                 f"unknown {mode_name(rank)}",
             )
 
@@ -247,7 +325,7 @@ def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
 def _scatter(study: DetectabilityStudy) -> float:
     """Median relative scatter of the measured modes."""
     if isinstance(study.noise, str):
-        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals_.values**2, axis=0))))
+        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals().values ** 2, axis=0))))
     return float(np.median(check_noise(study.noise, len(study.fem.mode_names_), study.fem.mode_names_)))
 
 
@@ -280,7 +358,7 @@ def _with_sensors(
     return trials
 
 
-def _beside(T: Any, name: Hashable, values: Array) -> Any:
+def _beside(T: Table, name: Hashable, values: Array) -> Any:
     if isinstance(T, pd.DataFrame):
         if name in T.columns:
             raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")

@@ -13,6 +13,7 @@ import pandas as pd
 from skthermo._effects.changes import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import SPACE, chance_text, listed, percent
+from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
 from skthermo.studies.identification._observe import ComparedRecords
 from skthermo.studies.scenarios import UncertainDamage
@@ -291,29 +292,33 @@ def limits(found: IdentifiedDamage) -> Iterator[str]:
         yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
 
 
-def warnings(found: IdentifiedDamage) -> Iterator[tuple[str, str]]:
-    """What is doubtful, by kind and text."""
+def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
+    """What is doubtful."""
     yield from found.records.warnings()
     best = told(found)[0]
     if found.confused:
         sets = "; ".join(" and ".join(causes) for causes in found.confused)
-        yield "confused groups", f"groups that these modes cannot tell apart: {sets}. Only their common effect is known"
+        yield ResultWarning(
+            f"groups that these modes cannot tell apart: {sets}. Only their common effect is known", "confused groups"
+        )
     if found.unseen:
         names = ", ".join(found.unseen)
-        yield "unseen groups", f"groups that these modes do not show, of which nothing is known: {names}"
+        yield ResultWarning(f"groups that these modes do not show, of which nothing is known: {names}", "unseen groups")
     highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
-        yield "severity at its bound", f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}"
+        yield ResultWarning(
+            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity at its bound"
+        )
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
             f"probability of something else {chance_text(found.probability_other)}"
             if best.has_else
             else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
         )
-        yield (
-            "unexplained shifts",
+        yield ResultWarning(
             f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
             f"{likely_causes(found)}",
+            "unexplained shifts",
         )
 
 
@@ -558,15 +563,13 @@ class IdentifiedDamage:
         """
         return "\n".join([*self.answer(), *self.limits(), *self.records.sentences()]).replace(SPACE, " ")
 
-    def warnings(self) -> Iterator[tuple[str, str]]:
+    def warnings(self) -> Iterator[SkthermoWarning]:
         """What is doubtful.
 
         Yields
         ------
-        kind : str
-            Of the warning.
-        text : str
-            Of the warning.
+        SkthermoWarning
+            With its ``kind``.
         """
         yield from warnings(self)
 

@@ -17,6 +17,13 @@ from skthermo._tables.frames import check_same_rows
 from skthermo._tables.text import counted, listed, significant
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import check_array
+from skthermo.exceptions import (
+    FewRecordsWarning,
+    RecordsWarning,
+    ResultWarning,
+    SkthermoWarning,
+    UnevaluatedRowsWarning,
+)
 from skthermo.residuals.weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import FrequencyShift, measured_shift, outlying, record_shifts, scatter_of
 
@@ -90,20 +97,20 @@ class ComparedRecords:
                 "uncertainty allows for that."
             )
 
-    def warnings(self) -> Iterator[tuple[str, str]]:
-        """What is doubtful, by kind and text."""
+    def warnings(self) -> Iterator[SkthermoWarning]:
+        """What is doubtful."""
         if self.left_out:
-            yield "records that were not compared", self._left_out()
+            yield UnevaluatedRowsWarning(self._left_out(), "records that were not compared")
         if self.n_latest >= IN_A_ROW:
-            yield "the last records differ", self._latest()
+            yield ResultWarning(self._latest(), "the last records differ")
         few = [(self.n_independent, self.n_compared, "record", FEW)]
         few += [(self.n_trained_independent, self.n_trained, "training record", FEW_TRAINED)]
         for independent, number, noun, least in few:
             if independent < least:
-                yield (
-                    f"few independent {noun}s",
+                yield FewRecordsWarning(
                     f"too few independent {noun}s: {_worth(noun, number, independent)}; expected {least:g} or more, "
                     "since probabilities and standard errors are rough with fewer",
+                    f"few independent {noun}s",
                 )
 
     def _latest(self) -> str:
@@ -172,7 +179,7 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
         frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
         shift = measured_shift(fem, T, shifts, noise)
     _check_ratios(np.exp(shift.mean), fem.mode_names_)
-    records = ComparedRecords.of(left_out, shift, len(fem.residuals_.values), latest(T, outliers))
+    records = ComparedRecords.of(left_out, shift, len(fem.residuals().values), latest(T, outliers))
     return ObservedRecords(shift, records, T, theta, frequencies)
 
 
@@ -226,11 +233,13 @@ def _named_as_in_fit(fem: Any, T: Any) -> Any:
         warn_user(
             f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
             "columns are taken in the order that they have",
+            RecordsWarning,
             "names of temperatures",
         )
         return T.set_axis(range(len(columns)), axis=1)
     warn_user(
         f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
+        RecordsWarning,
         "names of temperatures",
     )
     return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)

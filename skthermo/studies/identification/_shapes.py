@@ -12,6 +12,7 @@ from skthermo._effects.frequencies import central_differences
 from skthermo._estimators.arguments import check_noise
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
+from skthermo.exceptions import RecordsWarning
 
 STATES = ("healthy", "damaged")
 ALIKE = 0.5  # MAC of a measured healthy shape with the model's below which it counts as another mode
@@ -147,6 +148,7 @@ class ShapeShift:
                 f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
                 f"model's, {modes[np.flatnonzero(foreign)[0]]} the first, and are left out; expected shapes of the "
                 "same modes, with rows in the order of dofs",
+                RecordsWarning,
                 "foreign mode shapes",
             )
         effects = effects.at(effects.known & ~foreign)

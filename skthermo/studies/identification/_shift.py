@@ -11,7 +11,7 @@ from scipy import stats
 
 from skthermo._effects.frequencies import healthy_frequencies
 from skthermo._estimators.arguments import check_noise
-from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.arrays import Array
 from skthermo._tables.times import has_stamps, row_times
 
 FEWEST_TO_JUDGE = 8  # records among which one may be called far from the others
@@ -44,7 +44,7 @@ class FrequencyShift:
 
 def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
     """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
-    residuals = as_floats(fem.expected_residuals(T))
+    residuals = fem.residuals().expected(fem.weather(T).inputs)
     return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals))) - fem.discrepancy_(T)
 
 
@@ -74,13 +74,14 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
-    shares, judged, factor = fem.training_shares(T, (~np.isnan(shifts)).any(axis=1)), ~np.isnan(mean), 1.0
+    inputs = fem.weather(T).inputs[(~np.isnan(shifts)).any(axis=1)]
+    trained, judged, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
         wider = np.where(spread**2 > limit, spread, 1.0)
         new = new * np.outer(wider, wider)
-    parts = new + scatter.of_sums(shares, np.arange(len(shares)))
+    parts = new + scatter.of_sums(trained, np.arange(len(trained)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
         n_evaluated, of_correlations = judged.sum(), freedom + scatter.n_pseudo
@@ -97,11 +98,11 @@ def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
     if isinstance(noise, str):
         if noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        return fem.residuals_.scatter
+        return fem.residuals().scatter
     deviations = check_noise(noise, len(fem.mode_names_), fem.mode_names_)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-    return fem.residuals_.independent_scatter(deviations)
+    return fem.residuals().independent_scatter(deviations)
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._effects.frequencies import read_groups
 from skthermo._estimators.warnings import told_around, warn_user, without_warnings
 from skthermo._tables.arrays import as_random_state
+from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division, lines_of
@@ -155,6 +156,7 @@ def locate_damage(
         warn_user(
             "no damage of neighbouring members explains the shifts (something else has a probability of "
             f"{located.probability_other:.0%})",
+            ResultWarning,
             "unexplained shifts",
         )
     return located

@@ -2,5 +2,6 @@
 
 from skthermo.surrogate.chain._data_informed import DataInformedFEM
 from skthermo.surrogate.chain._fit_report import FitReport
+from skthermo.surrogate.chain._fitted_chain import FittedChain
 
-__all__ = ["DataInformedFEM", "FitReport"]
+__all__ = ["DataInformedFEM", "FitReport", "FittedChain"]

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypeAlias, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
 from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._estimators.arguments import check_flag, integer_row
+from skthermo._estimators.arguments import check_flag, check_model, is_auto
 from skthermo._estimators.regressors import (
     check_takes_weights,
     fit_weighted,
@@ -25,7 +30,16 @@ from skthermo._estimators.regressors import (
 )
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, is_real
-from skthermo._tables.frames import check_same_rows, column_names, frame_like, like_targets, row_weights
+from skthermo._tables.frames import (
+    Table,
+    check_columns,
+    check_same_rows,
+    check_temperatures,
+    column_names,
+    frame_like,
+    like_targets,
+    row_weights,
+)
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import (
     CallbackSupport,
@@ -38,38 +52,33 @@ from skthermo._validation import (
     check_array,
     check_is_fitted,
     last_step,
+    seed_parts,
+    seeded,
     validate_data,
 )
+from skthermo.exceptions import ResultWarning, UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
+from skthermo.preprocessing import BiasAligner, check_records
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._simulator import Box, tolerance
+from skthermo.surrogate._memory import remembered
+from skthermo.surrogate._regression import TemperatureMapper
+from skthermo.surrogate._simulator import Box, Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
-from skthermo.surrogate.chain._intervals import PredictionIntervals
-from skthermo.surrogate.chain._parts import (
-    Estimates,
-    clone_parts,
-    default_part,
-    known_findings,
-    part_of,
-    read_records,
-    shape_inputs_of,
-    shape_warnings,
-    simulator_of,
-    surrogates_in,
-    warn_of_inert,
-    with_means,
-    with_quick_start,
-    with_shapes,
+from skthermo.surrogate.chain._inverse_of_chain import ChainInverse
+from skthermo.surrogate.chain._records import (
+    RecordSimulator,
+    TrainingRecords,
+    check_frequencies,
+    measurement_noise,
     without_outliers,
 )
-from skthermo.surrogate.chain._recorder import RecordSimulator
-from skthermo.surrogate.chain._records import TrainingRecords, measurement_noise
-from skthermo.surrogate.chain._service import ServiceRecords
-from skthermo.surrogate.chain._thermal_model import ThermalModel, Weather, frequencies_of, possible
+from skthermo.surrogate.chain._thermal_model import ThermalModel, Weather, frequencies_of, possible, ratio_regressor
+from skthermo.surrogate.inverse import InverseSurrogate
 
-Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
+START_SAMPLES, START_PENALTY = 200, 1e-3
+"""Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
 
 
 class Simulated(TypedDict, total=False):
@@ -118,17 +127,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
         Whether M1, predictions and simulations use a reduced model, ``model.reduced``, much faster for large models.
-        "auto" reduces where that is expected to save time and where a basis is accurate; ``report_`` says which. True
-        allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Every
-        `InverseSurrogate` of the inverse whose own ``reduce`` is "auto" gets this value. Predictions use its reduced
-        model if the box of that covers the parameters that M2 gives for the training weather, plus a quarter of their
-        range on either side, else one of their own for this box. Rows outside the box are solved by the model itself,
-        with a warning that counts them; so are all where no basis is as accurate as that, with a warning unless "auto"
-        decides.
+        "auto" reduces where that is expected to save time and a basis is accurate; ``report_`` says which. True allows
+        a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. An
+        `InverseSurrogate` whose own ``reduce`` is "auto" gets this value, and predictions use its reduced model if that
+        covers the parameters of the training weather, plus a quarter of their range on either side. Rows outside the
+        box of a reduced model are solved by the model itself, with a warning that counts them.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
-        and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
-        chain, makes them once for each set of training records. See ``memory`` of `InverseSurrogate`.
+        and the parameters of these records, so that searches make them once. See ``memory`` of `InverseSurrogate`.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -150,9 +156,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         temperatures T; 0 with ``discrepancy=None``.
     records_ : TrainingRecords
         The training records, and what M2 learned from them.
-    thermal_, recorder_ : ThermalModel, RecordSimulator
-        What predicts (mapper, simulator, aligner and discrepancy), and what draws noise, gaps and outliers as the
-        training records have them.
+    thermal_ : ThermalModel
+        Mapper, simulator, aligner and discrepancy, which predict: ``thermal_.simulated(weather(T), modes)`` gives other
+        modes than the measured ones, as the FE model does.
+    recorder_ : RecordSimulator
+        What draws noise, gaps and outliers as the training records have them: ``recorder_.noise(weather(T))``,
+        ``recorder_.gaps(weather(T))`` and ``recorder_.service_of(F)``, whose ``missing`` and ``outliers`` are those of
+        the training records.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -175,19 +185,17 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T))) * exp(discrepancy_(T))``,
     and simulations of damage have the same discrepancy, as Kennedy and O'Hagan [KOH01]_ separate the parameters of a
     calibrated model from it. Outliers, as `~skthermo.preprocessing.check_records` finds them, train neither aligner nor
-    M1; they stay in the records, so that ``service_records`` knows them. If temperatures are a frame, results are
+    M1; they stay in the records, so that ``recorder_`` knows them. If temperatures are a frame, results are
     frames. A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in
     the training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
 
-    Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
-    among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
-    5000. Time and memory then grow in proportion to the rows.
+    Similar weather, for intervals and fitted noise, is looked for among at most 20,000 training records, spread evenly,
+    so that time and memory grow in proportion to the rows.
 
-    A mapper that states its own uncertainty by a method ``predict_covariance(X)``, (n_samples, n_parameters,
-    n_parameters), such as one that has learned from a fleet, makes standard deviations and intervals as wide as it is
-    uncertain. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, it says where it stands on
-    records of others.
+    A mapper with a method ``predict_covariance(X)``, (n_samples, n_parameters, n_parameters), such as one that has
+    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain. With ``reach_``, a range
+    of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others.
 
     Examples
     --------
@@ -280,41 +288,44 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in ``report_``: what
-            `~skthermo.preprocessing.check_records` finds, few rows, rows left out, modes that are far from the model's
-            or look like others of its modes, parameters far outside the bounds of the inverse.
+            One, with counts, for each kind of doubtful data in ``report_``, and for what
+            `~skthermo.preprocessing.check_records` finds.
         """
-        T, F = read_records(self, X, y)
+        T, F = self._read_records(X, y)
         tolerance(self.model, self.reduce)
         self.mode_names_ = column_names(F, "f")
         self.parameter_names_ = list(self.model.parameter_names)
-        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = clone_parts(self)
-        inverse = next(surrogates_in(self.inverse_), None)
-        self.box_ = None if inverse is None else Box.of(inverse.bounds, self.parameter_names_)
-        if shapes is None and shape_inputs_of(self.inverse_) is not None:
+        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
+        inverse = ChainInverse(self.inverse_)
+        surrogate = next(iter(inverse.surrogates), None)
+        self.box_ = None if surrogate is None else Box.of(surrogate.bounds, self.parameter_names_)
+        if shapes is None and inverse.shape_inputs is not None:
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
         mended = {"outliers", "memory"} if self.mapper is None else {"outliers"}
-        findings = findings_of(partial(known_findings, self.memory), T, F, mended=mended)
+        findings = findings_of(self._findings, T, F, mended=mended)
         warn_each(mode_warnings(self.model, F))
         self.sensors_ = SensorRegression.of(T)
         filled = frame_like(T, self.sensors_.fill(T)[0])
         usable = without_outliers(findings, F)
-        self.mapper_ = with_means(self, self.mapper_, findings, T)
+        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
+        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
+            self.mapper_ = make_pipeline(means, self.mapper_)
         stages = Stages(self, 5, X, y)
         with stages.stage("noise"):
             self.noise_ = measurement_noise(self.mapper_, filled, usable)
         with stages.stage("inverse surrogate", self.inverse_):
-            aligned = self._fit_inverse(T, usable, shapes)
+            aligned = self._fit_inverse(inverse, T, usable, shapes)
         with stages.stage("parameters of the records"):
-            estimates = Estimates.of(self.inverse_, aligned, self.parameter_names_)
+            estimates = inverse.estimates(aligned, self.parameter_names_)
         with stages.stage("temperature mapper", self.mapper_):
             fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
             inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-            simulator = simulator_of(self, learned)
+            known = getattr(surrogate, "simulator_", None)
+            simulator = Simulator.around(self.model, learned, self.reduce, known)
             records = TrainingRecords(
                 temperatures=T,
                 frequencies=F,
@@ -330,7 +341,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 mapper=self.mapper_,
                 simulator=simulator,
                 aligner=self.aligner_,
-                discrepancy=records.learns(part_of(self, "discrepancy"), self.mapper_, self.sensors_),
+                discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
                 sensors=self.sensors_,
                 training_range=TrainingRange.of(inputs, records.trained),
                 parameter_names=self.parameter_names_,
@@ -353,8 +364,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     ) -> DataInformedFEM:
         """A chain of the same parts that has learned other records, or has another FE model.
 
-        What a chain would have been, had its records or its model been others, tells how uncertain its results are.
-
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors), optional
@@ -372,20 +381,22 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         DataInformedFEM
             Fitted; this chain is unchanged.
 
-        Raises
-        ------
-        ValueError
-            As `fit`.
-
         Notes
         -----
-        An inverse that refines finds the same parameters whatever its regressor, which gives the start alone: here a
-        linear regression on 200 simulations at most. It refines on frequencies alone, also where `fit` had shapes.
-        Records whose weight was 0 in `fit` are left out, and other weights are 1.
+        An inverse that refines finds the same parameters whatever its regressor, which is here a linear regression on
+        200 simulations at most. It refines on frequencies alone, also where `fit` had shapes. Records whose weight was
+        0 in `fit` are left out, and other weights are 1.
         """
         T, F = self.training_records_
         counted = self.records_.counted
-        chain = with_quick_start(self, self.model if model is None else model).set_params(random_state=random_state)
+        chain = clone(self)
+        models = {name: model for name, part in chain.get_params().items() if part is self.model}
+        chain.set_params(**({} if model is None else models), random_state=random_state, verbose=0, memory=None)
+        if isinstance(self.inverse_, InverseSurrogate) and self.inverse_.n_steps_:
+            n_samples = min(self.inverse_.n_samples, START_SAMPLES)
+            quick = {"regressor": Ridge(START_PENALTY), "n_samples": n_samples, "narrow_bounds": False, "dofs": None}
+            quick["memory"] = None  # others than the chain's own inversions are hardly asked for again
+            chain.set_params(**{f"inverse__{name}": value for name, value in quick.items()})
         weights = None if counted.all() or X is not None else counted.astype(float)
         if self.y_is_vector_:
             F = F.squeeze(axis=1)
@@ -411,11 +422,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
         weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
-        correlated. No record comes twice, so that lags, folds and neighbours are what they are in measured records.
-        Only the temperature mapper and the discrepancy are fitted: nothing is inverted.
+        correlated. Nothing is inverted.
         """
         check_is_fitted(self)
-        records = self.records_.resampled(self.residuals_, self.discrepancy_, as_random_state(random_state))
+        records = self.records_.resampled(self.residuals(), self.discrepancy_, as_random_state(random_state))
         filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
         targets = named(filled, records.targets, self.parameter_names_)
         mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
@@ -423,7 +433,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
         discrepancy = records.learns(self.discrepancy_.regressor, mapper, self.sensors_)
         thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
-        return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.service_records()))
+        return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.recorder_.service))
 
     def with_model(self, model: FEModel) -> DataInformedFEM:
         """This fitted chain with another model of the same frequencies, such as one with divided damage groups.
@@ -472,7 +482,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         check_is_fitted(self)
         measured = frame_like(F, check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
-        inputs = with_shapes(self.inverse_, self.aligner_.transform(measured), shapes)
+        inputs = ChainInverse(self.inverse_).with_shapes(self.aligner_.transform(measured), shapes)
         theta = as_floats(self.inverse_.transform(inputs))
         return frame_like(F, theta, self.parameter_names_)
 
@@ -498,10 +508,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records, or a sensor departs from what the others foretell; `predict`, `predict_interval` and `simulate`
+            records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
-        weather = self._weather(X)
+        weather = self.weather(X)
         return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
 
     @overload
@@ -535,12 +545,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             and what `predict_covariance` says where the mapper knows it.
         """
         check_flag(return_std, "return_std")
-        weather = self._weather(X)
+        weather = self.weather(X)
         frequencies = self.thermal_.simulated(weather)
         predicted = self._as_targets(X, frequencies)
         if not return_std:
             return predicted
-        return predicted, self._as_targets(X, frequencies * self._intervals.deviations(weather))
+        deviations = np.hypot(self.residuals().spread(weather.inputs), self.thermal_.known_deviations(weather))
+        return predicted, self._as_targets(X, frequencies * deviations)
 
     def predict_covariance(self, X: ArrayLike) -> Array:
         """Covariance of predicted frequencies, because the temperature mapper is uncertain.
@@ -554,19 +565,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         ndarray of shape (n_samples, n_modes, n_modes)
             In Hz squared, in the measured domain, to first order: G C G' with the covariance C of the parameters that
-            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and the exact derivatives G = d f / d theta of
-            the model (of its reduced model within its box), times the discrepancy. Without the scatter of the
-            measurement. NaN where nothing is predicted.
+            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and G = d f / d theta, times the discrepancy.
+            Without the scatter of the measurement. Errors of records in similar weather do not average out.
 
         Raises
         ------
         ValueError
             If the mapper does not state how uncertain it is.
-
-        Notes
-        -----
-        The same draw of the mapper's uncertain coefficients moves all records of a season together, so that the errors
-        of records in similar weather do not average out.
         """
         check_is_fitted(self)
         if not offers(self.mapper_, "predict_covariance"):
@@ -574,8 +579,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 f"{type(last_step(self.mapper_)).__name__} does not state how uncertain it is; expected a mapper with "
                 "predict_covariance, such as FleetPrior().fit(bridges).mapper()"
             )
-        weather = self._weather(X)
-        predicted, relative = self.thermal_.predicted(weather), self._intervals.of_mapper(weather)
+        weather = self.weather(X)
+        predicted, relative = self.thermal_.predicted(weather), self.thermal_.covariances_of_mapper(weather)
         return relative * predicted[:, :, np.newaxis] * predicted[:, np.newaxis]
 
     @overload
@@ -606,20 +611,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals [LGR18]_: the training records are divided into blocks of a week or more, which are
-        dealt in turn to five folds, and each fold is predicted by a mapper fitted to the others. The width is a
-        multiple of the spread of these residuals in similar weather; the multiple is the order statistic that the folds
-        themselves needed. If new records are exchangeable with the training records, the interval holds a mode with
-        about the probability asked; the share of a short period varies more, because records of one structure are
-        serially correlated. Beyond the training range, the interval is widened by the distance (see
-        `extrapolation_distance`). Where a temperature was filled, it is widened by the change of the prediction when
-        that temperature is wrong by its standard deviation, sensor by sensor in quadrature.
+        Split-conformal intervals [LGR18]_ from `residuals`. The width is a multiple of their spread in similar weather;
+        the multiple is the order statistic that the folds themselves needed. If new records are exchangeable with the
+        training records, the interval holds a mode with about the probability asked; the share of a short period varies
+        more, because records are serially correlated. Beyond the training range, the interval is widened by the
+        distance (see `extrapolation_distance`), and where a temperature was filled, by what its standard deviation
+        changes in the prediction.
 
-        A mapper that knows how uncertain it is (`predict_covariance`) says so in place of that distance: its standard
-        deviation is added in quadrature, and the residuals count without what it explains of them. Only beyond the
-        weather that such a mapper stands on, its ``reach_``, is the interval widened by the distance as well. What a
-        mapper does not know stays the same for a season: the share that is held differs more from one structure to the
-        next than from one year to the next.
+        With a mapper that states its uncertainty (`predict_covariance`), its standard deviation is added in quadrature
+        in place of that distance, which counts beyond its ``reach_`` only.
 
         Examples
         --------
@@ -635,8 +635,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
-        weather = self._weather(X)
-        frequencies, margin = self.thermal_.simulated(weather), self._intervals.margins(weather, confidence)
+        weather = self.weather(X)
+        frequencies, residuals = self.thermal_.simulated(weather), self.residuals()
+        margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
+        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
         bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
         lowest, highest = (self._as_targets(X, bound) for bound in bounds)
         return lowest, highest
@@ -681,7 +683,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             a small weight smooths the residuals, so that the largest of the training records can be exceeded.
         gaps : float or "fitted", optional
             Values that are missing. With "fitted", modes and whole records are missing as in the training records: as
-            often, together, and for as long (`draw_gaps` tells which temperatures are missing beside them). A number is
+            often, together, and for as long (``recorder_.gaps`` says which temperatures are missing, too). A number is
             the share of the values that are missing, each by itself; 0 gives complete records. By default, modes are
             missing with ``noise="fitted"`` only, as in the record that the noise of a row is of.
         outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
@@ -710,207 +712,49 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         UserWarning
             If a factor is above 10, which may be meant in percent.
         """
-        weather = self._weather(X)
+        weather = self.weather(X)
         change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
         frequencies = self.thermal_.simulated(weather, **change)
         frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
         return frame_like(X, frequencies, self.mode_names_)
 
-    def draw_noise(
-        self,
-        X: ArrayLike,
-        noise: ArrayLike | Literal["fitted"] = "fitted",
-        *,
-        gaps: float | Literal["fitted"] | None = None,
-        outliers: ArrayLike | Literal["fitted"] | None = None,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> Array:
-        """Relative noise, as `simulate` puts it on the frequencies.
+    def weather(self, X: ArrayLike) -> Weather:
+        """Temperatures, checked and filled, as ``thermal_``, ``recorder_`` and `residuals` take them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-        noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
-            As in `simulate`, and so are all others.
-        gaps, outliers : float, "fitted" or array-like, optional
-            Which values are missing, and which are far off.
-        random_state : int, RandomState or None, default=None
-            Seed of the noise.
 
         Returns
         -------
-        ndarray of shape (n_samples, n_modes)
-            What is added to 1 and multiplied with the frequencies; NaN where a mode is missing.
-
-        Raises
-        ------
-        ValueError
-            If the noise is neither "fitted" nor relative standard deviations; if gaps or outliers are no shares.
-        """
-        weather = self._weather(X)
-        return self.recorder_.noise(weather, noise, gaps, outliers, random_state)
-
-    def draw_gaps(
-        self,
-        X: ArrayLike,
-        gaps: float | Literal["fitted"] = "fitted",
-        *,
-        outliers: ArrayLike | Literal["fitted"] | None = None,
-        random_state: int | np.random.RandomState | None = None,
-    ) -> tuple[Table, Table]:
-        """Which temperatures and frequencies are missing in records as they come in service.
-
-        `simulate` leaves out the same modes, if gaps, outliers and the seed, an integer, are the same.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius, in which gaps may depend on the weather.
-        gaps : float or "fitted", default="fitted"
-            As in `simulate`; sensors have gaps with "fitted" only.
-        outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
-            As in `simulate`.
-        random_state : int, RandomState or None, default=None
-            Seed.
-
-        Returns
-        -------
-        temperatures : ndarray or DataFrame of bool of shape (n_samples, n_sensors)
-            True where a temperature is missing; ``X.mask(temperatures)`` has the gaps.
-        frequencies : ndarray or DataFrame of bool of shape (n_samples, n_modes)
-            True where a mode is missing.
-
-        Raises
-        ------
-        ValueError
-            If gaps or outliers are no shares.
-        """
-        weather = self._weather(X)
-        of_sensors, of_modes = self.recorder_.gaps(weather, gaps, outliers, random_state)
-        return frame_like(X, of_sensors, column_names(X, "T")), frame_like(X, of_modes, self.mode_names_)
-
-    def service_records(self, F: ArrayLike | None = None) -> ServiceRecords:
-        """Gaps and outliers of the training records, which `simulate` draws from.
-
-        Parameters
-        ----------
-        F : array-like or DataFrame of shape (n_training_records, n_modes), optional
-            Frequencies of the training records before they were cleaned: what cleaning has changed or removed is an
-            outlier. By default a value is one if its residual is far from those of its neighbours in time.
-
-        Returns
-        -------
-        ServiceRecords
-            With the tables ``missing`` and ``outliers``; ``outliers`` of `simulate` may be this object, too.
-
-        Raises
-        ------
-        ValueError
-            If the frequencies are not of the training records.
+        Weather
+            With the temperatures that are ``given`` and ``filled`` from the other sensors, and the ``inputs`` of M2.
         """
         check_is_fitted(self)
-        return self.recorder_.service_of(F)
+        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        filled, deviations = self.sensors_.fill(values)
+        return Weather(X, frame_like(X, filled), deviations, self.mapper_)
 
-    def simulate_modes(
-        self,
-        X: ArrayLike,
-        modes: Sequence[int],
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-    ) -> Array:
-        """Frequencies of other modes than the measured ones, without noise and as the model gives them.
+    def residuals(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records by weather.
 
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        modes : sequence of int
-            Ranks of modes of the healthy nominal model, the lowest being 0.
-        damage, parameters, stiffness, mass : optional
-            Changes of the structure, as in `simulate`.
+        The first call fits the mapper and the discrepancy in each of five folds.
 
         Returns
         -------
-        ndarray of shape (n_samples, n_chosen)
-            In Hz, in the numerical domain: no aligner knows how these modes differ from measured ones.
-
-        Raises
-        ------
-        ValueError
-            As in `simulate`; if the model has no such modes.
+        BaselineResiduals
+            Relative: measured frequency over the prediction, minus 1. ``expected(weather(T).inputs)`` is their mean in
+            weather like that of each row, and ``n_expected`` the effective number of records that it is based on.
         """
-        weather = self._weather(X)
-        integer_row(modes, "modes")
-        change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
-        return self.thermal_.simulated(weather, modes, **change)
-
-    @overload
-    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[False] = False) -> pd.DataFrame: ...
-    @overload
-    def expected_residuals(self, X: pd.DataFrame, return_number: Literal[True]) -> tuple[pd.DataFrame, Array]: ...
-    @overload
-    def expected_residuals(self, X: ArrayLike, return_number: Literal[False] = False) -> Array: ...
-    @overload
-    def expected_residuals(self, X: ArrayLike, return_number: Literal[True]) -> tuple[Array, Array]: ...
-    @overload
-    def expected_residuals(self, X: ArrayLike, return_number: bool) -> Any: ...
-    def expected_residuals(self, X: ArrayLike, return_number: bool = False) -> Any:
-        """Mean relative residual of the training records in weather like that of each row.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        return_number : bool, default=False
-            Whether to return how many training records the mean over all rows stands on.
-
-        Returns
-        -------
-        expected : ndarray or DataFrame of shape (n_samples, n_modes)
-            Measured frequency over the prediction, minus 1: what the chain leaves unexplained in such weather. NaN
-            where an input of M2 is missing.
-        number : ndarray of shape (n_modes,)
-            Only with ``return_number``: effective sample size of the mean of ``expected`` over the rows, lower than the
-            number of training records if the rows have little variety of weather.
-        """
-        check_flag(return_number, "return_number")
-        weather = self._weather(X).inputs
-        expected = frame_like(X, self.residuals_.expected(weather), self.mode_names_)
-        return (expected, self.residuals_.n_expected(weather)) if return_number else expected
-
-    def training_shares(self, X: ArrayLike, rows: ArrayLike | None = None) -> Array:
-        """Share of each training record in the mean of `expected_residuals` over some rows.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        rows : array-like of bool of shape (n_samples,), optional
-            Which rows to average over; all by default. Lags are of all rows.
-
-        Returns
-        -------
-        ndarray of shape (n_records, n_modes)
-            For the records of ``residuals_``, in order of time. The sum over them is 1; 0 for a mode without any.
-        """
-        weather = self._weather(X).inputs
-        return self.residuals_.shares(weather if rows is None else weather[np.asarray(rows)])
+        check_is_fitted(self)
+        return self.recorder_.residuals
 
     @property
     def training_records_(self) -> tuple[Any, Any]:
         """Temperatures and frequencies that `fit` was given."""
         check_is_fitted(self)
         return self.records_.temperatures, self.records_.frequencies
-
-    @property
-    def residuals_(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records by weather."""
-        check_is_fitted(self)
-        return self.recorder_.residuals
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far inputs and parameters are outside the training range, row by row.
@@ -928,7 +772,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             the inverse. Where the mapper has learned from a fleet, ``from_fleet`` is True in weather that only the
             fleet has seen.
         """
-        weather = self._weather(X)
+        weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
         theta = as_columns(self.mapper_.predict(weather.filled))
@@ -966,7 +810,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         predicted = self.predict(X)
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
-            warn_user(f"the score is of {scored} of {len(predicted)} rows: the others have gaps", "rows scored")
+            warn_user(
+                f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
+                UnevaluatedRowsWarning,
+                "rows scored",
+            )
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
@@ -976,25 +824,85 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return tags
 
     def _default_part(self, name: str) -> BaseEstimator | None:
-        return default_part(self, name)
+        if name == "inverse":
+            return InverseSurrogate(reduce=self.reduce, n_jobs=self.n_jobs)
+        if name == "aligner":
+            return BiasAligner(method="scale")
+        if name == "mapper":
+            return TemperatureMapper()
+        return ratio_regressor() if is_auto(getattr(self, name)) else None
 
     def set_params(self, **params: Any) -> Self:
         super().set_params(**params)
-        warn_of_inert(self, params)
+        warn_of_inert(self.inverse, self.model, params)
         return self
 
-    def _fit_inverse(self, T: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    def _part(self, name: str) -> Any:
+        """A clone of a part, or what it is by default."""
+        part = getattr(self, name)
+        return self._default_part(name) if part is None or is_auto(part) else clone(part)
+
+    def _cloned_parts(self) -> tuple[Any, Any, Any, Any]:
+        """Clones of inverse, mapper, aligner and imputer, with the model, and seeds where they have none."""
+        unchanged = FunctionTransformer().set_output(transform="default")
+        inverse, mapper = self._part("inverse"), self._part("mapper")
+        aligner = unchanged if self.aligner == "passthrough" else self._part("aligner")
+        imputer = None if self.imputer == "passthrough" else clone(self.imputer)
+        for part in (aligner, *aligner.get_params().values()):
+            if isinstance(part, BiasAligner) and part.reference is None:
+                part.set_params(reference=self.model)
+        names = list(self.model.parameter_names)
+        for part in ChainInverse(inverse).surrogates:
+            if part.model is None:
+                part.set_params(model=self.model)
+            if part.memory is None:
+                part.set_params(memory=self.memory)
+            if list(part.model.parameter_names) != names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                    f"{self.model!r} has"
+                )
+            if is_auto(part.reduce) and (not self.reduce or hasattr(part.model, "reduced")):
+                part.set_params(reduce=self.reduce)
+        random_state = seeded(self.random_state)
+        for part in (inverse, mapper, aligner, imputer):
+            if part is not None:
+                seed_parts(part, random_state)
+        return inverse, mapper, aligner, imputer
+
+    def _read_records(self, X: Table, y: Any) -> tuple[Any, Any]:
+        """Copies of temperatures and frequencies, checked; frames stay frames."""
+        check_model(self.model)
+        if y is None:
+            raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+        options = {"dtype": np.float64, "ensure_all_finite": "allow-nan", "copy": True}
+        T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
+        self.y_is_vector_ = np.ndim(y) == 1
+        if self.y_is_vector_:
+            y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
+        F = frame_like(y, check_array(y, **options))
+        check_same_rows(X, y, ("temperatures", "frequencies"))
+        check_frequencies(F, self.model)
+        check_temperatures(T)
+        check_columns(T, "temperature", varying=True)
+        return T, F
+
+    def _findings(self, T: Table, F: Table) -> Any:
+        """What `check_records` finds, read from the memory if these records were checked before."""
+        return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
+
+    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Any:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
             F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
-        aligned = with_shapes(self.inverse_, self.aligner_.fit(F).transform(F), shapes)
-        for part in surrogates_in(self.inverse_):
+        aligned = inverse.with_shapes(self.aligner_.fit(F).transform(F), shapes)
+        for part in inverse.surrogates:
             if isinstance(part.noise, str):
                 part.set_params(noise=self.noise_)
         self.inverse_.fit(aligned)
         if shapes is not None:
-            warn_each(shape_warnings(self.inverse_, aligned))
+            warn_each(inverse.shape_warnings(aligned))
         return aligned
 
     def _hold(self, thermal: ThermalModel, recorder: RecordSimulator) -> Self:
@@ -1005,22 +913,31 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.parameters_ = frame_like(self.records_.temperatures, self.records_.targets, self.parameter_names_)
         return self
 
-    def _weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled, and what M2 sees of them."""
-        check_is_fitted(self)
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
-        filled, deviations = self.sensors_.fill(values)
-        return Weather(X, frame_like(X, filled), deviations, self.mapper_)
-
-    @property
-    def _intervals(self) -> PredictionIntervals:
-        return PredictionIntervals(self.thermal_, self.residuals_)
-
-    def _as_targets(self, X: Any, frequencies: Array) -> Any:
+    def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
 
-def named(T: Any, theta: Array, names: Sequence[str]) -> pd.DataFrame:
+def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
+
+
+def warn_of_inert(inverse: Any, model: FEModel, names: Iterable[str]) -> None:
+    """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
+    frame = sys._getframe(2)
+    while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
+        frame = frame.f_back  # past the estimators around the chain
+    if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
+        return
+    parts = {"inverse": inverse} | {f"inverse__{name}": part for name, part in inverse.get_params().items()}
+    for name, part in parts.items():
+        searched = [one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)]
+        if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
+            warn_user(
+                f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
+                "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
+                "search over the InverseSurrogate itself, whose score is that of its regressor",
+                ResultWarning,
+                "inert settings searched",
+            )

@@ -10,26 +10,28 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.arguments import seem_rad_per_s
 from skthermo._estimators.regressors import offers, reach_of
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._tables.frames import column_names, columns_by_sensor
+from skthermo._tables.frames import Table, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import last_step
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.weather import SensorRegression
-from skthermo.surrogate._fitted_chain import FittedChain
-from skthermo.surrogate.chain._parts import Estimates
+from skthermo.surrogate.chain._fitted_chain import FittedChain
+from skthermo.surrogate.chain._inverse_of_chain import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
-MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is told
+MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
@@ -110,7 +112,7 @@ class FitReport(SavesFrames):
         With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
     follows : mapping or None
-        Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
+        Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
 
@@ -165,12 +167,12 @@ class FitReport(SavesFrames):
             f"{when}."
             for name, rows, deviation, when in self.filled.itertuples()
         ]
-        lines += [f"{text[0].upper()}{text[1:]}." for _, text in self.warnings()]
+        lines += [f"{text[0].upper()}{text[1:]}." for text in map(str, self.warnings())]
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
             lines.append(
-                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
-                "apart."
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot distinguish all "
+                "of them."
             )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
@@ -183,7 +185,8 @@ class FitReport(SavesFrames):
             )
         if self.fleet is not None:
             lines.append(
-                f"In weather that these records have not seen, predictions stand on a fleet: {self._listed_weather()}."
+                "In weather that these records have not seen, predictions are based on a fleet: "
+                f"{self._listed_weather()}."
             )
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
@@ -224,13 +227,13 @@ class FitReport(SavesFrames):
             percent["rows outside (%)"] = (100 * self.outside).round(1)
         return percent
 
-    def warnings(self) -> Iterator[tuple[str, str]]:
+    def warnings(self) -> Iterator[SkthermoWarning]:
         """Warnings about the rows.
 
         Yields
         ------
-        kind, text : str
-            What the warning is about, and what it says; the report has the same sentences.
+        SkthermoWarning
+            Its text stands in the report, too.
         """
         yield from self._few_trained()
         yield from self._few_for_parameters()
@@ -241,70 +244,70 @@ class FitReport(SavesFrames):
         yield from self._large_discrepancy()
         yield from self._poor_round_trip()
 
-    def _few_trained(self) -> Iterator[tuple[str, str]]:
+    def _few_trained(self) -> Iterator[SkthermoWarning]:
         if 2 * self.n_trained >= self.n_rows:
             return
         reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
-        yield (
-            "half of the rows",
+        yield FewRecordsWarning(
             f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
             "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
+            "half of the rows",
         )
 
-    def _few_for_parameters(self) -> Iterator[tuple[str, str]]:
+    def _few_for_parameters(self) -> Iterator[SkthermoWarning]:
         n_parameters = len(self.deviations)
         if self.n_trained >= ROWS_PER_PARAMETER * n_parameters or self.fleet is not None:
             return
-        yield (
-            "few rows",
+        yield FewRecordsWarning(
             f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
             "rows for each",
+            "few rows",
         )
 
-    def _mostly_filled(self) -> Iterator[tuple[str, str]]:
+    def _mostly_filled(self) -> Iterator[SkthermoWarning]:
         for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples():
-            yield (
-                f"mostly filled {name}",
+            yield RecordsWarning(
                 f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the others "
                 f"({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
+                f"mostly filled {name}",
             )
 
-    def _worse_than_mean(self) -> Iterator[tuple[str, str]]:
+    def _worse_than_mean(self) -> Iterator[SkthermoWarning]:
         chain, mean = self.errors.mean()
         if not chain > WORSE_THAN_MEAN * mean:
             return
         worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
-        yield (
-            "worse than the mean",
+        yield ModelWarning(
             f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
             f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
             "see report_.offsets, update the model, or use the default aligner and discrepancy",
+            "worse than the mean",
         )
 
-    def _hidden(self) -> Iterator[tuple[str, str]]:
+    def _hidden(self) -> Iterator[SkthermoWarning]:
         if not self.has_hidden_offsets:
             return
         large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
         told = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
-        yield (
-            "hidden offsets",
+        yield ModelWarning(
             f"the aligner hides offsets between measurement and model that weather does not explain ({told}): "
             "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
             "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
             "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
+            "hidden offsets",
         )
 
-    def _many_outliers(self) -> Iterator[tuple[str, str]]:
+    def _many_outliers(self) -> Iterator[SkthermoWarning]:
         far = np.zeros(0, dtype=bool) if self.findings is None else self.findings.outliers.to_numpy()
         if far.sum() <= MANY_OUTLIERS * far.size:
             return
-        yield (
-            "many outliers",
+        yield RecordsWarning(
             f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
             "by one way of identification: see report_.findings",
+            "many outliers",
         )
 
-    def _large_discrepancy(self) -> Iterator[tuple[str, str]]:
+    def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
         if self.variation is None:
             return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
@@ -313,26 +316,26 @@ class FitReport(SavesFrames):
             f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
         )
         if told:
-            yield (
-                "large discrepancy",
+            yield ModelWarning(
                 f"the FE model cannot follow what the weather does to {told}: predictions rely on the discrepancy, and "
                 "simulated damage on a model that is not calibrated; expected a model updated to these records "
                 "(ModelUpdater), or parameters that this weather changes",
+                "large discrepancy",
             )
 
-    def _poor_round_trip(self) -> Iterator[tuple[str, str]]:
+    def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
         if self.round_trip is None:
             return
         shares = self.round_trip.abs() / self.scatter.clip(lower=UNSEEN)
         if not (shares > 1).any():
             return
         worst = shares.idxmax()
-        yield (
-            "round trip",
+        yield ModelWarning(
             f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
             f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
             f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
             "refines its estimates, narrow_bounds=True, or more samples",
+            "round trip",
         )
 
 
@@ -389,7 +392,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
 
 
 def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
+    """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
@@ -403,7 +406,7 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
-def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
+def filled(T: Table, sensors: SensorRegression) -> pd.DataFrame:
     """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
     deviations, found = sensors.fill(T)[1], {}
     for sensor, columns in columns_by_sensor(T).items():
@@ -431,7 +434,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     return pd.Series(counts, dtype=int)
 
 
-def periods(T: Any, rows: NDArray[np.bool_]) -> str:
+def periods(T: Table, rows: NDArray[np.bool_]) -> str:
     """When some rows of a table were taken: their period, or the longest one and how many there are."""
     order = np.argsort(row_times(T), kind="stable")
     places = np.flatnonzero(rows[order])
@@ -442,7 +445,7 @@ def periods(T: Any, rows: NDArray[np.bool_]) -> str:
     return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
 
 
-def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
+def _labels(T: Table, rows: NDArray[np.intp]) -> list[str]:
     """What rows are called: their stamps, or their numbers."""
     if not has_stamps(T):
         return [f"row {row}" for row in rows]
@@ -451,19 +454,19 @@ def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
     return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 
-def mode_offsets(model: FEModel, F: Any) -> pd.Series:
+def mode_offsets(model: FEModel, F: Table) -> pd.Series:
     """Mean measured frequency against the model's nominal one, by mode, in percent."""
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
 
 
-def hidden_offsets(aligner: Any, F: Any) -> pd.Series:
+def hidden_offsets(aligner: BaseEstimator, F: Table) -> pd.Series:
     """Mean measured frequency against the mean that the model sees behind an aligner, by mode, in percent."""
     seen = np.nanmean(as_floats(aligner.transform(F)), axis=0)
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
 
 
-def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Array) -> float:
+def unexplained_offset(hidden: pd.Series, predicted: Array, T: Table, errors: Array) -> float:
     """Size of hidden offsets as a share of what weather, errors of the means and a calibrated model may leave."""
     offsets = 100 * np.log1p(hidden.to_numpy() / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]
@@ -476,8 +479,8 @@ def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Arra
     return float(size / (MOST_UNEXPLAINED if n_months >= MOST_OF_A_YEAR else MOST_OF_FEW_MONTHS))
 
 
-def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
-    """Warnings about the order and the units of the modes: kind and text of each."""
+def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
+    """Warnings about the order and the units of the modes."""
     offsets = mode_offsets(model, F)
     ratios = 1 + offsets.to_numpy() / 100
     far = offsets[offsets.abs() > LARGE_OFFSET]
@@ -490,17 +493,17 @@ def mode_warnings(model: FEModel, F: Any) -> Iterator[tuple[str, str]]:
         moved = order != unchanged
         is_better = (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET
         if moved.any() and is_better and len(np.unique(order)) == len(order):
-            yield (
-                "order of modes",
+            yield ModelWarning(
                 f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
                 f"order of its modes, or model.with_modes({order.tolist()})",
+                "order of modes",
             )
             return
     if len(far):
         units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
-        yield (
-            "offset of modes",
+        yield RecordsWarning(
             f"measured modes differ from the model's nominal frequencies: {listed}{units}; expected Hz, the modes of "
             "the model in their order, and a model updated to the structure",
+            "offset of modes",
         )

@@ -1,27 +1,171 @@
-"""The FE model that knows the weather: temperatures in, frequencies out, equations (7) and (8)."""
+"""The FE model that knows the weather: equations (7) and (8), and what it cannot follow, the discrepancy."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.arguments import as_mapping
-from skthermo._estimators.regressors import inputs_of_last_step, reach_of, told_by_fleet, warn_of_fleet
-from skthermo._estimators.warnings import warn_each, warn_user
-from skthermo._tables.arrays import HUGE, Array, MatrixLike, as_columns, as_floats, is_real, real_array
-from skthermo._tables.frames import check_same_rows, column_names
+from skthermo._estimators.regressors import (
+    fit_outputs,
+    inputs_of_last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+    warn_of_fleet,
+)
+from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
+from skthermo._tables.arrays import (
+    HUGE,
+    Array,
+    MatrixLike,
+    as_columns,
+    as_floats,
+    is_real,
+    median,
+    patterns,
+    real_array,
+    robust_deviation,
+    spread_evenly,
+)
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo.residuals.weather import SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
+from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.chain._discrepancy import Discrepancy
+
+PENALTIES = np.logspace(-1, 5, 7)  # few, because it is fitted often; below them, rounding errors would show
+FEWEST = 30  # records of a mode, below which its discrepancy counts as 0
+TINY = 1e-300
+FAR = 5.0  # robust deviations of ln(measured / model) from the median, beyond which a record does not count
+MOST = 20_000  # records, spread evenly, that a discrepancy is learned from
+
+
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
+    """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
+
+    ``learned`` holds the fitted regressors of the ratios, from inputs of the ``mapper``; modes with few records have
+    none. The changes that they add to the ``levels`` of the modes count by ``shares``, the slopes of the ratios over
+    what is predicted out of fold.
+    """
+
+    regressor: BaseEstimator
+    learned: tuple[Ratios, ...]
+    levels: Array
+    shares: Array
+    sensors: SensorRegression | None = None
+    mapper: Any = None
+
+    @classmethod
+    def of(
+        cls,
+        regressor: BaseEstimator,
+        inputs: Array,
+        ratios: Array,
+        weights: Array | None,
+        folds: NDArray[np.intp],
+        **chain: Any,
+    ) -> Discrepancy:
+        """Learn from inputs of M2, ratios of measured over modelled frequencies, weights and the folds of the rows."""
+        n_modes = ratios.shape[1]
+        learned = () if regressor is None else ratios_of(regressor, inputs, ratios, weights)
+        found = cls(regressor, learned, np.zeros(n_modes), np.zeros(n_modes), **chain)
+        for one in learned:
+            logs = np.log(ratios[np.ix_(one.rows, one.modes)])
+            level = np.average(logs, axis=0, weights=None if weights is None else weights[one.rows])
+            change = np.zeros_like(logs)
+            for fold in np.unique(folds[one.rows]):
+                test = folds[one.rows] == fold
+                other = one.refitted(regressor, inputs, ratios, weights, one.rows[~test])
+                if other.regressor is not None:
+                    change[test] = other.logs(inputs[one.rows[test]]) - level
+            slopes = (change * (logs - level)).sum(axis=0) / np.maximum((change**2).sum(axis=0), TINY)
+            found.levels[one.modes], found.shares[one.modes] = level, np.clip(slopes, 0, 1)
+        return found
+
+    def relearned(self, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.bool_]) -> Discrepancy:
+        """The same with regressors that have learned some of the rows only."""
+        some = (
+            ratios_of(self.regressor, inputs, np.where(rows[:, np.newaxis], ratios, np.nan), weights)
+            if self.learned
+            else ()
+        )
+        return replace(self, learned=some)
+
+    def __call__(self, X: Table) -> Array:
+        """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
+        T = frame_like(X, self.sensors.fill(as_floats(X))[0])
+        with without_warnings():
+            return self.at(as_floats(inputs_of_last_step(self.mapper, T)))
+
+    def at(self, inputs: Array) -> Array:
+        """delta at inputs of M2; NaN in rows in which one is missing."""
+        known = ~np.isnan(inputs).any(axis=1)
+        delta = np.where(known[:, np.newaxis], self.levels, np.nan)
+        for one in self.learned if known.any() else ():
+            change = one.logs(inputs[known]) - self.levels[one.modes]
+            delta[np.ix_(known, one.modes)] += self.shares[one.modes] * change
+        return delta
+
+
+@dataclass(frozen=True, eq=False)
+class Ratios:
+    """A regressor of ratios, fitted to some ``modes`` that are there in the same rows; None where these are too few."""
+
+    modes: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    regressor: BaseEstimator
+
+    def refitted(
+        self, regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.intp]
+    ) -> Ratios:
+        """The same modes learned from other rows."""
+        if len(rows) < FEWEST or not np.ptp(inputs[rows], axis=0).all():
+            return replace(self, rows=rows, regressor=None)
+        values = ratios[np.ix_(rows, self.modes)]
+        values = values[:, 0] if len(self.modes) == 1 else values
+        fitted = fit_outputs(regressor, inputs[rows], values, None if weights is None else weights[rows])
+        return replace(self, rows=rows, regressor=fitted)
+
+    def logs(self, inputs: Array) -> Array:
+        """Logarithms of the ratios at complete inputs, (n_samples, n_modes)."""
+        return np.log(as_columns(self.regressor.predict(inputs)))
+
+
+def ratios_of(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> tuple[Ratios, ...]:
+    """Regressors of the modes, of which those that are there in the same rows are learned together.
+
+    Rows in which a mode is far from its median are left out.
+    """
+    usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
+    logs = np.log(np.where(usable[:, np.newaxis], ratios, np.nan))
+    with np.errstate(invalid="ignore"):
+        far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
+    present, of_mode = patterns(~np.isnan(logs).T)
+    learned = []
+    for number, mask in enumerate(present):
+        modes = np.flatnonzero(of_mode == number)
+        rows = spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
+        learned.append(Ratios(modes, rows, None).refitted(regressor, inputs, ratios, weights, rows))
+    return tuple(one for one in learned if one.regressor is not None)
+
+
+def ratio_regressor() -> TemperatureMapper:
+    """What learns ratios and the noise by default, with a penalty for each mode."""
+    return TemperatureMapper(default_lines(PENALTIES, alpha_per_target=True))
+
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
-ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
+ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 
 
@@ -32,10 +176,10 @@ class Weather:
     ``mapper`` is the fitted M2 whose last step sees them as ``inputs``, lags included.
     """
 
-    given: Any
-    filled: Any
+    given: Table
+    filled: Table
     deviations: Array
-    mapper: Any
+    mapper: BaseEstimator
 
     def __len__(self) -> int:
         return len(self.filled)
@@ -55,13 +199,12 @@ class Weather:
 class ThermalModel(SavesFrames):
     """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
 
-    ``parameter_names`` and ``mode_names`` are the columns of theta and of the frequencies. ``sensors`` and
-    ``training_range`` tell unusual weather.
+    ``sensors`` and ``training_range`` detect unusual weather.
     """
 
-    mapper: Any
+    mapper: BaseEstimator
     simulator: Simulator
-    aligner: Any
+    aligner: BaseEstimator
     discrepancy: Discrepancy
     sensors: SensorRegression
     training_range: TrainingRange
@@ -78,29 +221,30 @@ class ThermalModel(SavesFrames):
             warn_user(
                 f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
                 f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                ModelWarning,
                 "impossible parameters",
             )
         return theta
 
-    def _warnings(self, weather: Weather) -> Iterator[tuple[str, str]]:
-        """What is unusual about weather: kind and text of each warning."""
+    def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
+        """Warnings about what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
         consequence = "standard deviations and intervals of predictions are widened by what that costs"
         message = told_fills(weather.deviations, column_names(filled, "T"), consequence)
         if message:
-            yield "filled temperatures", message
+            yield RecordsWarning(message, "filled temperatures")
         message = told_unpredicted(unknown, as_floats(filled))
         if message:
-            yield "rows that cannot be predicted", message
+            yield UnevaluatedRowsWarning(message, "rows that cannot be predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
         message = learned.warning(inputs)
         if message:
-            yield "weather outside the training range", message
+            yield WeatherWarning(message, "weather outside the training range")
         consequence = "standard deviations and intervals say how uncertain that is"
         warn_of_fleet(told_by_fleet(self.mapper, filled), consequence)
         message = self.sensors.warning(weather.given)
         if message:
-            yield "sensor apart from others", message
+            yield RecordsWarning(message, "sensor apart from others")
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
@@ -145,8 +289,33 @@ class ThermalModel(SavesFrames):
         effects = slopes[:, :, np.newaxis] * jacobian
         return effects @ covariances @ effects.swapaxes(1, 2)
 
+    def known_deviations(self, weather: Weather) -> Array:
+        """Relative standard deviations because temperatures were filled and the mapper states errors of its own."""
+        covariances = self.covariances_of_fills(weather), self.covariances_of_mapper(weather)
+        return np.hypot(*(np.sqrt(np.einsum("ijj->ij", part)) for part in covariances))
 
-def frequencies_of(simulator: Simulator, aligner: Any, theta: Array, n_jobs: int | None) -> Array:
+    def covariances_of_fills(self, weather: Weather) -> Array:
+        """Covariances of ln f because temperatures were filled, (n_rows, n_modes, n_modes)."""
+        n_parameters = len(self.parameter_names)
+
+        def predict(filled: Table) -> Array:
+            return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
+
+        def log_frequencies(both: Array) -> Array:
+            return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
+
+        cost = PredictionError.of_fills(self.sensors, weather.given, weather.filled, predict, log_frequencies)
+        return cost.of_all(len(weather), len(self.mode_names))
+
+    def covariances_of_mapper(self, weather: Weather) -> Array:
+        """Covariances of ln f as the mapper states them; zero where it does not."""
+        if not offers(self.mapper, "predict_covariance"):
+            return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
+        theta = as_columns(self.mapper.predict(weather.filled))
+        return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
+
+
+def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
     return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
 
@@ -174,6 +343,7 @@ def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> 
             warn_user(
                 f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
                 "and not percent",
+                ModelWarning,
                 "large factor",
             )
         factors[name] = float(factor)

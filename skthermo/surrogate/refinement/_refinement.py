@@ -1,9 +1,11 @@
-"""Estimates of the inverse surrogate, refined on the FE model."""
+"""Estimates of the inverse surrogate, refined on the FE model from the solution of a response surface."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
+from itertools import combinations_with_replacement
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -11,12 +13,93 @@ from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._estimators.arguments import check_bounds, check_prior
+from skthermo._estimators.threads import single_blas_thread
 from skthermo._io import with_progress
 from skthermo._tables.arrays import Array, robust_deviation, spread_evenly
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.refinement._posterior import Linearise, Objective, Prior, Refined, minimise, refine
-from skthermo.surrogate.refinement._response_surface import ResponseSurface
 from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
+
+SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
+ROWS_PER_CHUNK = 1024
+KEPT = 0.01  # weight of the samples of the box, beside solutions near the records
+
+
+@dataclass(frozen=True)
+class ResponseSurface:
+    """ln f as a polynomial of z = (ln theta - middle) / scale; coefficients (n_terms, n_modes)."""
+
+    degree: int
+    middle: Array
+    scale: Array
+    coefficients: Array
+
+    @classmethod
+    def of_samples(cls, theta: Array, frequencies: Array) -> ResponseSurface | None:
+        """The surface of samples of a box; None where they are too few."""
+        known = ~(np.isnan(frequencies).any(axis=1) | np.isnan(theta).any(axis=1))
+        x, log_f = np.log(theta[known]), np.log(frequencies[known])
+        n_parameters = theta.shape[1]
+        degree = next((d for d in (3, 2) if len(x) >= SAMPLES_PER_TERM * comb(n_parameters + d, d)), None)
+        if degree is None:
+            return None
+        middle, scale = x.mean(axis=0), x.std(axis=0)
+        return cls(degree, middle, scale, least_squares(terms((x - middle) / scale, degree), log_f))
+
+    def near(self, x: Array, frequencies: Array, sensitivity: Array) -> ResponseSurface:
+        """The surface that is accurate near solutions, frequencies and d ln f / d ln theta at rows of ln theta = x.
+
+        In directions in which these hardly differ, this surface is kept.
+        """
+        solved = np.isfinite(frequencies).all(axis=1) & np.isfinite(sensitivity).all(axis=(1, 2))
+        z, log_f = (x[solved] - self.middle) / self.scale, np.log(frequencies[solved])
+        slopes = (sensitivity[solved] * self.scale).swapaxes(1, 2).reshape(-1, log_f.shape[1])
+        kept = KEPT * np.sqrt(len(z)) * np.eye(len(self.coefficients))
+        equations = np.vstack([terms(z, self.degree), slopes_of_terms(z, self.degree).reshape(-1, len(kept)), kept])
+        coefficients = least_squares(equations, np.vstack([log_f, slopes, kept @ self.coefficients]))
+        return replace(self, coefficients=coefficients)
+
+    def linearise(self, theta: Array) -> tuple[Array, Array]:
+        """Frequencies and d ln f / d ln theta."""
+        z = (np.log(theta) - self.middle) / self.scale
+        log_f, slopes = (
+            np.empty((len(z), self.coefficients.shape[1])),
+            np.empty((len(z), self.coefficients.shape[1], z.shape[1])),
+        )
+        for rows in (slice(i, i + ROWS_PER_CHUNK) for i in range(0, len(z), ROWS_PER_CHUNK)):
+            log_f[rows] = terms(z[rows], self.degree) @ self.coefficients
+            slopes[rows] = (slopes_of_terms(z[rows], self.degree) @ self.coefficients).swapaxes(1, 2)
+        return np.exp(log_f), slopes / self.scale
+
+
+def products(n_variables: int, degree: int) -> list[NDArray[np.intp]]:
+    """Which variables are multiplied in each product of one, two, ... variables, (n_products, n_factors)."""
+    variables = range(n_variables)
+    return [np.array([*combinations_with_replacement(variables, factors)]) for factors in range(1, degree + 1)]
+
+
+def terms(z: Array, degree: int) -> Array:
+    """1 and every product of up to so many variables, (n_samples, n_terms)."""
+    values = [z[:, chosen].prod(axis=2) for chosen in products(z.shape[1], degree)]
+    return np.hstack([np.ones((len(z), 1)), *values])
+
+
+def slopes_of_terms(z: Array, degree: int) -> Array:
+    """Derivatives of the terms by each variable, (n_samples, n_variables, n_terms)."""
+    slopes = [np.zeros((*z.shape, 1))]
+    for chosen in products(z.shape[1], degree):
+        slope, column = np.zeros((*z.shape, len(chosen))), np.arange(len(chosen))
+        for factor in range(chosen.shape[1]):
+            slope[:, chosen[:, factor], column] += z[:, np.delete(chosen, factor, axis=1)].prod(axis=2)
+        slopes.append(slope)
+    return np.concatenate(slopes, axis=2)
+
+
+def least_squares(equations: Array, values: Array) -> Array:
+    """Least-squares solution, the same bits on any number of threads."""
+    with single_blas_thread():
+        return np.linalg.lstsq(equations, values, rcond=None)[0]
+
 
 EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 """Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
@@ -32,7 +115,7 @@ ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it 
 ROWS_FOR_SCATTER = 365
 STEPS_ON_SURFACE = 100
 ROWS_FOR_SURFACE = 50  # number of records near which a response surface is made accurate
-ROWS_FOR_BOX = 200  # number of records that tell where a reduced model has to be accurate
+ROWS_FOR_BOX = 200  # number of records near which a reduced model has to be accurate
 CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
 
 
@@ -45,10 +128,9 @@ def unconverged(found: Bunch) -> NDArray[np.bool_]:
 class Refinement:
     """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
-    ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
-    Rows start where the response ``surface`` has its posterior mode, or at the regressor's guess without one. Steps are
-    taken on the reduced model, if there is one; rows that end outside its box go on with the full model.
-    ``recent`` holds the rows that the scatter was estimated from until they are asked for, mostly at once.
+    ``noise`` holds relative standard deviations, (n_modes,); ``n_steps`` is the most for each row. Rows start where the
+    response ``surface`` has its posterior mode, or at the regressor's guess. Rows that end outside the box of a reduced
+    model go on with the full one. ``recent`` holds the rows that the scatter was estimated from until they are needed.
     """
 
     simulator: Simulator
@@ -154,7 +236,7 @@ class Refinement:
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
-        """Refine rows, in blocks that tell how far the work is."""
+        """Refine rows in blocks, which show the progress."""
         size = CHUNKS_PER_BLOCK * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
         blocks = np.split(np.arange(len(start)), range(size, len(start), size))
         refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
@@ -195,10 +277,8 @@ class Refinement:
         return np.abs(x - self.prior.mean) > FAR_OUTSIDE * expected
 
     def estimated_scatter(self, inputs: Array, guess: Array) -> Array:
-        """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
-
-        Records can tell only if there are more modes than parameters, and are not exact themselves.
-        """
+        """The noise of each mode; where it is 0, what exact parameters leave of complete records, with more modes than
+        parameters."""
         n_modes, n_parameters = len(self.noise), guess.shape[1]
         if self.noise.all():
             return self.noise

@@ -17,7 +17,6 @@ from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
 from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.monitoring.drift._observations import observation, shapes_of_time
-from skthermo.plotting import ParameterHistoryDisplay
 from skthermo.surrogate import DataInformedFEM
 
 GROUPS = ["bottom", "top", "diagonal"]
@@ -310,22 +309,6 @@ def test_wrong_input_is_refused(healthy):
     for freq in ("month", "ME", 7, "0D", "NaT"):
         with pytest.raises(ValueError, match=f"freq is {freq!r}; expected a day or some days"):
             track_parameters(fem, T, F, freq=freq)
-
-
-def test_the_display_shows_each_group_its_band_and_a_limit(history):
-    import matplotlib.pyplot as plt
-
-    display = ParameterHistoryDisplay.from_history(history, limit=-0.1)
-    assert list(display.lines_) == GROUPS
-    drawn = display.lines_["bottom"].get_ydata()
-    assert_allclose(drawn, 100 * (history.table["bottom"]["estimate"] - 1))
-    assert [line.get_ydata()[0] for line in display.axes_[0].lines][-1] == pytest.approx(-10)
-    assert display.axes_[0].get_title(loc="right") == "drifts: yes"
-    with pytest.raises(ValueError, match="expected some of"):
-        ParameterHistoryDisplay.from_history(history, groups=["deck"])
-    with pytest.raises(ValueError, match="expected a ParameterHistory"):
-        ParameterHistoryDisplay.from_history(None)
-    plt.close("all")
 
 
 def test_more_groups_than_modes_are_said_to_be_a_limit(history):

@@ -46,6 +46,12 @@ def service(watch, T, F, n_days=30):
     return state
 
 
+def masked(watch, state, T, F):
+    """Temperatures and responses without what sensors at fault show."""
+    seen = watch.masked(state, T, F)
+    return seen.T, seen.F
+
+
 def after(table, n_days=ONSET):
     """Rows from a day on."""
     return table.index[n_days * PER_DAY :]
@@ -75,8 +81,8 @@ def with_fault(records, kind):
 def test_healthy_sensors_are_left_alone(watch, records):
     state = service(watch, *records)
     assert watch.faults(state).empty
-    for masked, given in zip(watch.masked(state, *records), records, strict=True):
-        pd.testing.assert_frame_equal(masked, given)
+    for kept, given in zip(masked(watch, state, *records), records, strict=True):
+        pd.testing.assert_frame_equal(kept, given)
 
 
 @pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "drift", "implausible", "swapped"])
@@ -90,12 +96,12 @@ def test_a_fault_is_named_dated_and_left_out(watch, records, kind):
     onset = after(T)[0]
     assert (abs(faults["since"] - onset) <= pd.Timedelta(days=20 if kind == "drift" else 1)).all()
     assert (faults["detected"] - onset <= pd.Timedelta(days=40 if kind == "drift" else 3)).all()
-    masked = pd.concat(watch.masked(state, T, F), axis=1).loc[after(T, ONSET + 5)]
+    kept = pd.concat(masked(watch, state, T, F), axis=1).loc[after(T, ONSET + 5)]
     if kind == "swapped":
-        np.testing.assert_array_equal(masked[columns], records[1].loc[masked.index, columns])
+        np.testing.assert_array_equal(kept[columns], records[1].loc[kept.index, columns])
     else:
-        assert masked[columns].isna().all(axis=None)
-    assert masked.drop(columns=columns).notna().all(axis=None)
+        assert kept[columns].isna().all(axis=None)
+    assert kept.drop(columns=columns).notna().all(axis=None)
 
 
 @pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "swapped"])
@@ -107,8 +113,8 @@ def test_a_repaired_sensor_comes_back(watch, records, kind):
     faults = watch.faults(state)
     assert faults["column"].tolist() == columns
     assert (abs(faults["until"] - repaired[0]) <= pd.Timedelta(days=2)).all()
-    masked = pd.concat(watch.masked(state, *records), axis=1)
-    pd.testing.assert_frame_equal(masked, pd.concat(records, axis=1))
+    kept = pd.concat(masked(watch, state, *records), axis=1)
+    pd.testing.assert_frame_equal(kept, pd.concat(records, axis=1))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +126,7 @@ def test_damage_is_not_taken_for_a_fault(watch, records, lost):
         F.loc[after(F), mode] *= 1 - share
     state = service(watch, T, F)
     assert watch.faults(state).empty
-    pd.testing.assert_frame_equal(watch.masked(state, T, F)[1], F)
+    pd.testing.assert_frame_equal(masked(watch, state, T, F)[1], F)
 
 
 @pytest.mark.parametrize("moved", [[6.0, -6.0, 20.0], [-6.0, 20.0, 20.0], [25.0, 25.0, 25.0]])
@@ -129,7 +135,7 @@ def test_where_most_thermometers_depart_none_is_left_out(watch, records, moved):
     T.loc[after(T), ["T0", "T1", "T2"]] += moved
     state = service(watch, T, records[1], 30)
     assert set(watch.faults(state)["kind"]) <= {"disagree"}
-    pd.testing.assert_frame_equal(watch.masked(state, T, records[1])[0], T)
+    pd.testing.assert_frame_equal(masked(watch, state, T, records[1])[0], T)
 
 
 def test_two_thermometers_disagree_and_both_stay():
@@ -140,7 +146,7 @@ def test_two_thermometers_disagree_and_both_stay():
     faults = watch.faults(state)
     assert set(faults["column"]) == {"T0", "T1"}
     assert set(faults["kind"]) == {"disagree"}
-    pd.testing.assert_frame_equal(watch.masked(state, T, F)[0], T)
+    pd.testing.assert_frame_equal(masked(watch, state, T, F)[0], T)
 
 
 def test_two_that_are_left_disagree(watch, records):
@@ -150,7 +156,7 @@ def test_two_that_are_left_disagree(watch, records):
     state = service(watch, T, records[1])
     faults = watch.faults(state)
     assert faults.groupby("kind")["column"].apply(sorted).to_dict() == {"dead": ["T0"], "disagree": ["T1", "T2"]}
-    assert watch.masked(state, T, records[1])[0]["T1"].equals(T["T1"])
+    assert masked(watch, state, T, records[1])[0]["T1"].equals(T["T1"])
 
 
 def test_one_thermometer_can_still_be_dead_or_stuck():
@@ -168,7 +174,7 @@ def test_lags_of_a_thermometer_are_left_out_with_it(watch, records):
     both = SensorWatch.of(lagged.iloc[: N_BASELINE * PER_DAY], F.iloc[: N_BASELINE * PER_DAY])
     state = service(both, lagged, F, 30)
     assert both.faults(state)["column"].tolist() == ["T1"]
-    late = both.masked(state, lagged, F)[0].loc[after(T)]
+    late = masked(both, state, lagged, F)[0].loc[after(T)]
     assert late.columns[late.isna().all()].tolist() == ["T1", "T1_lag1"]
 
 
@@ -176,9 +182,9 @@ def test_what_cannot_be_is_left_out_at_once(watch, records):
     T, F = (table.copy() for table in records)
     row = T.index[-1]
     T.loc[row, "T2"], F.loc[row, "f1"] = -999.0, 20.0
-    masked = pd.concat(watch.masked(watch.start(), T, F), axis=1)
-    assert masked.loc[row].isna().sum() == 2
-    assert masked.isna().sum().sum() == 2
+    kept = pd.concat(masked(watch, watch.start(), T, F), axis=1)
+    assert kept.loc[row].isna().sum() == 2
+    assert kept.isna().sum().sum() == 2
 
 
 def test_outages_of_the_logger_and_empty_days_are_no_faults(watch, records):

@@ -11,6 +11,8 @@ from skthermo.fem import FEModel
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._simulator import Box, Simulator
+from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
+from skthermo.surrogate.chain._thermal_model import Discrepancy, ThermalModel, Weather
 
 
 class FittedChain(Protocol):
@@ -26,7 +28,7 @@ class FittedChain(Protocol):
         Number of temperature columns.
     mode_names_, parameter_names_ : list of str
         Columns of the frequencies and of the parameters.
-    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, box_
+    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, box_, thermal_, recorder_
         What the chain has learned, as `DataInformedFEM` describes it.
     parameters_, noise_, records_, report_
         What it has found in the training records.
@@ -44,23 +46,44 @@ class FittedChain(Protocol):
     inverse_: Any
     mapper_: Any
     aligner_: Any
-    discrepancy_: Any
+    discrepancy_: Discrepancy
     simulator_: Simulator
     sensors_: SensorRegression
     training_range_: TrainingRange
     box_: Box | None
     parameters_: Any
     noise_: Array
-    records_: Any
+    thermal_: ThermalModel
+    recorder_: RecordSimulator
+    records_: TrainingRecords
     report_: Any
 
     @property
     def training_records_(self) -> tuple[Any, Any]:
         """Temperatures and frequencies that ``fit`` was given."""
 
-    @property
-    def residuals_(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records."""
+    def residuals(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records by weather.
+
+        Returns
+        -------
+        BaselineResiduals
+            Relative.
+        """
+
+    def weather(self, X: ArrayLike) -> Weather:
+        """Temperatures, checked and filled.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+
+        Returns
+        -------
+        Weather
+            As ``thermal_``, ``recorder_`` and residuals take them.
+        """
 
     def predict(self, X: ArrayLike) -> Any:
         """Frequencies of the healthy structure.

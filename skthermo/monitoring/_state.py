@@ -1,0 +1,281 @@
+"""All that a monitor knows besides its detector: records, evaluations, events, and how late records are taken in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._tables.arrays import Array
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, Acknowledgement, EventLog
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate
+from skthermo.monitoring._records import Intake, RecordStore
+
+ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
+
+
+@dataclass(frozen=True)
+class Checkpoint(SavesFrames):
+    """Where everything stood at the beginning of a day, before its first record."""
+
+    day: pd.Timestamp
+    corrections: CorrectionState
+    log: EventLog
+
+
+@dataclass(frozen=True)
+class MonitorState(SavesFrames):
+    """Records, evaluations by record and by day, checkpoints of the last days, and what the owner has said of events.
+
+    ``corrected`` are the records as the detector sees them, those kept and the memory before the first checkpoint. It
+    does not change: another one takes its place.
+    """
+
+    store: RecordStore
+    corrected: pd.DataFrame
+    checkpoints: tuple[Checkpoint, ...]
+    log: EventLog
+    evaluations: pd.DataFrame
+    days: pd.DataFrame
+    estimates: tuple[tuple[pd.Timestamp, FalseAlarmEstimate], ...]
+    acknowledgements: tuple[Acknowledgement, ...] = ()
+    n_repeated: int = 0
+    n_late: int = 0
+    n_too_late: int = 0
+
+    @classmethod
+    def of(cls, active: ActiveDetector, store: RecordStore) -> MonitorState:
+        """The state after the baseline, whose last records are the first memory."""
+        times, end = store.baseline.index.asi8, store.last
+        start = active.memory.start(times, len(times), int(times[-1]) + 1)
+        nothing = not_evaluated(store.baseline.index[:0])
+        checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
+        memory = active.corrections.cleaned(store.baseline.iloc[start:])[list(active.trained.columns)]
+        days = _days_of(nothing, np.zeros(0, dtype=np.int64))
+        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimates[DAMAGE]),))
+
+    @property
+    def corrections(self) -> CorrectionState:
+        """States of the corrections at the beginning of the newest day."""
+        return self.checkpoints[-1].corrections
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of records, and of values that were left out."""
+        n_outside = self.n_too_late + len(self.store.ahead)
+        n_records, n_evaluated, n_left_out = (
+            int(self.days[name].sum()) for name in ("n_records", "n_evaluated", "n_left_out")
+        )
+        return {
+            "n_records": n_records + n_outside,
+            "n_repeated": self.n_repeated,
+            "n_late": self.n_late,
+            "n_too_late": self.n_too_late,
+            "n_ahead": len(self.store.ahead),
+            "n_not_evaluated": n_records - n_evaluated + n_outside,
+            "n_left_out": n_left_out,
+        }
+
+    def taken_in(self, active: ActiveDetector, intake: Intake) -> tuple[MonitorState, pd.DataFrame]:
+        """The state after a batch, and what it says of its records and of others that are evaluated anew."""
+        state = replace(
+            self,
+            store=intake.store,
+            n_repeated=self.n_repeated + intake.n_repeated,
+            n_late=self.n_late + intake.n_late,
+            n_too_late=self.n_too_late + len(intake.too_late),
+        )
+        answers = not_evaluated(intake.too_late.index[:0]).assign(revised=False)
+        if len(intake.fresh):
+            state, answers = state.advanced(active, intake.fresh.index)
+        outside = pd.concat([intake.too_late, intake.ahead])
+        if len(outside):
+            refused = not_evaluated(outside.index, active.threshold, intake.reasons)
+            answers = pd.concat([answers, refused.assign(revised=False)]).sort_index(kind="stable")
+        return replace(state, store=intake.store.trimmed()), answers
+
+    def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[MonitorState, pd.DataFrame]:
+        """The state after new records, which are in the store already, and what it says of these and of later ones.
+
+        It goes on from the beginning of the day of the first new record, and evaluates all records from that one on.
+        """
+        first, rules, store = fresh[0], active.rules, self.store
+        place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
+        begin = self.checkpoints[place]
+        raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
+        days, states, seen = self._corrected_by_day(active.corrections, begin, raw)
+        memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
+        records, n_memory = pd.concat([memory, seen.records]), len(memory)
+        known = self.evaluations.iloc[slice(*self.evaluations.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
+        new = n_memory + len(known)
+        index = np.append(known["index"].to_numpy(), active.index(records, new))
+        series, times = active.by_kind(records, n_memory, _not_closing(index, seen, active)), raw.index.asi8
+        drivers = np.full(len(raw), "", dtype=object)
+        is_open = np.any([begin.log.is_open_after(rules, kind, one, times) for kind, one in series.items()], axis=0)
+        rows = np.flatnonzero(is_open & ~np.isnan(index))
+        drivers[rows] = active.drivers(records, rows + n_memory)
+        series |= {MEASUREMENT: seen.n_held}
+        modes = dict.fromkeys(series, drivers) | {MEASUREMENT: np.array(seen.held, dtype=object)}
+        bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
+        log, numbers, points = begin.log, {kind: np.zeros(len(raw), dtype=np.int64) for kind in series}, []
+        for day, state, (start, stop) in zip(days, states, pairwise(bounds), strict=True):
+            points.append(Checkpoint(day, state, log))
+            own = slice(start, stop)
+            found, log = log.follow(
+                rules, *({kind: one[own] for kind, one in parts.items()} for parts in (series, modes)), times[own]
+            )
+            for kind, number in found.items():
+                numbers[kind][own] = number
+        reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :])
+        reasons = _with_stiffening(known["reason"].tolist() + reasons, numbers, len(known))
+        answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, seen.is_held)
+        points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
+        needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
+        evaluations = pd.concat([self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)], answers])
+        kept_since = store.last - store.retention
+        state = replace(
+            self,
+            corrected=records.iloc[min(needed, records.index.searchsorted(kept_since)) :],
+            checkpoints=tuple(points),
+            log=log,
+            evaluations=evaluations.iloc[evaluations.index.searchsorted(kept_since) :],
+            days=self._with_days(active.corrections, days, states, _days_of(answers, seen.n_left_out)),
+        )
+        return state, self._news(answers.iloc[len(known) :], fresh)
+
+    def handed_over(self, active: ActiveDetector, end: int | None = None) -> MonitorState:
+        """The state with another detector, which evaluates the records of the newest day anew.
+
+        With an ``end``, events that are open have ended then, and sensors are watched from new.
+        """
+        points, log = self.checkpoints, self.log
+        if end is not None:
+            log, start = log.ended(end), active.corrections.start()
+            points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
+        day = points[-1].day
+        estimates = (*self.estimates, (self.store.last, active.estimates[DAMAGE]))
+        kept = self.evaluations[self.evaluations.index < day]
+        state = replace(self, checkpoints=points, log=log, evaluations=kept, estimates=estimates)
+        today = self.store.kept.index[self.store.kept.index >= day]
+        return state.advanced(active, today)[0] if len(today) else state
+
+    def _corrected_by_day(
+        self, corrections: Corrections, begin: Checkpoint, raw: pd.DataFrame
+    ) -> tuple[list[pd.Timestamp], list[CorrectionState], Corrected]:
+        """Days from a checkpoint to the last record, states before each, and the records as the detector sees them."""
+        days = list(pd.date_range(begin.day, raw.index[-1].normalize(), freq="D"))
+        bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
+        parts = [raw.iloc[start:stop] for start, stop in pairwise(bounds)]
+        states = [begin.corrections]
+        for day in parts[:-1]:
+            states.append(corrections.advance(states[-1], day))
+        by_peak = {one.peak_time: one for one in self.acknowledgements if one.kind == MEASUREMENT}
+        acknowledged = [one.time for one in by_peak.values() if one.harmless]
+        seen = [corrections.corrected(*pair, acknowledged) for pair in zip(states, parts, strict=True) if len(pair[1])]
+        return days, states, Corrected.joined(seen)
+
+    def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
+        """The answers to new records, and those to others that have changed."""
+        is_new = answers.index.isin(fresh)
+        changed = np.zeros(len(answers), dtype=bool)
+        if not is_new.all():
+            known = answers[~is_new]
+            before = self.evaluations.loc[known.index]
+            same = [(known[c] == before[c]) | (known[c].isna() & before[c].isna()) for c in ANSWER]
+            changed[~is_new] = ~np.all(same, axis=0)
+        return answers.assign(revised=changed)[is_new | changed]
+
+    def _with_days(
+        self,
+        corrections: Corrections,
+        days: Sequence[pd.Timestamp],
+        states: Sequence[CorrectionState],
+        new: pd.DataFrame,
+    ) -> pd.DataFrame:
+        """Daily summaries, those of some days anew."""
+        if corrections.drift is not None:
+            by_day = dict(zip(days, states, strict=True))
+            shares = pd.DataFrame({day: corrections.drifts(by_day[day])["taken_out"] for day in new.index}).T
+            new = new.join(shares.add_prefix("drift "))
+        before = self.days.iloc[: self.days.index.searchsorted(days[0])]
+        return pd.concat([before, new]) if len(before) else new
+
+
+def _not_closing(index: Array, seen: Corrected, active: ActiveDetector) -> Array:
+    """Indices by which events open and close: where a response was set aside, the others cannot close one."""
+    with np.errstate(invalid="ignore"):
+        return np.where(seen.is_held & ~(index > active.rules[DAMAGE].release), np.nan, index)
+
+
+def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Checkpoint]:
+    """The checkpoints from the last one before a time on."""
+    return points[max(n for n, one in enumerate(points) if n == 0 or one.day <= horizon) :]
+
+
+def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], n_known: int) -> list[str]:
+    """Reasons that say so of records, from a position on, that are stiffer than the baseline."""
+    stiffer = np.flatnonzero(numbers.get(STIFFENING, np.zeros(0)) > 0)
+    for row in stiffer[stiffer >= n_known]:
+        reasons[row] = "; ".join(filter(None, [reasons[row], "stiffer than the baseline"]))
+    return reasons
+
+
+def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
+    """A row for each of some records that are not evaluated."""
+    nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
+    modes, is_held = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=bool)
+    return _answers(stamps, nothing, threshold, modes, list(reasons), {DAMAGE: number}, is_held)
+
+
+def _answers(
+    stamps: pd.DatetimeIndex,
+    index: Array,
+    threshold: float,
+    drivers: NDArray[Any],
+    reasons: list[str],
+    numbers: dict[str, NDArray[np.int64]],
+    is_held: NDArray[np.bool_],
+) -> pd.DataFrame:
+    """A row for each record."""
+    has_index, number = ~np.isnan(index), numbers[DAMAGE]
+    is_alarm = has_index & (number > 0)
+    for kind in (STIFFENING, MEASUREMENT):
+        number = np.where(number > 0, number, numbers.get(kind, 0))
+    state = np.where(is_alarm, "alarm", np.where(has_index & ~is_held, "healthy", "not evaluated"))
+    table = {
+        "state": pd.Series(state.tolist(), stamps, dtype=object),
+        "index": index,
+        "threshold": np.full(len(index), threshold),
+        "modes": pd.Series(np.where(is_alarm, drivers, "").tolist(), stamps, dtype=object),
+        "reason": pd.Series(reasons, stamps, dtype=object),
+        "event": np.where(has_index | is_held, number, 0),
+    }
+    return pd.DataFrame(table, stamps)
+
+
+def _days_of(answers: pd.DataFrame, n_left_out: NDArray[np.int64]) -> pd.DataFrame:
+    """A row for each calendar day that has records, from the evaluations of all of them in order of time.
+
+    ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``n_left_out`` values; ``index_median`` and ``index_max``,
+    NaN where there is none.
+    """
+    flags = {"known": answers["state"] != "not evaluated", "alarm": answers["state"] == "alarm", "out": n_left_out}
+    by_day = answers.assign(**flags).groupby(answers.index.normalize().rename("day"))
+    return pd.DataFrame(
+        {
+            "n_records": by_day.size(),
+            "n_evaluated": by_day["known"].sum().astype("int64"),
+            "n_alarms": by_day["alarm"].sum().astype("int64"),
+            "n_left_out": by_day["out"].sum().astype("int64"),
+            "index_median": by_day["index"].median(),
+            "index_max": by_day["index"].max(),
+        }
+    )

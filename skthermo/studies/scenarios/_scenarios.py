@@ -1,0 +1,456 @@
+"""States of the structure in simulated records: damage, strengthening and other changes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._estimators.arguments import as_mapping, check_names
+from skthermo._tables.arrays import HUGE, is_real, real_array
+from skthermo._tables.frames import Table
+from skthermo._tables.times import row_times, time_of
+from skthermo._validation import check_is_fitted
+from skthermo.fem import FEModel
+from skthermo.surrogate import FittedChain
+
+LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
+
+
+class BaseScenario(ABC):
+    """What changes in a structure from the onset on; scenarios of one family differ in severity only.
+
+    The severity is NaN where there is no single one, and the onset None where the change is there from the beginning.
+    The repeats of a study take ``n_draws`` different states in turn.
+    """
+
+    name: str
+    family: str | None
+    severity: float | None
+    onset: Any = None
+    n_draws: int = 1
+
+    @property
+    @abstractmethod
+    def groups(self) -> tuple[str, ...]:
+        """Damage groups that are changed."""
+
+    @property
+    def is_healthy(self) -> bool:
+        """Whether nothing is changed, so that alarms are false."""
+        return not self.groups
+
+    def changes(self, T: Table, repeat: int = 0) -> dict[str, Any]:
+        """Arguments of `~skthermo.surrogate.DataInformedFEM.simulate` that change the structure as in this scenario.
+
+        Parameters
+        ----------
+        T : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures of the records to be simulated.
+        repeat : int, default=0
+            Number of the repeat of a study.
+
+        Returns
+        -------
+        dict
+            Severities may be arrays with one value for each row of T.
+
+        Raises
+        ------
+        ValueError
+            If damage begins at no record of T.
+        """
+        if not isinstance(repeat, Integral) or isinstance(repeat, bool) or repeat < 0:
+            raise ValueError(f"repeat is {repeat!r:.100}; expected the number of a repeat, from 0 on")
+        return self._changes(T, int(repeat))
+
+    @abstractmethod
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
+        """Hook: the arguments that differ from those of the healthy structure."""
+
+
+def check_chain(fem: FittedChain) -> None:
+    """Raise an error for what is not a fitted chain."""
+    if isinstance(fem, type) or not hasattr(fem, "simulate"):
+        raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
+    check_is_fitted(fem)
+
+
+def check_groups(groups: Sequence[str], known: Any) -> None:
+    """Raise an error for damage groups that the model does not have."""
+    unknown = [group for group in groups if group not in known]
+    if unknown:
+        raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
+
+
+def check_name(name: Any) -> None:
+    """Raise an error if a scenario's name is not a text."""
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
+
+
+def severities_of(damage: Any, name: str) -> dict[str, float]:
+    """Severity by group as floats."""
+    damage = mapping_of(damage, f"damage of scenario {name!r}", "{group: severity}")
+    for group, severity in damage.items():
+        if not isinstance(group, str):
+            raise ValueError(f"scenario {name!r} has the damage group {group!r:.100}; expected a text")
+        if np.ndim(severity):
+            raise ValueError(
+                f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}; expected one number, or "
+                "ProgressiveDamage for damage that grows"
+            )
+        check_severities(severity, group, name)
+    return {group: float(severity) for group, severity in damage.items()}
+
+
+def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
+    """Raise an error for severities that no structure can have."""
+    values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
+    wrong = values[~(np.isfinite(values) & (values < 1) & (values >= LOWEST_SEVERITY))]
+    if wrong.size:
+        raise ValueError(
+            f"scenario {name!r} has severities of {group!r} such as {wrong[0]:g}; expected finite shares of the "
+            f"stiffness below 1, not percent (0.2 means 20 %), and not below {LOWEST_SEVERITY:g}"
+        )
+
+
+def mapping_of(values: ArrayLike, what: str, expected: str) -> Mapping[str, Any]:
+    """A mapping, or a Series with names as one; None becomes an empty one."""
+    mapping = {} if values is None else as_mapping(values)
+    if not isinstance(mapping, Mapping):
+        raise ValueError(f"{what} is {values!r:.200}; expected {expected}")
+    return mapping
+
+
+def only_group(damage: Mapping[str, float]) -> tuple[str | None, float]:
+    """The damage group and its severity if there is only one, else None and NaN."""
+    return next(iter(damage.items())) if len(damage) == 1 else (None, np.nan)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scenario(BaseScenario):
+    """A change of the structure, the same in all records.
+
+    Parameters
+    ----------
+    name : str
+        Unique in a study.
+    damage : mapping of str to float, optional
+        Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %.
+    parameters : mapping of str to float, optional
+        Factor by parameter of the model, for changes that are not damage, such as 1.02 for ballast that adds 2 % mass.
+    stiffness : matrix of shape (n_dof, n_dof), optional
+        Added to the model's in N/m.
+    mass : matrix of shape (n_dof, n_dof) or array of shape (n_dof,), optional
+        Added to the model's in kg; a vector holds lumped masses.
+    family : str, optional
+        Scenarios of one family differ in severity only, and have a curve of the probability of detection together. By
+        default the damage group, if there is one alone.
+    severity : float, optional
+        Position on that curve. By default the severity of the damage group, if there is one alone, else NaN.
+
+    Raises
+    ------
+    ValueError
+        If the name is not a text, or a severity or factor is impossible.
+
+    Examples
+    --------
+    >>> from skthermo.studies import Scenario
+    >>> Scenario("healthy")
+    Scenario('healthy')
+    >>> damaged = Scenario("lower chord, a fifth", {"bottom": 0.2})
+    >>> damaged.family, damaged.severity
+    ('bottom', 0.2)
+    """
+
+    name: str
+    damage: Mapping[str, float] | None = None
+    parameters: Mapping[str, float] | None = field(default=None, kw_only=True)
+    stiffness: Any = field(default=None, kw_only=True)
+    mass: Any = field(default=None, kw_only=True)
+    family: str | None = field(default=None, kw_only=True)
+    severity: float | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        damage = severities_of(self.damage, self.name)
+        given = mapping_of(self.parameters, f"parameters of scenario {self.name!r}", "{parameter: factor}")
+        wrong = [f for f in given.values() if not is_real(f) or not 0 < f < HUGE]
+        if wrong:
+            raise ValueError(
+                f"scenario {self.name!r} has the factor {wrong[0]!r:.99}; expected finite and positive ones"
+            )
+        factors = {name: float(factor) for name, factor in given.items()}
+        if self.family is not None and (not isinstance(self.family, str) or not self.family):
+            raise ValueError(f"family of scenario {self.name!r} is {self.family!r:.100}; expected a text")
+        if self.severity is not None:
+            if not is_real(self.severity):
+                raise ValueError(f"severity of scenario {self.name!r} is {self.severity!r:.100}; expected a number")
+            if not np.isnan(self.severity):
+                check_severities(self.severity, self.family, self.name)
+        alone = not (factors or self.stiffness is not None or self.mass is not None)
+        family, severity = only_group(damage) if alone else (None, np.nan)
+        object.__setattr__(self, "damage", damage)
+        object.__setattr__(self, "parameters", factors)
+        object.__setattr__(self, "family", family if self.family is None else self.family)
+        object.__setattr__(self, "severity", severity if self.severity is None else float(self.severity))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Damage groups that it changes."""
+        return tuple(group for group, severity in (self.damage or {}).items() if severity)
+
+    @property
+    def is_healthy(self) -> bool:
+        """Whether nothing is changed, so that alarms are false."""
+        return not (self.groups or any(factor != 1 for factor in (self.parameters or {}).values())) and (
+            self.stiffness is None and self.mass is None
+        )
+
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
+        asked = {"damage": self.damage or None, "parameters": self.parameters or None}
+        asked |= {"stiffness": self.stiffness, "mass": self.mass}
+        return {name: value for name, value in asked.items() if value is not None}
+
+    def __repr__(self) -> str:
+        return f"Scenario({', '.join([repr(self.name), *(f'{k}={_short(v)}' for k, v in self.changes(None).items())])})"
+
+
+def read_scenarios(given: Table, model: FEModel) -> list[BaseScenario]:
+    """Scenarios of a study of a model, mappings of groups to severities among them; an error if they are wrong."""
+    if isinstance(given, type) or not isinstance(given, Iterable):
+        raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
+    scenarios, groups = [_as_scenario(one) for one in given], getattr(model, "groups", None)
+    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
+    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
+    if wrong or not names or len(set(names)) < len(names):
+        raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
+    for scenario in scenarios:
+        if groups is not None:
+            check_groups(scenario.groups, groups)
+    return scenarios
+
+
+def _as_scenario(given: Table) -> Any:
+    """A scenario of a mapping of groups to severities, with a name such as "soil 18 %, piers 5 %"; others as they are.
+
+    An empty mapping is the healthy structure.
+    """
+    mapping = as_mapping(given)
+    if not isinstance(mapping, Mapping):
+        return given
+    damage = severities_of(mapping, f"{dict(mapping)!r:.100}")
+    name = ", ".join(f"{group} {100 * severity:g} %" for group, severity in damage.items())
+    return Scenario(name or "healthy", damage)
+
+
+def _short(value: ArrayLike) -> str:
+    shape = getattr(value, "shape", None)
+    return repr(value) if shape is None else f"<{'x'.join(map(str, shape))} matrix>"
+
+
+def sweep(
+    model: FEModel, severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5), groups: Sequence[str] | None = None
+) -> list[Scenario]:
+    """The healthy structure, and damage of every group at every severity.
+
+    Parameters
+    ----------
+    model : FE model or DataInformedFEM
+        With damage groups.
+    severities : sequence of float, default=(0.1, 0.2, 0.3, 0.4, 0.5)
+        Shares of the stiffness that are lost; negative ones are gained.
+    groups : sequence of str, optional
+        Damage groups; by default all.
+
+    Returns
+    -------
+    list of Scenario
+        With names such as "healthy" and "bottom 20 %". Each group is a family. If there are severities of both signs,
+        the strengthening of a group is a family of its own, such as "bottom strengthened", since no curve of detection
+        can hold both.
+
+    Raises
+    ------
+    ValueError
+        If a group is unknown, a severity is impossible, or the model has no damage groups.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.studies import sweep
+    >>> [scenario.name for scenario in sweep(make_truss(), (0.1, 0.2), ["bottom", "top"])]
+    ['healthy', 'bottom 10 %', 'bottom 20 %', 'top 10 %', 'top 20 %']
+    >>> [scenario.family for scenario in sweep(make_truss(), (-0.1, 0.2), ["bottom"])]
+    [None, 'bottom strengthened', 'bottom']
+    """
+    model = getattr(model, "model", model)
+    known = getattr(model, "groups", None)
+    if not known:
+        raise ValueError(f"{model!r:.200} has no damage groups; expected a model with 'groups', such as AffineModel")
+    if isinstance(model, type):
+        raise ValueError(f"model is {model!r:.200}; expected an FE model, not its class")
+    chosen = list(known) if groups is None else check_names(groups, "groups")
+    check_groups(chosen, known)
+    shares = real_array(severities, "severities")
+    if shares.ndim != 1 or not chosen or len(np.unique(shares)) < shares.size:
+        raise ValueError(
+            f"severities is {severities!r:.200} and groups {groups!r:.200}; expected different severities, such as "
+            "(0.1, 0.2), and groups"
+        )
+    if (shares == 0).any():
+        raise ValueError(f"severities is {severities!r:.200}; expected none of 0, which is the healthy structure")
+    severities = shares.tolist()
+    has_both = min(severities, default=0) < 0 < max(severities, default=0)
+
+    def scenario(group: str, severity: float) -> Scenario:
+        family = f"{group} strengthened" if has_both and severity < 0 else None
+        return Scenario(f"{group} {100 * severity:g} %", {group: severity}, family=family)
+
+    return [Scenario("healthy"), *(scenario(group, severity) for group in chosen for severity in severities)]
+
+
+@dataclass(frozen=True, eq=False)
+class ProgressiveDamage(BaseScenario):
+    """Damage that begins during the records, suddenly or growing.
+
+    Parameters
+    ----------
+    name : str
+        Unique in a study.
+    damage : mapping of str to float
+        Final severity by damage group of the model.
+    onset : int or time
+        When damage begins: the number of a record counted from 0 or, for temperatures on a ``DatetimeIndex``, a time.
+    end : int or time, optional
+        When the final severity is reached; in between it grows linearly. By default damage is sudden.
+
+    Attributes
+    ----------
+    family : str or None
+        The damage group of sudden damage, if there is one alone. Growing damage belongs to no family, because its
+        records have many severities.
+    severity : float
+        Final severity of the damage group, if there is one alone, else NaN.
+
+    Raises
+    ------
+    ValueError
+        If the name is not a text, or a severity is impossible.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.studies import ProgressiveDamage
+    >>> crack = ProgressiveDamage("growing crack", {"bottom": 0.2}, onset=2, end=4)
+    >>> crack.changes(np.zeros((6, 3)))["damage"]["bottom"]
+    array([0. , 0. , 0. , 0.1, 0.2, 0.2])
+    """
+
+    name: str
+    damage: Mapping[str, float]
+    onset: Any
+    end: Any = None
+    family: str | None = field(init=False)
+    severity: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        damage = severities_of(self.damage, self.name)
+        family, severity = only_group(damage)
+        object.__setattr__(self, "damage", damage)
+        object.__setattr__(self, "family", family if self.end is None else None)
+        object.__setattr__(self, "severity", severity)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Damage groups that it changes."""
+        return tuple(group for group, severity in self.damage.items() if severity)
+
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
+        times, onset = row_times(T), time_of(T, self.onset, "onset")
+        end = onset if self.end is None else time_of(T, self.end, "end")
+        if not np.isfinite(end) or end < onset or onset > times.max():
+            raise ValueError(
+                f"scenario {self.name!r} has onset {self.onset!r} and end {self.end!r} for {len(times)} records; "
+                "expected an onset that is not after the last record, and an end that is not before it"
+            )
+        grown = (times - onset) / (end - onset) if end > onset else (times >= onset).astype(float)
+        return {"damage": {group: np.clip(grown, 0, 1) * severity for group, severity in self.damage.items()}}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class UncertainDamage(BaseScenario):
+    """Damage that is known with uncertainty: every repeat of a study takes another draw of its severities.
+
+    Parameters
+    ----------
+    name : str
+        Unique in a study.
+    draws : DataFrame of shape (n_draws, n_groups)
+        Severities; columns are damage groups of the model. Repeats beyond the last draw begin again with the first.
+
+    Attributes
+    ----------
+    family : None
+        It belongs to no family, because its records have many severities.
+    severity : float
+        Mean severity of the damage group, if there is one alone, else NaN.
+
+    Raises
+    ------
+    ValueError
+        If the name is not a text, or ``draws`` is not a frame of possible severities.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from skthermo.studies import UncertainDamage
+    >>> settled = UncertainDamage("settled pier", pd.DataFrame({"pier": [0.24, 0.31, 0.28]}))
+    >>> settled
+    UncertainDamage('settled pier', pier=0.277, 3 draws)
+    >>> settled.changes(None, repeat=1)
+    {'damage': {'pier': 0.31}}
+    """
+
+    name: str
+    draws: pd.DataFrame
+    family: None = field(init=False, default=None)
+    severity: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        if not isinstance(self.draws, pd.DataFrame) or not self.draws.size:
+            raise ValueError(f"draws is {self.draws!r:.200}; expected a frame with a column for each damage group")
+        if self.draws.columns.has_duplicates:
+            raise ValueError(f"draws has the columns {list(self.draws.columns)}; expected each damage group once")
+        for group, severities in self.draws.items():
+            check_severities(severities, group, self.name)
+        means = {str(group): float(mean) for group, mean in self.draws.mean().items()}
+        object.__setattr__(self, "severity", only_group(means)[1])
+
+    @property
+    def n_draws(self) -> int:  # type: ignore[override]
+        """How many different states there are."""
+        return len(self.draws)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Damage groups that it changes."""
+        return tuple(self.draws.columns)
+
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
+        draw = self.draws.iloc[repeat % len(self.draws)]
+        return {"damage": {group: float(severity) for group, severity in draw.items()}}
+
+    def __repr__(self) -> str:
+        means = ", ".join(f"{group}={mean:.3g}" for group, mean in self.draws.mean().items())
+        return f"UncertainDamage({self.name!r}, {means}, {len(self.draws)} draws)"

@@ -1,0 +1,291 @@
+"""More change is never less alarm, whatever changes; responses of any unit, references, wrong clocks, other targets."""
+
+import pickle
+import warnings
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.monitoring import Monitor
+from skthermo.preprocessing.checks import Plausible
+
+PER_DAY, N_BASELINE = 4, 4 * 365
+SETTLED = 3 * PER_DAY  # records after which also a window of two days has to see a change
+KINDS = {"damage", "measurement or structure"}
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*(season|baseline|not evaluated|far beyond)")
+
+
+@cache
+def truss():
+    campaign = make_truss_campaign(2, samples_per_year=4 * 365, samples_per_day=4, noise=0.003, random_state=0)
+    return campaign.temperatures.join(campaign.frequencies)
+
+
+MODES = ["f1", "f2", "f3", "f4", "f5", "f6"]
+
+
+def detector(targets, last=None):
+    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
+    return make_pipeline(compensator, MahalanobisDetector() if last is None else last)
+
+
+@cache
+def saved(window=None, **options):
+    """A monitor of the truss after its baseline."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        last = None if window is None else WindowedAlarm(window)
+        return pickle.dumps(Monitor(detector(MODES, last), **options).fit(truss()[:N_BASELINE]))
+
+
+def fitted(window=None, **options):
+    return pickle.loads(saved(window, **options))
+
+
+def changed(factors, n_days=20, start=0):
+    """Records of the truss in service in which modes are multiplied."""
+    begin = N_BASELINE + PER_DAY * start
+    new = truss()[begin : begin + PER_DAY * n_days].copy()
+    return new.assign(**{name: new[name] * factor for name, factor in factors.items()})
+
+
+SIZES = st.builds(lambda sign, size: float(np.exp(sign * size)), st.sampled_from([-1, 1]), st.floats(0.05, 12.0))
+
+
+@settings(
+    max_examples=40, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+)
+@given(
+    factors=st.dictionaries(st.sampled_from(MODES), SIZES | st.just(0.0) | st.just(-1.0), min_size=1),
+    window=st.sampled_from([None, "2D"]),
+    sensors=st.booleans(),
+    start=st.integers(0, 300),
+    n_days=st.integers(4, 20),
+)
+def test_no_change_of_any_size_or_pattern_is_healthy(factors, window, sensors, start, n_days):
+    monitor = fitted(window, sensors=sensors)
+    answers = monitor.update(changed(factors, n_days, start))[SETTLED:]
+    assert set(answers["state"]) <= {"alarm", "not evaluated"}
+    assert answers.loc[answers["state"] == "not evaluated", "reason"].ne("").all()
+    assert monitor.state() != "healthy"
+    opened = monitor.events_[monitor.events_["end"].isna()]
+    assert set(opened["kind"]) & KINDS
+
+
+def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
+    monitor = fitted()
+    monitor.update(changed({"f3": 0.8}, 5))
+    assert monitor.state() == "alarm"
+    answers = monitor.update(changed({"f3": 0.6}, 30, start=5))
+    assert set(answers["state"]) == {"alarm"}
+    answers = monitor.update(changed({}, 5, start=35))
+    assert answers["state"].iloc[-1] == "healthy"
+    assert monitor.events_["end"].notna().all()
+
+
+def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back():
+    monitor = fitted("2D")
+    answers = monitor.update(changed({"f3": 0.6}, 10))
+    assert set(answers["state"]) == {"not evaluated"}
+    assert answers["reason"].str.contains("f3").all()
+    event = monitor.events_.loc[1]
+    assert (event["kind"], event["modes"], event["peak"]) == ("measurement or structure", "f3", 1.0)
+    other = pickle.loads(pickle.dumps(monitor))
+    monitor.acknowledge(1, harmless=True, note="loose cable")
+    parts = [monitor.update(changed({"f3": 0.6}, 1, start=day)) for day in range(10, 14)]
+    assert set(pd.concat(parts)["state"]) == {"healthy"}
+    assert pd.concat(parts)["reason"].str.contains("f3 is left out").all()
+    assert monitor.events_["end"].notna().all()
+    assert other.update(changed({}, 3, start=10))["state"].tolist()[-1] == "healthy"
+    assert other.events_["end"].notna().all()
+    n_values = (14 + 0) * PER_DAY
+    assert monitor.counts_["n_left_out"] == n_values
+    assert monitor.days_["n_left_out"].sum() == n_values
+
+
+def test_a_single_value_that_cannot_be_is_explained_and_counted():
+    monitor, new = fitted(), changed({}, 2)
+    new.iloc[3, new.columns.get_loc("f2")] = 1e6
+    answers = monitor.update(new)
+    assert answers["state"].eq("not evaluated").tolist() == [n == 3 for n in range(8)]
+    assert "f2 is 1e+06" in answers["reason"].iloc[3]
+    assert monitor.counts_["n_left_out"] == 1
+    assert not len(monitor.events_)
+
+
+class DropsOutliers(TransformerMixin, BaseEstimator):
+    """A step that leaves out what is far from the baseline."""
+
+    def fit(self, X, y=None):
+        self.centre_, self.deviation_ = X.median(), X.std()
+        return self
+
+    def transform(self, X):
+        return X.mask((X - self.centre_).abs() > 8 * self.deviation_)
+
+
+class Bounded(MahalanobisDetector):
+    """A detector whose index does not grow beyond what the baseline has."""
+
+    def score_samples(self, X):
+        return np.maximum(super().score_samples(X), -self.baseline_index_.max())
+
+
+def test_a_detector_that_drops_large_changes_is_refused_and_a_blind_one_is_reported():
+    drops = make_pipeline(DropsOutliers(), *(step for _, step in detector(MODES).steps))
+    with pytest.raises(ValueError, match="drops or fills large changes"):
+        Monitor(drops, sensors=False).fit(truss()[:N_BASELINE])
+    blind = Monitor(detector(MODES, Bounded()), sensors=False, persistence=1, false_alarms_per_year=0.5)
+    with pytest.warns(UserWarning, match="does not see damage"):
+        blind.fit(truss()[:N_BASELINE])
+
+
+def with_displacement():
+    """Beside the modes a displacement about 0 mm, and two strains."""
+    table, random = truss().copy(), np.random.default_rng(1)
+    weather = table["T1"] - table["T1"].mean()
+    table["d"] = 0.02 * weather + random.normal(0, 0.5, len(table))
+    table["e1"] = 80 + 3 * weather + random.normal(0, 4, len(table))
+    table["e2"] = -60 - 2 * weather + random.normal(0, 4, len(table))
+    return table
+
+
+def test_responses_may_have_any_sign_and_unit():
+    records, targets = with_displacement(), [*MODES, "d", "e1", "e2"]
+    units = dict.fromkeys(MODES, "Hz") | {"d": "mm", "e1": "µm/m", "e2": "µm/m"}
+    monitor = Monitor(detector(targets), units=units).fit(records[:N_BASELINE])
+    assert monitor.units_ == units | {"T1": "°C", "T2": "°C", "T3": "°C"}
+    new = records[N_BASELINE : N_BASELINE + 30 * PER_DAY]
+    healthy = pickle.loads(pickle.dumps(monitor))
+    assert (healthy.update(new)["state"] == "healthy").mean() > 0.97
+    assert healthy.faults_.empty
+    moved = pickle.loads(pickle.dumps(monitor))
+    assert set(moved.update(new.assign(d=new["d"] - 10.0))["state"][SETTLED:]) == {"alarm"}
+    assert moved.faults_.empty
+    stuck = pickle.loads(pickle.dumps(monitor))
+    assert "healthy" not in set(stuck.update(new.assign(d=0.0))["state"][2 * SETTLED :])
+    assert "repeats 0 mm" in stuck.faults_["detail"].iloc[0]
+    monitor.update(new[:1].assign(d=500.0))
+    assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]
+
+
+def test_units_are_honest_and_checked():
+    assert set(fitted().units_.values()) == {"", "°C"}
+    assert {fitted(units="Hz").units_[name] for name in MODES} == {"Hz"}
+    with pytest.raises(ValueError, match="units"):
+        Monitor(detector(MODES), units={"f9": "Hz"}).fit(truss()[:N_BASELINE])
+
+
+def test_a_number_that_loggers_write_is_a_value_where_the_baseline_reaches_it():
+    records = pd.DataFrame({"d": [-150.0, -99.0, 120.0], "f": [2.0, -99.0, 2.1]})
+    wrong = Plausible.of(records, ["d", "f"]).implausible(records.to_numpy())
+    assert wrong.tolist() == [[False, False], [False, True], [False, False]]
+
+
+def with_station():
+    """One thermometer, and a weather station with a bias, a season and errors of its own."""
+    records, random = truss().drop(columns=["T2", "T3"]), np.random.default_rng(2)
+    slow = pd.Series(random.normal(0, 1, len(records))).ewm(halflife=PER_DAY).mean().to_numpy()
+    season = 1.5 * np.sin(2 * np.pi * records.index.day_of_year / 365.25)
+    station = 1.7 + 0.9 * records["T1"] + season + 0.5 * slow / slow.std() + random.normal(0, 0.5, len(records))
+    return records.assign(station=station)
+
+
+def test_a_reference_finds_the_drift_of_the_only_thermometer_and_fills_its_place():
+    records = with_station()
+    monitor = Monitor(detector(MODES), reference=["station"]).fit(records[:N_BASELINE])
+    assert "station" not in monitor.detector_.feature_names_in_
+    assert "station" in monitor.records_
+    assert "station" not in monitor.corrected_
+    new = records[N_BASELINE : N_BASELINE + 140 * PER_DAY].copy()
+    healthy = pickle.loads(pickle.dumps(monitor))
+    assert (healthy.update(new)["state"] == "healthy").mean() > 0.97
+    assert healthy.faults_.empty
+    onset = new.index[30 * PER_DAY]
+    new["T1"] += np.maximum((new.index - onset) / pd.Timedelta("30.4D"), 0.0)
+    monitor.update(new)
+    (fault,) = monitor.faults_.itertuples()
+    assert (fault.column, fault.kind) == ("T1", "drift")
+    assert fault.detected - onset <= pd.Timedelta("91D")
+    late = monitor.evaluations_[monitor.evaluations_.index > fault.detected + pd.Timedelta("1D")]
+    assert (late["state"] == "healthy").mean() > 0.9
+    assert late["reason"].str.contains("T1 is left out").all()
+    gap = healthy.update(records[len(new) + N_BASELINE :][:8].assign(T1=np.nan))
+    assert set(gap["state"]) == {"healthy"}
+
+
+def test_references_are_columns_and_no_responses():
+    with pytest.raises(ValueError, match="reference"):
+        Monitor(detector(MODES), reference=["station"]).fit(truss()[:N_BASELINE])
+
+
+def test_records_of_a_wrong_clock_are_set_aside_and_true_ones_are_not_late():
+    monitor, new = fitted(), changed({}, 10)
+    ahead = new[:20].set_axis(new.index[:20] + pd.Timedelta("3653D"))
+    answers = monitor.update(pd.concat([new[20:24], ahead]))
+    assert answers["state"].tolist() == ["healthy"] * 4 + ["not evaluated"] * 20
+    assert answers["reason"][4:].str.contains("set aside").all()
+    assert set(monitor.update(new[24:])["state"]) == {"healthy"}
+    assert monitor.counts_["n_too_late"] == 0
+    assert (monitor.counts_["n_ahead"], monitor.counts_["n_not_evaluated"]) == (20, 20)
+    assert len(monitor.update(ahead)) == 0  # known, and still set aside
+    assert monitor.last_ == new.index[-1]
+    assert "20 set aside" in monitor.summary()
+    monitor.update(new[:0], confirm=True)
+    assert monitor.last_ == ahead.index[-1]
+    assert monitor.counts_["n_ahead"] == 0
+
+
+def test_a_logger_that_was_silent_for_months_is_taken_in_once_records_confirm_each_other():
+    parts, whole = fitted(), fitted()
+    new = changed({}, 6, start=120)
+    first = parts.update(new[:9])
+    assert set(first["state"]) == {"not evaluated"}
+    rest = parts.update(new[9:])
+    assert rest.index.equals(new.index)
+    pd.testing.assert_frame_equal(rest, whole.update(new))
+    assert set(rest["state"]) == {"healthy"}
+
+
+def test_a_record_of_the_present_needs_no_confirmation():
+    now = pd.Timestamp.now().floor("h")
+    records = truss().set_axis(pd.date_range(end=now - pd.Timedelta("100D"), periods=len(truss()), freq="6h"))
+    monitor = Monitor(detector(MODES), sensors=False).fit(records[-N_BASELINE:])
+    new = records[-1:].set_axis(pd.DatetimeIndex([now]))
+    assert monitor.update(new)["state"].tolist() == ["healthy"]
+
+
+@pytest.mark.parametrize("wanted", [MODES[:4], [*MODES, "T1"]])
+def test_other_targets_than_those_of_the_compensator_are_refused(wanted):
+    with pytest.raises(ValueError, match="expected those of the compensator"):
+        Monitor(detector(MODES), targets=wanted).fit(truss()[:N_BASELINE])
+
+
+def test_modes_are_named_whatever_the_order_of_targets():
+    for options in ({"targets": MODES[::-1]}, {}):
+        own = MODES if options else ["f6", "f1", "f3", "f2", "f5", "f4"]
+        monitor = Monitor(detector(own), sensors=False, **options).fit(truss()[:N_BASELINE])
+        monitor.update(changed({"f6": 0.9}, 2))
+        assert monitor.targets_ == MODES
+        assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
+
+
+def test_results_do_not_share_the_state():
+    monitor = fitted()
+    answers = monitor.update(changed({}, 2))
+    for table in (answers, monitor.days_, monitor.evaluations_, monitor.records_, monitor.baseline_, monitor.trained_):
+        table.iloc[:, 0] = 0
+    monitor.counts_["n_records"] = 0
+    assert monitor.counts_["n_records"] == 8
+    assert set(monitor.evaluations_["state"]) == {"healthy"}
+    assert (monitor.records_ != 0).all(axis=None)
