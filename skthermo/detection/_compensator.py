@@ -133,8 +133,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     baseline itself is whitened. At most 5000 baseline records, evenly spaced in time, teach the covariances. A new
     record takes S from the baseline record with the most similar weather; where a value is missing that no sensor
     tells, from all records. With "auto", a record that is farther from its neighbours in weather than 98 % of the
-    baseline's are from theirs takes the smallest covariance that is no smaller than S and than that of all records; at
-    twice that distance wholly, before in proportion.
+    baseline's are from theirs, or outside the baseline's range, takes a covariance that is no smaller than S and than
+    that of all records: wholly at twice that distance, or a quarter of the range outside, before in proportion.
 
     In weather that is colder or warmer than the baseline's, predictions err by an amount that the baseline's own
     residuals do not show. "auto" and "local" therefore fit the estimator two more times, without the coldest and

@@ -152,9 +152,6 @@ class OutlierDetector(DamageDetector):
             index[complete] = _index_of(self.estimator_, F[complete])
         return index
 
-    def _own_index(self, F: Array) -> Array:
-        return self._index(F)
-
     def _has_likelihood(self) -> bool:
         return isinstance(self.estimator, DensityMixin | KernelDensity)
 

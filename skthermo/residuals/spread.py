@@ -20,7 +20,14 @@ from skthermo.residuals.gaussian import (
     whitenings,
 )
 from skthermo.residuals.local_covariance import CANDIDATES, NEAR_IN_TIME, History, Smoothing, whitened
-from skthermo.residuals.weather import PredictionError, nearest, parts, weather_coordinates
+from skthermo.residuals.weather import (
+    FAR_OUTSIDE,
+    PredictionError,
+    TrainingRange,
+    nearest,
+    parts,
+    weather_coordinates,
+)
 
 MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned
 JITTER = 1e-12  # share of its variance that each mode has of its own, so that covariances have roots
@@ -31,8 +38,9 @@ FAMILIAR = 0.98  # share of the baseline records that are as close to others in 
 class WeatherCovariance:
     """Covariances at the places of the baseline's weather, each of which is taken for the weather around it.
 
-    Records that are farther from the places than ``familiar`` (infinite: none) get a covariance that is, to the extent
-    that they are, no smaller than that of all weather; at twice the distance, it is no smaller at all.
+    Records that are farther from the places than ``familiar``, or outside the ``trained`` range, get a covariance that
+    is, to the extent that they are, no smaller than that of all weather: wholly at twice the distance, or far outside.
+    Without ``trained``, none does.
     """
 
     coordinates: Pipeline
@@ -40,16 +48,20 @@ class WeatherCovariance:
     covariances: Array
     smoothing: Smoothing
     familiar: float
+    trained: TrainingRange | None = None
 
     def at(self, weather: Array, overall: Array) -> Array:
         """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
         wanted = self.coordinates.transform(weather)
         distances, near = nearest(self.places, wanted, self.smoothing.n_neighbors)
-        return self.floored(self.covariances[near[:, 0]], distances.mean(axis=1), overall)
+        return self.floored(self.covariances[near[:, 0]], weather, distances.mean(axis=1), overall)
 
-    def floored(self, covariances: Array, distances: Array, overall: Array) -> Array:
-        """Covariances of rows at some mean distances from the places nearest to them, no smaller in unknown weather."""
-        unknown = np.clip(distances / self.familiar - 1, 0.0, 1.0)[:, np.newaxis, np.newaxis]
+    def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
+        """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""
+        if self.trained is None:
+            return covariances
+        outside = self.trained.excess(weather).max(axis=1) / FAR_OUTSIDE
+        unknown = np.clip(np.maximum(distances / self.familiar - 1, outside), 0, 1)[:, np.newaxis, np.newaxis]
         rows = np.flatnonzero(unknown)
         floored = covariances.copy()
         floored[rows] += unknown[rows] * (no_smaller(covariances[rows], overall) - covariances[rows])
@@ -97,13 +109,14 @@ class Spread:
         local = History(chosen, places, residuals[chosen], self.overall, near).likeliest()
         if local is None:
             return self, white
-        familiar = float(np.quantile(local.distances(order=chosen), FAMILIAR)) if floor else np.inf
-        by_weather = WeatherCovariance(coordinates, places, local.at(), local.smoothing, familiar)
+        familiar = float(np.quantile(local.distances(order=chosen), FAMILIAR))
+        trained = TrainingRange.of(weather, usable) if floor else None
+        by_weather = WeatherCovariance(coordinates, places, local.at(), local.smoothing, familiar, trained)
         for part in parts(len(usable), local.numbers_per_record):
             block = usable[part]
             here = coordinates.transform(weather[block])
-            by_others = local.at(here, order=block)
-            by_others = by_weather.floored(by_others, local.distances(here, order=block), self.overall.covariance)
+            by_others, distances = local.at(here, order=block), local.distances(here, order=block)
+            by_others = by_weather.floored(by_others, weather[block], distances, self.overall.covariance)
             white[block] = whitened(residuals[block], self.overall, by_others)[0]
         return replace(self, by_weather=by_weather), white
 
