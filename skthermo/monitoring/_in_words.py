@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._tables.text import counted_number
+from skthermo._tables.text import counted_number, probability_text
 
 MOST_EVENTS = 5  # that are told, the latest ones
 
@@ -54,8 +54,10 @@ def _sensors(faults: pd.DataFrame) -> list[str]:
 
 
 def _drift(drift: pd.DataFrame, n_left_out: int) -> list[str]:
-    """A line for each group that drifts, and one where drift is not followed at present."""
-    lines = [
+    """Whether the structure drifts, a line for each group that does, and one where drift is not followed at present."""
+    found = "The structure drifts" if drift["significant"].any() else "No drift of stiffness is seen"
+    lines = [f"{found} (probability by chance {probability_text(drift['p_value'].iloc[0])})."]
+    lines += [
         f"Drift of {group}: {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
         f"{'; beyond the limit' if one['beyond_limit'] else ''}."
         for group, one in drift[drift["significant"]].iterrows()

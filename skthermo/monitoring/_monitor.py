@@ -113,7 +113,7 @@ class Monitor(SavesFrames, Estimator):
         Sensors that have failed: ``column``, ``kind``, ``since``, ``detected``, ``until``, ``detail``.
     drift_ : DataFrame or None
         Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
-        ``per_year_error``, ``significant``; None without ``fem``.
+        ``per_year_error``, ``significant``, and the ``p_value`` of the structure's drift; None without ``fem``.
     counts_ : dict
         ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (evaluated all the
         same), ``n_too_late`` and ``n_ahead`` (set aside at present), neither of them evaluated; ``n_repeated``; and

@@ -7,7 +7,7 @@ from collections.abc import Hashable
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.text import SPACE, listed, percent, significant
+from skthermo._tables.text import SPACE, listed, percent, probability_text, significant
 from skthermo.reporting._html import Section, bullets, figure, paragraphs, section, table
 from skthermo.reporting.service._figures import draw_drift
 from skthermo.reporting.service._standing import YEAR, Standing, moment
@@ -26,14 +26,21 @@ KINDS = {
 
 
 def drift_sentences(standing: Standing) -> list[str]:
-    """Change of each group that is beyond its error, its rate, and when it reaches a limit."""
+    """Whether the structure drifts, how much each group that does, and when it reaches a limit."""
     found = standing.monitor.drift_
     if found is None:
         return ["Slow drift is not followed: that needs a model of the structure."]
     certain = found[found["significant"].astype(bool)]
     if not len(certain):
-        return ["No drift beyond its error."]
-    return [_group(name, row, standing.last, standing.limit) for name, row in certain.iterrows()]
+        return [f"No drift of stiffness is seen{_by_chance(found)}."]
+    return [f"The structure drifts{_by_chance(found)}."] + [
+        _group(name, row, standing.last, standing.limit) for name, row in certain.iterrows()
+    ]
+
+
+def _by_chance(found: pd.DataFrame) -> str:
+    """The p value of the drift, in brackets."""
+    return f" (probability by chance {probability_text(found['p_value'].iloc[0])})"
 
 
 def _group(name: Hashable, row: pd.Series, last: pd.Timestamp, limit: float) -> str:
@@ -86,7 +93,9 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
         meaning = (
             "Structures age: parts lose stiffness slowly. The monitor follows this with the model of the structure, "
             "and takes it out before it evaluates, so that slow ageing raises no false alarm. Errors are two standard "
-            "errors. A drift counts as certain only where it is well beyond its error."
+            "errors. The structure counts as drifting if one that does not age would seem to drift as much with a "
+            "probability of 1 % at most. The drift is then that of the one or two groups, or of all groups alike, "
+            "which explain it best."
         )
         drawn = draw_drift(standing) if is_drawn else None
         caption = "Change of the stiffness of each group since the baseline, with two standard errors at its end."
@@ -98,7 +107,7 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
             + ["yes" if row["significant"] else "no"]
             for name, row in found.iterrows()
         ]
-        columns = ["Group", "Change so far", "Change a year", "Beyond its error"]
+        columns = ["Group", "Change so far", "Change a year", "Drifts"]
         parts += [paragraphs(meaning), figure(caption, [] if drawn is None else [drawn])]
         parts.append(table("Change of stiffness by group, ± two standard errors.", columns, rows))
     return section("drift", "Slow change of the structure", *parts, link="Slow change")
