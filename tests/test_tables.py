@@ -8,11 +8,10 @@ from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
 
 from skthermo._tables.arrays import as_floats, as_random_state, real_array
-from skthermo._tables.frames import check_same_rows, check_temperatures, column_names, frame_like
+from skthermo._tables.frames import check_temperatures, column_names, frame_like
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
-from skthermo.surrogate import TemperatureMapper
 
 HOURS = pd.date_range("2025-01-01", periods=60, freq="h")
 RECORDS = pd.DataFrame(
@@ -82,38 +81,30 @@ def test_masked_values_are_missing_to_estimators(estimator):
     ids=repr,
 )
 def test_complex_numbers_are_refused(values):
-    with pytest.raises(ValueError, match=r"complex.*; expected (real )?numbers"):
+    with pytest.raises(ValueError, match="complex"):
         as_floats(values)
-    with pytest.raises(ValueError, match=r"frequencies (is|holds) complex.*; expected (real )?numbers"):
+    with pytest.raises(ValueError, match="frequencies"):
         real_array(values, "frequencies")
 
 
 def test_what_is_no_number_is_refused():
     for values in (None, "high", [{}], object()):
-        with pytest.raises(ValueError, match=r"level is .*; expected numbers"):
+        with pytest.raises(ValueError, match="level"):
             real_array(values, "level")
 
 
 @pytest.mark.parametrize("seed", [np.random.default_rng(0), "seed", -1, 1.5, 2**33])
 def test_seeds_of_another_kind_are_refused(seed):
-    with pytest.raises(
-        ValueError, match=r"random_state is .*; expected None, an integer from 0 to 4294967295 or a num"
-    ):
+    with pytest.raises(ValueError, match="random_state"):
         as_random_state(seed)
-    with pytest.raises(ValueError, match=r"random_state is .*numpy\.random\.RandomState"):
+    with pytest.raises(ValueError, match="random_state"):
         add_noise([[4.0]], 0.01, random_state=seed)
-
-
-def test_estimators_refuse_a_generator_by_name():
-    with pytest.raises(ValueError, match=r"'random_state' parameter of TemperatureMapper must be .* Got Generator"):
-        TemperatureMapper(random_state=np.random.default_rng(0)).fit([[1.0], [2.0]], [[1.0], [1.1]])
 
 
 @pytest.mark.parametrize("times", [HOURS, HOURS.tz_localize("UTC"), HOURS - HOURS[0]], ids=["stamps", "zone", "spans"])
 @each_estimator
 def test_a_column_of_times_is_refused_by_name(estimator, times):
-    said = r"column 'stamp' holds times, such as .*; expected numbers, .*set_index\('stamp'\)"
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=r"set_index\('stamp'\)"):
         estimator.fit(RECORDS.assign(stamp=times))
 
 
@@ -121,7 +112,7 @@ def test_a_column_of_times_is_refused_by_name(estimator, times):
 def test_a_column_of_times_in_a_polars_frame_is_refused_by_name(estimator):
     polars = pytest.importorskip("polars")
     frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
-    with pytest.raises(ValueError, match=r"column 'stamp' holds times, such as .*; expected numbers"):
+    with pytest.raises(ValueError, match="'stamp'"):
         estimator.fit(frame.with_columns(polars.Series("stamp", range(60)).cast(polars.Datetime)))
 
 
@@ -151,11 +142,6 @@ def test_indicators_of_gaps_have_names_beside_integers():
     assert list(KNNGapImputer(add_indicator=True).fit_transform(holed).columns) == [5, 6, 7, "missingindicator_x1"]
 
 
-def test_series_of_other_rows_are_refused():
-    with pytest.raises(ValueError, match=r"a and b have different indices .row 0"):
-        check_same_rows(RECORDS["f1"], RECORDS["f2"].shift(freq="1h"), ("a", "b"))
-
-
 # Units of temperature
 
 
@@ -169,27 +155,21 @@ def temperatures(**changes):
 @pytest.mark.parametrize(
     ("T", "message"),
     [
-        (
-            temperatures() + 273.15,
-            "column 'air' lies between 258.15 and 308.15, all above 150: kelvin. expected degrees C",
-        ),
-        (temperatures(deck=(slice(None), 293.0)), "column 'deck' lies between 293 and 293, all above 150"),
-        (temperatures(air=([3, 9], -999)), "column 'air' is -999 in 2 of 40 rows; expected degrees Celsius, and NaN"),
-        (temperatures(air=([3], -9999.0)), "column 'air' is -9999 in 1 of 40 rows"),
-        (temperatures(deck=([3, 4, 5], 9999)), "column 'deck' is 9999 in 3 of 40 rows"),
-        (temperatures(deck=([3, 4], 999.9), air=([0], np.nan)), "column 'deck' is 999.9 in 2 of 40 rows"),
-        (temperatures(deck=([3], 9998), air=([4], 20)), "column 'deck' is 9998"),
-        (temperatures(air=([3], -127)), "column 'air' is -127 in 1 of 40 rows"),
-        (temperatures(air=([0, 1], 290.0)), "column 'air' is 290 in 2 of 40 rows"),
-        (
-            temperatures(air=([0, 1, 5], [290.0, 295.0, 280.0])),
-            r"column 'air' is 280 to 295 in 3 of 40 rows \(kelvin.\); expected degrees Celsius",
-        ),
-        (np.array([[293.0], [294.0]]), "column 'T1' lies between 293 and 294"),
+        (temperatures() + 273.15, "'air' .*kelvin"),
+        (temperatures(deck=(slice(None), 293.0)), "'deck' .*kelvin"),
+        (temperatures(air=([3, 9], -999)), "'air' is -999 in 2"),
+        (temperatures(air=([3], -9999.0)), "'air' is -9999 in 1"),
+        (temperatures(deck=([3, 4, 5], 9999)), "'deck' is 9999 in 3"),
+        (temperatures(deck=([3, 4], 999.9), air=([0], np.nan)), "'deck' is 999.9 in 2"),
+        (temperatures(deck=([3], 9998), air=([4], 20)), "'deck' is 9998"),
+        (temperatures(air=([3], -127)), "'air' is -127 in 1"),
+        (temperatures(air=([0, 1], 290.0)), "'air' is 290 in 2"),
+        (temperatures(air=([0, 1, 5], [290.0, 295.0, 280.0])), "'air' is 280 to 295 in 3 .*kelvin"),
+        (np.array([[293.0], [294.0]]), "'T1' .*293 and 294"),
     ],
 )
 def test_temperatures_that_are_no_degrees_celsius_are_named(T, message):
-    with pytest.raises(ValueError, match=f"temperature {message}"):
+    with pytest.raises(ValueError, match=message):
         check_temperatures(T)
 
 

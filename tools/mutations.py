@@ -146,7 +146,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
         ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
     ],
-    ("monitoring/_promise.py", "fleet/test_discoveries.py"): [
+    ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
         ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
     ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
@@ -240,7 +240,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "content_of(guess)",
         ),
     ],
-    ("surrogate/_simulator.py", "surrogate/test_known_changes.py"): [
+    ("surrogate/_simulator.py", "surrogate/test_reduce_auto.py"): [
         ("changes of another simulator", "default_factory=KnownChanges, init=False,", "default_factory=KnownChanges,"),
     ],
     ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
@@ -484,7 +484,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
-    ("studies/detectability/_intervals.py", "studies/test_intervals.py"): [
+    ("studies/detectability/_intervals.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
@@ -525,7 +525,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/structures/_projection.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
-    ("monitoring/_promise.py", "monitoring/test_promise.py"): [
+    ("monitoring/_false_alarms.py", "monitoring/test_false_alarms.py"): [
         ("promised tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
         ("promised end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
         ("promised numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),

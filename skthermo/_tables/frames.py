@@ -3,7 +3,7 @@
 import re
 from collections.abc import Hashable, Iterable
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,8 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats, median, real_array, robust_deviation
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
+
+Table: TypeAlias = Array | pd.DataFrame
 
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius

@@ -163,14 +163,9 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
         for part in (shapes.real, shapes.imag):
             _check_possible(part[:, :, number], f_names, [None] * n_modes, f"{file}: field 'm', sensor {sensor!r}")
     time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
-    return {
-        "temperatures": pd.DataFrame(env, index=time, columns=channels),
-        "frequencies": pd.DataFrame(f, index=time, columns=f_names),
-        "damping": pd.DataFrame(xi, index=time, columns=xi_names),
-        "shapes": shapes,
-        "sensors": sensors,
-        "state": state_of(time),
-    }
+    tables = {"temperatures": (env, channels), "frequencies": (f, f_names), "damping": (xi, xi_names)}
+    frames = {name: pd.DataFrame(values, index=time, columns=columns) for name, (values, columns) in tables.items()}
+    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}
 
 
 def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:

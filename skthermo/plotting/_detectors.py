@@ -302,7 +302,7 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     unknown = tested.get("not_evaluated", pd.Series(dtype=float))
     notes = {name: f"{share_text(share)} not evaluated" for name, share in unknown.items() if share > 0}
     label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
-    false, found = "healthy records in alarm (%, square-root scale)", "damaged records in alarm (%)"
+    false, found = "healthy in alarm (%, square-root scale)", "damaged in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
         "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
@@ -408,7 +408,7 @@ def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None
 
 
 def small_rates(ax: Axes, drawn: Array) -> None:
-    """An axis from 0 to the largest of some rates in percent, whose square root is even: small ones are told apart."""
+    """An axis from 0 to the largest of some rates in percent, on a square-root scale, which spreads small ones."""
     largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
     functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []

@@ -1,4 +1,4 @@
-"""Identified damage: what explains the shifts, how probable that is, and how severe."""
+"""Identified damage: explanations of the shifts, how probable that is, and how severe."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class IdentifiedDamageDisplay(Display):
     ...         ["f1", "f2"]))
     >>> display = IdentifiedDamageDisplay.from_predictions(identified)
     >>> [ax.get_title() for ax in display.axes_]
-    ['what explains the shifts', 'average severity', 'shift of frequencies']
+    ['explanations of the shifts', 'mean severity', 'shift of frequencies']
     >>> plt.close(display.figure_)
     """
 
@@ -151,7 +151,7 @@ class IdentifiedDamageDisplay(Display):
             ax.text(0.8, place - 0.22, plain(text), ha="left", va="bottom", fontsize="small")
             ax.text(probability + 1.5, place, chance_text(probability / 100), ha="left", va="center", fontsize="small")
         ax.set_yticks([])
-        ax.set(title="what explains the shifts", xlabel="probability (%)", xlim=(0, 118))
+        ax.set(title="explanations of the shifts", xlabel="probability (%)", xlim=(0, 118))
         ax.set_xticks(range(0, 101, 20))
         ax.set_ylim(max(len(shown), 3) - 0.5, -1.0)
         ax.spines[["top", "right"]].set_visible(False)
@@ -167,17 +167,17 @@ class IdentifiedDamageDisplay(Display):
             possible = np.where(is_known, 100 * table["highest_if_damaged"].to_numpy(dtype=float), np.nan)
             ax.barh(places, possible, height=0.5, color=LIGHT, alpha=0.5, label="if damaged, up to (95 %)")
         errors = np.clip([severity - lowest, highest - severity], 0, None)[:, is_known]
-        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "90 % band"}
+        style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "credible interval, 90 %"}
         drawn = ax.errorbar(severity[is_known], places[is_known], xerr=errors, **style)
-        shades = drawing("matplotlib.colors").LinearSegmentedColormap.from_list("probability", ["white", ORANGE])
-        points = {"cmap": shades, "vmin": 0, "vmax": 1, "edgecolors": ORANGE, "s": 50, "zorder": 3}
-        ax.scatter(severity[is_known], places[is_known], c=probability[is_known], **points)
+        shades = drawing("matplotlib.colors").to_rgba_array([(ORANGE, share) for share in probability[is_known]])
+        style = {"c": shades, "edgecolors": ORANGE, "s": 50, "zorder": 3}
+        ax.scatter(severity[is_known], places[is_known], **style)
         for place, known, share in zip(places, is_known, probability, strict=True):
             if not known:  # it may be anything
                 ax.axhline(place, color=GREY, linestyle=":", linewidth=1.2)
                 style = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"}
                 ax.text(
-                    0.5, place, "cannot be seen", transform=side, ha="center", va="center", fontsize="small", bbox=style
+                    0.5, place, "unobservable", transform=side, ha="center", va="center", fontsize="small", bbox=style
                 )
             else:
                 ax.text(1.02, place, chance_text(share), transform=side, ha="left", va="center", fontsize="small")
@@ -186,7 +186,7 @@ class IdentifiedDamageDisplay(Display):
         ax.set_yticks(places, [shortened(name) for name in table.index])
         is_damage = "kind" not in table or table["kind"].eq("damage").all()
         label = "loss of stiffness (%)" if is_damage else "loss of stiffness, or change (%)"
-        ax.set(title="average severity", xlabel=label, ylim=(len(table) - 0.5, -0.5))
+        ax.set(title="mean severity", xlabel=label, ylim=(len(table) - 0.5, -0.5))
         right = max(ax.get_xlim()[1], 1.0)
         ax.set_xlim(min(ax.get_xlim()[0], -0.03 * right), right)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False, fontsize="small")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 from sklearn.exceptions import NotFittedError
@@ -26,30 +25,17 @@ from skthermo.reporting.fleet import fleet_page
 from skthermo.reporting.service import Standing, monitor_page
 from skthermo.studies import DetectabilityStudy, IdentifiedDamage
 
-
-class PageKind(NamedTuple):
-    """A kind of subject: the attributes that tell it from others, what it has with results, and the page's heading."""
-
-    attributes: tuple[str, ...]
-    results: str
-    lacking: str
-    title: str
-
-
 KINDS = {
-    "Fleet": PageKind(("chains", "monitors", "discoveries"), "table", "", "The bridges today"),
-    "Monitor": PageKind(
-        ("update", "acknowledge"),
-        "events_",
-        "the monitor is not fitted yet; expected a call of fit before",
-        "The structure today",
-    ),
-    "DetectabilityStudy": PageKind(
-        ("scenarios",),
-        "results_",
-        "the study has no results yet; expected a call of run before",
-        "Which damage the monitoring would find",
-    ),
+    "Fleet": ("chains", "monitors", "discoveries"),
+    "Monitor": ("update", "acknowledge"),
+    "DetectabilityStudy": ("scenarios",),
+}
+"""Attributes by which a subject is recognised."""
+
+HEADINGS = {
+    "Fleet": "The bridges today",
+    "Monitor": "The structure today",
+    "DetectabilityStudy": "Which damage the monitoring would detect",
 }
 ONLY_FOR = {
     "identified": ("DetectabilityStudy", "Monitor"),
@@ -75,19 +61,17 @@ def owner_report(
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
-    Of a study, it says in plain sentences which damage the monitoring would find, what was monitored, how good the
-    model is, which damage was identified, and with which settings and warnings all this was computed. If the study has
-    several detectors, it says which one is recommended and why, and the rest is on that one.
+    Of a study, it says which damage the monitoring would detect, what was monitored, how good the model is, which
+    damage was identified, and with which settings and warnings all this was computed. Of several detectors, it
+    says which one is recommended and why, and the rest is on that one.
 
     Of a monitor, it says whether the structure is healthy today, in alarm or not evaluated, since when and why; which
-    events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and what the
-    promise of few false alarms means. A monitor that has had no record for two days more than usual is not called
-    healthy.
+    events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and how many
+    false alarms are to be expected. A monitor without a record for two days more than usual is not called healthy.
 
-    Of a fleet, it says how many bridges are in alarm, not evaluated, not fitted and healthy, and how many of the alarms
-    chance explains; a table has a row for each bridge, the worst first. Each row opens that bridge's own page, in a
-    folder beside the file: ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced; those of bridges
-    that are no longer in the fleet stay.
+    Of a fleet, it says how many bridges are in which state, and how many of the alarms chance explains. A table has a
+    row for each bridge, the worst first, which opens that bridge's own page in a folder beside the file:
+    ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced.
 
     Parameters
     ----------
@@ -151,17 +135,20 @@ def owner_report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
-    kind = next((kind for kind, one in KINDS.items() if all(hasattr(subject, name) for name in one.attributes)), None)
+    kind = next((kind for kind, names in KINDS.items() if all(hasattr(subject, name) for name in names)), None)
     if kind is None:
         raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
-    if identified is not None and not isinstance(identified, IdentifiedDamage):
-        raise ValueError(f"identified is {identified!r:.200}; expected what identify_damage gives")
-    if not hasattr(subject, KINDS[kind].results):
-        raise NotFittedError(KINDS[kind].lacking)
-    if title is not None and not isinstance(title, str):
-        raise ValueError(f"title is {title!r:.100}; expected a text")
-    if structure is not None and not isinstance(structure, Structure):
-        raise ValueError(f"structure is {structure!r:.200}; expected a Structure")
+    if kind == "Monitor" and not hasattr(subject, "events_"):
+        raise NotFittedError("the monitor is not fitted yet; expected a call of fit before")
+    if kind == "DetectabilityStudy" and not hasattr(subject, "results_"):
+        raise NotFittedError("the study has no results yet; expected a call of run before")
+    for name, value, expected in (
+        ("identified", identified, IdentifiedDamage),
+        ("title", title, str),
+        ("structure", structure, Structure),
+    ):
+        if value is not None and not isinstance(value, expected):
+            raise ValueError(f"{name} is {value!r:.200}; expected a {expected.__name__}")
     given = {"identified": identified, "structure": structure, "detector": detector, "now": now}
     for name, kinds in ONLY_FOR.items():
         if given[name] is not None and kind not in kinds:
@@ -175,7 +162,7 @@ def owner_report(
         raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
     if kind != "DetectabilityStudy":
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
-    heading = KINDS[kind].title if title is None else title
+    heading = HEADINGS[kind] if title is None else title
     if kind == "Fleet":
         check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)

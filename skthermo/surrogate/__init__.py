@@ -4,11 +4,4 @@ from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
 from skthermo.surrogate.inverse import InverseSurrogate
 
-__all__ = [
-    "DataInformedFEM",
-    "FitReport",
-    "FittedChain",
-    "InverseSurrogate",
-    "TemperatureMapper",
-    "paper_network",
-]
+__all__ = ["DataInformedFEM", "FitReport", "FittedChain", "InverseSurrogate", "TemperatureMapper", "paper_network"]

@@ -22,6 +22,7 @@ from skthermo._estimators.regressors import check_takes_weights, fit_outputs, pr
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._tables.arrays import Array, as_columns
 from skthermo._tables.frames import (
+    Table,
     check_columns,
     check_same_rows,
     check_temperatures,
@@ -61,7 +62,7 @@ def default_network() -> MLPRegressor:
 
 
 def default_lines(penalties: Any = PENALTIES, **options: Any) -> Pipeline:
-    """Broken lines whose changes of slope are penalised; they go on straight beyond the data."""
+    """Piecewise-linear regression with penalised changes of slope, which goes on straight beyond the data."""
     hinges = HingeFeatures().set_output(transform="default")  # whatever the global setting is at fit and at predict
     return make_pipeline(hinges, RidgeCV(penalties, **options))
 
@@ -205,7 +206,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None
 
-    def _read_xy(self, X: Any, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
+    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""
         if y is None:
             raise ValueError(
@@ -274,7 +275,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
                 theta[complete] = self.targets_.inverse_transform(means)
         return theta, std
 
-    def _as_targets(self, X: Any, values: Array) -> Any:
+    def _as_targets(self, X: Table, values: Array) -> Any:
         """Predictions as a vector or a frame if the training targets were."""
         return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
@@ -292,9 +293,9 @@ class TemperatureMapper(MultiplierRegressor):
     regressor : regressor, optional
         Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
         logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
-        parameters are not positive, no logarithm is taken. By default broken lines, ``make_pipeline(HingeFeatures(),
-        RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data. See `paper_network` for the paper's
-        network.
+        parameters are not positive, no logarithm is taken. By default piecewise-linear regression,
+        ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which goes on straight beyond the data.
+        See `paper_network` for the paper's network.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -316,9 +317,10 @@ class TemperatureMapper(MultiplierRegressor):
     Rows with a missing temperature or parameter are left out in `fit`, and only there.
 
     On the last fifth of the healthy records of the bridge Z24, warmer than all others, the errors are 0.60 % with
-    broken lines, about 0.7 % with small networks (different for each seed), 0.67 % with random forests, 0.73 % with
-    boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials (``examples/plot_regressors.py``).
-    Trees stay at their last value beyond the data. Where few records show a sharp knee, networks follow it better.
+    piecewise-linear regression, about 0.7 % with small networks (different for each seed), 0.67 % with random forests,
+    0.73 % with boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials
+    (``examples/plot_regressors.py``). Trees stay at their last value beyond the data. Where few records show a sharp
+    knee, networks follow it better.
 
     Examples
     --------
@@ -338,10 +340,7 @@ class TemperatureMapper(MultiplierRegressor):
     }
 
     def __init__(
-        self,
-        regressor: BaseEstimator | None = None,
-        *,
-        random_state: int | np.random.RandomState | None = None,
+        self, regressor: BaseEstimator | None = None, *, random_state: int | np.random.RandomState | None = None
     ):
         self.regressor = regressor
         self.random_state = random_state

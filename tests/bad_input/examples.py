@@ -1488,6 +1488,23 @@ def detected(index, onset):
     return metrics.time_to_detection(index, 3.0, onset)
 
 
+def roles(roles):
+    return preprocessing.SensorMeans(roles).fit(T)
+
+
+LISTS = {name: list(values) for name, values in POLES.items()}
+NAMED = dict(zip(("frequencies", "shapes"), REFERENCE, strict=True))
+
+
+def tracker(reference, **options):
+    return preprocessing.ModeTracker(reference, **options).fit()
+
+
+def tracked(*, many=False, **changes):
+    poles = {"shapes": np.tile(POLES["shapes"][:1], (20, 1, 1))} if many else POLES
+    return tracker(REFERENCE).transform(poles | changes)
+
+
 REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("fem.AffineModel", "a bare matrix", lambda: AffineModel(EYE, EYE, n_modes=1), "parameter"),
     ("fem.AffineModel", "a mechanism", lambda: affine([[1.0, -1.0], [-1.0, 1.0]]), "mechanism"),
@@ -1546,6 +1563,38 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("HampelFilter", "no unit", lambda: HampelFilter("7").fit(F), "unit"),
     ("HampelFilter", "months", lambda: HampelFilter("1M").fit(F), "fixed length"),
     ("HampelFilter", "all targets", lambda: HampelFilter(targets=MODES).fit(F), "6"),
+    ("HampelFilter", "unknown target", lambda: HampelFilter(targets=["f9"]).fit(F), "'f9'"),
+    ("SensorMeans", "a column without a role", lambda: roles({"T1": "air"}), "each of"),
+    ("SensorMeans", "an unknown column", lambda: roles(dict.fromkeys([*T, "T9"], "air")), "T9"),
+    ("SensorMeans", "no role", lambda: roles(dict.fromkeys(T)), "at least"),
+    ("SensorMeans", "a number", lambda: roles(dict.fromkeys(T, 3)), "'air'"),
+    ("BlockedKFold", "block of 0", lambda: preprocessing.BlockedKFold(block=0).fold_of(T), "block is 0"),
+    (
+        "BlockedKFold",
+        "block, no stamps",
+        lambda: preprocessing.BlockedKFold(block="7D").fold_of(np.ones((9, 1))),
+        "'7D'",
+    ),
+    ("ModeTracker", "rad/s", lambda: tracked(many=True, frequencies=np.tile([12.6, 13.8], (20, 1))), "rad/s"),
+    ("ModeTracker", "no shapes", lambda: tracked(shapes=None), "'shapes'"),
+    ("ModeTracker", "negative", lambda: tracked(frequencies=-POLES["frequencies"]), "record 0"),
+    ("ModeTracker", "transposed shapes", lambda: tracked(shapes=POLES["shapes"].transpose(0, 2, 1)), "(2, 3, 2)|shape"),
+    ("ModeTracker", "complex damping", lambda: tracked(damping=np.ones((2, 2)) * 1j), "complex"),
+    ("ModeTracker", "damping of one record", lambda: tracked(damping=np.ones((1, 2))), "damping 1"),
+    ("ModeTracker", "shapes of one record", lambda: tracked(**LISTS | {"shapes": LISTS["shapes"][:1]}), "1 records"),
+    ("ModeTracker", "shapes of one pole", lambda: tracked(**LISTS | {"shapes": [[[1, 2, 1]]] * 2}), "record 0"),
+    ("ModeTracker", "an index of another length", lambda: tracked(index=[1, 2, 3]), "3 entries"),
+    ("ModeTracker", "transposed reference", lambda: tracker((REFERENCE[0], REFERENCE[1].T)), "transpose"),
+    ("ModeTracker", "a shape of zeros", lambda: tracker((REFERENCE[0], 0 * REFERENCE[1])), "zero"),
+    ("ModeTracker", "a reference in part", lambda: tracker({"frequencies": REFERENCE[0]}), "'shapes'"),
+    ("ModeTracker", "too few sensors", lambda: tracker(NAMED | {"sensors": "ab"}), "2 sensors"),
+    (
+        "ModeTracker",
+        "unknown sensors",
+        lambda: tracker(NAMED | {"sensors": "abz"}).transform(POLES | {"sensors": "abc"}),
+        "'z'",
+    ),
+    ("ModeTracker", "a duration, no stamps", lambda: tracker(REFERENCE, follow="5D").transform(POLES), "Datetime"),
     ("BiasAligner", "scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "zero"),
     ("BiasAligner", "a mode of NaN", lambda: BiasAligner().fit(F.assign(f3=NAN)), "'f3'"),
     ("BiasAligner", "a model of more modes", lambda: BiasAligner(TRUSS).fit(F[["f1", "f2"]]), "6"),

@@ -8,29 +8,10 @@ from functools import partial
 
 import numpy as np
 from measure import median_seconds
+from reduction_pays import grid, line, model_of
 
-from skthermo.fem import Beam, Structure
 from skthermo.fem._terms import DenseTerms, SparseTerms
 from skthermo.fem.modal import ShiftInvertSolver, dense_solver
-
-SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
-
-
-def viaduct(n_elements):
-    """A straight beam clamped at both ends: 6 (n - 1) degrees of freedom."""
-    nodes = {i: (float(i), 0.0, 0.0) for i in range(n_elements + 1)}
-    beams = {i: Beam(i, i + 1, **SECTION) for i in range(n_elements)}
-    groups = {"first": list(beams)[::2], "other": list(beams)[1::2]}
-    return Structure(nodes, beams, dict.fromkeys((0, n_elements), "xyz rx ry rz"), groups)
-
-
-def grid(n):
-    """A square grillage of n x n nodes, clamped at its corners: about 6 n^2 degrees of freedom."""
-    nodes = {(i, j): (2.0 * i, 2.0 * j, 0.0) for i in range(n) for j in range(n)}
-    along = {("x", i, j): Beam((i, j), (i + 1, j), **SECTION) for i in range(n - 1) for j in range(n)}
-    across = {("y", i, j): Beam((i, j), (i, j + 1), **SECTION) for i in range(n) for j in range(n - 1)}
-    corners = {(i, j): "xyz rx ry rz" for i in (0, n - 1) for j in (0, n - 1)}
-    return Structure(nodes, along | across, corners, {"first": list(along), "other": list(across)})
 
 
 def main():
@@ -40,12 +21,12 @@ def main():
     options = parser.parse_args()
     theta = np.random.default_rng(0).uniform(0.7, 1.3, (options.samples, 2))
     print("milliseconds a solve of 6 modes, sorted and with shapes of 10")
-    for name, structures in (
-        ("line", [viaduct(n) for n in (6, 11, 16, 21, 26, 34, 51, 67)]),
+    for name, shapes in (
+        ("line", [line(n) for n in (6, 11, 16, 21, 26, 34, 51, 67)]),
         ("grid", [grid(n) for n in (3, 4, 5, 6, 7, 8)]),
     ):
-        for structure in structures:
-            model = structure.assemble(["first", "other"])
+        for parts in shapes:
+            model = model_of(*parts, n_parameters=2)
             forms = both_forms(model)
             ways = {f"{kind} eigenvalues": lambda f=form: f.eigenvalues(theta, 6) for kind, form in forms.items()}
             ways |= {f"{kind} modes": lambda f=form: f.modes(theta, 10) for kind, form in forms.items()}

@@ -259,7 +259,7 @@ def z24(folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", default=list(STRUCTURES), choices=list(STRUCTURES))
+    parser.add_argument("--structures", nargs="+", default=list(DESIGNS), choices=list(DESIGNS))
     parser.add_argument("--designs", nargs="+", default=SHOWN, choices=SHOWN)
     parser.add_argument("--worlds", type=int, help="number of worlds of each structure and design")
     parser.add_argument(

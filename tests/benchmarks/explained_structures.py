@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 from blind_bridge import footbridge as footbridge_structure
 from scipy.signal import lfilter
+from slow_soil import GROUPS as GIRDER_GROUPS
+from slow_soil import girder as girder_structure
 
 from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
 from skthermo.fem import Structure, load_affine
@@ -21,6 +23,7 @@ CORRELATIONS = (0.0, 0.5, 0.9)
 SEVERITIES = (-0.01, 0.5)  # that reduced models of the truth cover
 N_SHAPES = 5  # measured shapes that are averaged
 SHAPE_NOISE = 0.01
+LAG_DAYS = 3.0  # after which half of a change of the weather has reached the parameters that lag
 
 
 def days(n_records, random):
@@ -66,7 +69,13 @@ class World:
     structure: object
     seed: int
     wrong: bool = False
+    memory: float | None = None
+    is_plain: bool = False
+    n_days: int = TRAINING_DAYS
     chains: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        self.memory = memory_of(self.seed) if self.memory is None else self.memory
 
     @property
     def fem(self):
@@ -85,7 +94,9 @@ class World:
         return model.damaged({group: WRONG * random.choice([-1, 1]) for group in self.structure.groups})
 
     def chain(self, model):
-        """A chain of one model, to be fitted."""
+        """A chain of one model, to be fitted; a plain one has no settings."""
+        if self.is_plain:
+            return DataInformedFEM(model, random_state=self.seed)
         box = 0.3
         small = model.reduced(box, random_state=0) if self.structure.is_large else model
         return DataInformedFEM(
@@ -99,12 +110,12 @@ class World:
     @property
     def records(self):
         """Healthy temperatures and frequencies to learn from."""
-        return self.structure.records(TRAINING_DAYS, {}, memory_of(self.seed), 1000 + self.seed)
+        return self.structure.records(self.n_days, {}, self.memory, 1000 + self.seed)
 
     def later(self, damage, number):
         """Later records with some damage; another number for other weather and noise."""
         seed = 100_000 + 1000 * self.seed + number
-        T, F = self.structure.records(LATER_DAYS, damage, memory_of(self.seed), seed)
+        T, F = self.structure.records(LATER_DAYS, damage, self.memory, seed)
         return T, spoiled(F, seed)
 
 
@@ -180,6 +191,18 @@ class Smooth:
         return tuple(found)
 
 
+@dataclass
+class Lagging(Smooth):
+    """The same, but the last two parameters follow means of earlier weather, which no thermometer shows."""
+
+    def theta(self, T, damage):
+        theta = super().theta(T, damage)
+        n_parameters = theta.shape[1] - len(self.groups)
+        earlier = super().theta(T.ewm(halflife=LAG_DAYS).mean(), damage)
+        theta[:, n_parameters - 2 : n_parameters] = earlier[:, n_parameters - 2 : n_parameters]
+        return theta
+
+
 @cache
 def truss():
     return Truss()
@@ -225,4 +248,10 @@ def seven_groups(bridge):
     return Structure(bridge.nodes, bridge.members, bridge.supports, groups)
 
 
-STRUCTURES = {"truss": truss, "KW51": kw51, "frame": frame, "footbridge": footbridge}
+@cache
+def girder():
+    parameters = ["girder", "pavement", "bearings"]
+    return Lagging.of("girder", girder_structure(6).assemble(parameters, groups=GIRDER_GROUPS), GIRDER_GROUPS, 0.002)
+
+
+STRUCTURES = {"truss": truss, "KW51": kw51, "frame": frame, "footbridge": footbridge, "girder": girder}

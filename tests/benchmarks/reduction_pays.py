@@ -12,10 +12,10 @@ import argparse
 import time
 
 import numpy as np
-from dense_or_sparse import SECTION
 
 from skthermo.fem import Beam, Structure, linearise
 
+SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
 BOUNDS, SAMPLES, SOLVES_PER_ROW = 0.3, 1000, 3
 ROWS = (365, 2000, 8760, 50_000)
 

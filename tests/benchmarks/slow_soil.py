@@ -1,13 +1,10 @@
 """A girder bridge whose soil follows the weather slowly, for benchmarks and tests; its truth is known.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/slow_soil.py
-
 A concrete girder of four spans stands on soil springs below its piers. Soil temperature follows the air with a time
 constant of 40 days, and soil stiffness follows soil temperature. Only the air and the steel of the railing are
-measured. Run as a command, it prints the frequencies, and how much weather and damage of 20 % change them.
+measured.
 """
 
-import argparse
 from collections import defaultdict
 from functools import cache
 from itertools import pairwise
@@ -174,26 +171,3 @@ def spoiled(clean, noise, correlation, gaps, outliers, drawn, rows):
     lost = persistent(missing, GAP_HOURS)[rows] < ndtri(share)
     outage = persistent(drawn[:, -1:], GAP_HOURS)[rows] < ndtri(gaps * OUTAGES)
     return np.where(lost | outage, np.nan, clean * (1 + relative))
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seed", type=int, default=0)
-    seed = parser.parse_args().seed
-    records = slow_soil(seed)
-    clean, F = records.clean_frequencies, records.frequencies
-    theta = np.ones((1, len(PARAMETERS)))
-    table = pd.DataFrame({"mean, Hz": clean.mean(), "user's model, Hz": records.model.frequencies(theta)[0]})
-    table["weather, %"] = 100 * (clean.max() - clean.min()) / clean.mean()
-    table["correlation with soil"] = clean.corrwith(records.soil)
-    table["missing, %"] = 100 * F.isna().mean()
-    table["outliers, %"] = 100 * ((F / clean - 1).abs() > 6 * records.noise).mean()
-    for damage in DAMAGES:
-        changed = slow_soil(seed, damage=damage).clean_frequencies
-        table[f"{next(iter(damage))}, %"] = 100 * (changed / clean - 1).mean()
-    print(f"degrees of freedom: truth {records.truth.n_dof}, user's model {records.model.n_dof}; {len(F)} records\n")
-    print(table.round(2).to_string())
-
-
-if __name__ == "__main__":
-    main()

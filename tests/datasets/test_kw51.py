@@ -4,18 +4,22 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
+from scipy.stats import spearmanr
 
 from skthermo.datasets import kw51_sensors, kw51_structure, make_kw51
 from skthermo.fem import Membrane
 from skthermo.updating import sensitivity
 
-PATH = Path(__file__).parents[1] / "benchmarks" / "kw51_model.py"
+PATH = Path(__file__).parents[2] / "examples" / "kw51_appendix_recipes.py"
 SPEC = importlib.util.spec_from_file_location(PATH.stem, PATH)
 PAPER = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(PAPER)
+SENSITIVITIES = pd.DataFrame(PAPER.PAPER_A3, index=PAPER.MODES).T
+THERMAL = ["E_bot", "E_arc", "E_br", "E_con", "E_pip"]
 
 NOMINAL = np.ones((1, 5))
 
@@ -37,21 +41,22 @@ def full_model():
 
 def test_unupdated_frequencies_are_the_papers(model):
     assert model.track
-    assert_allclose(model.frequencies(NOMINAL)[0], PAPER.FREQUENCIES, rtol=0.03)
+    assert_allclose(model.frequencies(NOMINAL)[0], PAPER.PAPER_A5["before"], rtol=0.03)
 
 
 def test_sensitivities_rank_as_the_papers(full_model):
     found = sensitivity(full_model).T
-    assert tuple(found.index) == tuple(PAPER.SENSITIVITIES.index) == full_model.parameter_names
-    assert PAPER.rank_correlation(found, PAPER.THERMAL) > 0.9
-    assert PAPER.rank_correlation(found, list(found.index)) > 0.85
-    large = PAPER.SENSITIVITIES.abs() > 0.1
-    assert (np.sign(found)[large] == np.sign(PAPER.SENSITIVITIES)[large])[large].all(axis=None)
+    assert tuple(found.index) == tuple(SENSITIVITIES.index) == full_model.parameter_names
+    for names, least in ((THERMAL, 0.9), (list(found.index), 0.85)):
+        pairs = (np.abs(table.loc[names]).to_numpy().ravel() for table in (found, SENSITIVITIES))
+        assert spearmanr(*pairs).statistic > least
+    large = SENSITIVITIES.abs() > 0.1
+    assert (np.sign(found)[large] == np.sign(SENSITIVITIES)[large])[large].all(axis=None)
 
 
 def test_six_moduli_are_the_whole_stiffness(full_model):
     found = sensitivity(full_model).T
-    assert_allclose(found.loc[[*PAPER.THERMAL, "E_b"]].sum(), 0.5, rtol=1e-6)
+    assert_allclose(found.loc[[*THERMAL, "E_b"]].sum(), 0.5, rtol=1e-6)
     assert (found.loc[["M_a", "M_g"]] <= 1e-9).all(axis=None)
     assert (found.drop(["M_a", "M_g"]) >= -1e-9).all(axis=None)
     for whole, parts in {
@@ -97,12 +102,6 @@ def test_a_subset_of_parameters_is_the_same_bridge(model, full_model):
     theta = np.ones((1, 21))
     theta[0, [full_model.parameter_names.index(name) for name in chosen.parameter_names]] = 1.3, 0.8
     assert_allclose(full_model.frequencies(theta), chosen.frequencies([[1.3, 0.8]]), rtol=1e-7)
-
-
-@pytest.mark.parametrize("parameters", [["E_bot", "E_x"], ["E_bot", "E_bot"], [], "E"])
-def test_unknown_parameters_are_named(parameters):
-    with pytest.raises(ValueError, match=r"expected 'all' or some, each once, of \['E_bot'"):
-        make_kw51(parameters)
 
 
 def test_damage_groups(model):

@@ -137,16 +137,6 @@ def test_drift_and_damage_multiply():
 
 
 @pytest.mark.nightly
-def test_noise_is_relative(campaign):
-    ratio = make_kw51_campaign(n_hours=3000, noise=[0.0, *[0.01] * 5], gaps=False, random_state=5)
-    error = ratio.frequencies / ratio.clean_frequencies - 1
-    assert_allclose(error.std()[1:], 0.01, rtol=0.05)
-    assert (error["f1"].abs() < 1e-12).all()
-    stated = [0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015]
-    assert_allclose((campaign.frequencies / campaign.clean_frequencies - 1).std(), stated, rtol=0.05)
-
-
-@pytest.mark.nightly
 def test_correlations_before_the_retrofit(campaign):
     before = campaign.state == "before"
     found = campaign.frequencies[before].corrwith(campaign.temperatures["tBD31A"][before])
@@ -240,14 +230,9 @@ def test_weather_stays_within_the_bounds_of_reduction():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"n_hours": 0}, "n_hours is 0; expected a positive integer"),
-        ({"noise": [0.1, 0.2]}, "6 modes"),
         ({"damage": {"brace": 0.1}}, "damage is .*'brace'.*expected a mapping whose keys are some of .*'braces'"),
         ({"damage": {"braces": 1.0}}, "damage of group 'braces' takes away 1 of its stiffness"),
-        ({"damage": {"braces": "much"}}, "'much'; expected a finite number"),
-        ({"drift": {"arch": np.nan}}, "nan; expected a finite number"),
         ({"drift": {"arch": 1000.0}, "n_hours": 48}, "drift of group 'arch' takes away"),
-        ({"damage_from": "tomorrow morning"}, "damage_from is 'tomorrow morning'; expected a time"),
         ({"damage_from": pd.Timestamp("2018-10-01 05:00", tz="UTC")}, "without time zone"),
     ],
 )

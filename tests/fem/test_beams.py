@@ -199,21 +199,6 @@ def every_parameter():
     return Structure(nodes, members, {"a": "xyz rx rz", "c": "y"}, groups).assemble(parameters, n_modes=5)
 
 
-def test_jacobian_of_every_property_equals_central_differences():
-    model = every_parameter()
-    theta = np.random.default_rng(0).uniform(0.8, 1.2, (3, len(model.parameter_names)))
-    step = 1e-5
-    differences = np.stack(
-        [
-            (model.frequencies(theta + step * e) - model.frequencies(theta - step * e)) / (2 * step)
-            for e in np.eye(theta.shape[1])
-        ],
-        axis=2,
-    )
-    scale = model.frequencies(theta)[:, :, np.newaxis]
-    np.testing.assert_allclose(model.jacobian(theta) / scale, differences / scale, atol=1e-6)
-
-
 def test_frequencies_are_homogeneous_in_stiffness_and_in_mass():
     model = every_parameter()
     theta = np.random.default_rng(1).uniform(0.8, 1.2, (3, len(model.parameter_names)))
@@ -221,31 +206,3 @@ def test_frequencies_are_homogeneous_in_stiffness_and_in_mass():
     share = dict(zip(model.parameter_names, np.moveaxis(relative, 2, 0), strict=True))
     np.testing.assert_allclose(share["E"] + share["G"] + share["soil"] + share["bearing"], 0.5, rtol=1e-8)
     np.testing.assert_allclose(share["mass"], -0.5, rtol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"orientation": (1, 0, 0)}, r"orientation \(1, 0, 0\) is along the beam"),
-        ({"I_yy": -1.0}, "member 'beam' has I_yy = -1.0; expected a positive number"),
-        ({"J": 0.0}, "member 'beam' has J = 0.0"),
-        ({"offset_end": (-LENGTH, 0, 0)}, "member 'beam' from node 0 to node 1 has zero length"),
-    ],
-)
-def test_bad_beams_are_named(options, message):
-    with pytest.raises(ValueError, match=message):
-        Structure(
-            {0: (0, 0, 0), 1: (LENGTH, 0, 0)},
-            {"beam": Beam(0, 1, **(SECTION | options))},
-            {0: CLAMPED},
-            {"g": ["beam"]},
-        ).assemble(["g"], n_modes=1)
-
-
-def test_bad_releases_and_dimensions_are_named():
-    with pytest.raises(ValueError, match=r"release_end names \['theta'\]"):
-        Beam(0, 1, **SECTION, release_end=("theta",))
-    with pytest.raises(ValueError, match="beam from node 0 to node 1: expected three coordinates"):
-        Structure({0: (0, 0), 1: (1, 0)}, {"beam": Beam(0, 1, **SECTION)}, {0: "xy"}, {"g": ["beam"]})
-    with pytest.raises(ValueError, match="node 1 along rx"):
-        line(1, (CLAMPED, ""), last=("rx",)).assemble(["all"], n_modes=1)

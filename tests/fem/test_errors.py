@@ -11,7 +11,6 @@ from skthermo.fem import (
     AffineModel,
     Bar,
     CallableModel,
-    PointMass,
     Spring,
     Structure,
     evaluate,
@@ -33,35 +32,20 @@ def structure(nodes=NODES, members=MEMBERS, supports=SUPPORTS, groups=GROUPS):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"nodes": NODES | {"d": (9, 9)}}, "node 'd' is disconnected"),
-        ({"nodes": NODES | {"d": (3, 2)}}, "nodes 'c' and 'd' are duplicates"),
         ({"nodes": NODES | {"d": (3, 2, 1)}}, "node 'd' has the coordinates"),
-        ({"nodes": NODES | {"c": (3, np.nan)}}, "node 'c' has the coordinates"),
-        ({"nodes": {}}, "nodes is empty"),
-        ({"members": MEMBERS | {"aa": Bar("a", "a", **STEEL)}}, "member 'aa' .* has zero length"),
         ({"members": MEMBERS | {"ax": Bar("a", "x", **STEEL)}}, "member 'ax' ends at node 'x'"),
         ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"E": -1.0})}}, "member 'ab' has E = -1.0"),
         ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"A": 0.0})}}, "member 'ab' has A = 0.0"),
-        ({"members": MEMBERS | {"ab": Bar("a", "b", **STEEL | {"density": -1.0})}}, "density = -1.0; expected zero or"),
         ({"members": MEMBERS | {"s": Spring("c", "x", float("nan"))}}, "member 's' has k = nan"),
         ({"members": MEMBERS | {"s": Spring("c", "z", 1.0)}}, "member 's' acts along 'z' of node 'c'"),
-        ({"members": MEMBERS | {"m": PointMass("c", -2.0)}}, "member 'm' has m = -2.0"),
-        ({"members": MEMBERS | {"ab": ("a", "b")}}, "member 'ab' is .* expected an element such as Bar"),
-        ({"nodes": NODES | {"c": "xy"}}, "node 'c' has the coordinates 'xy'"),
         (
             {"nodes": NODES | {"d": (3, 2 + 1e-9)}, "members": MEMBERS | {"cd": Bar("c", "d", **STEEL)}},
             "member 'cd' has a length of 1e-09 m; expected at least 3.61e-06 m, a millionth of the structure's extent",
         ),
-        ({"supports": None}, "supports is None; expected a mapping of node to directions, such as"),
-        ({"members": list(MEMBERS.values())}, "members is .*; expected a mapping of member to element"),
-        ({"nodes": [(0, 0), (3, 0)]}, "nodes is .*; expected a mapping of node to coordinates"),
-        ({"groups": ["tie"]}, "groups is .*; expected a mapping of group to members"),
         ({"supports": {"q": "x"}}, "supports name node 'q'"),
         ({"supports": {"a": "xz"}}, "support of node 'a' along 'z'; expected some of"),
         ({"groups": {"tie": ["xy"]}}, "group 'tie' holds"),
-        ({"groups": {"tie": []}}, "group 'tie' holds no member"),
         ({"groups": {"tie": "ax"}}, "group 'tie' holds .'ax'."),
-        ({"supports": dict.fromkeys(NODES, "xy")}, "the supports fix every node in every direction"),
     ],
 )
 def test_structure_names_what_is_wrong(changes, message):
@@ -82,34 +66,16 @@ def test_mechanism_names_the_node_that_moves():
     ("arguments", "message"),
     [
         ({"parameters": ["deck"]}, "parameter 'deck': unknown group 'deck'; expected one of .'rest', 'tie'."),
-        ({"parameters": {"A": ("A",)}}, r"parameter 'A' is \('A',\); expected a group, \(property, group\)"),
         ({"parameters": {"k": ("k", "tie")}}, "parameter 'k' is the property 'k' of group 'tie'"),
         ({"parameters": ["tie", "tie"]}, "each once"),
-        ({"parameters": ["tie"], "groups": ["deck"]}, "damage group 'deck': unknown group 'deck'"),
         ({"parameters": ["tie"], "groups": {"k": ("k", "tie")}}, "damage group 'k' is the property 'k' of group 'tie'"),
         ({"parameters": ["tie"], "groups": {"mass": ("mass", "tie")}}, "group 'mass' names no stiffness term"),
         ({"parameters": ["tie"], "n_modes": 4}, "n_modes is 4, but 3 degrees of freedom"),
-        ({"parameters": ["tie"], "n_modes": 0}, "n_modes is 0; expected a positive integer"),
     ],
 )
 def test_assembly_names_what_is_wrong(arguments, message):
     with pytest.raises(ValueError, match=message):
         structure().assemble(**({"n_modes": 1} | arguments))
-
-
-@pytest.mark.parametrize(
-    ("theta", "message"),
-    [
-        (np.ones((2, 3)), r"theta has shape \(2, 3\); expected \(n_samples, 4\)"),
-        (np.ones(3), r"theta has shape \(3,\)"),
-        ([[1, 1, np.nan, 1]], "row 0, parameter 'diagonal' is nan"),
-        ([[1, 1, 1, 1], [1, -1, 1, 1]], "row 1, parameter 'top' is -1"),
-        ([[1, 1, 0, 1]], "row 0, parameter 'diagonal' is 0"),
-    ],
-)
-def test_theta_is_checked(theta, message):
-    with pytest.raises(ValueError, match=message):
-        make_truss().frequencies(theta)
 
 
 def test_theta_frame_is_read_by_its_columns():
@@ -129,36 +95,19 @@ I2 = np.eye(2)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"stiffness": {}}, "stiffness has no terms"),
         ({"stiffness": {("k",): np.ones((2, 3))}}, r"stiffness term \('k',\) has shape \(2, 3\)"),
         ({"stiffness": {("k",): I2, ("h",): np.eye(3)}}, r"term \('h',\) has shape \(3, 3\); expected \(2, 2\)"),
-        ({"stiffness": {("k",): [[1, 0.5], [0, 1]]}}, r"is not symmetric: entries \(0, 1\)"),
-        ({"stiffness": {("k",): [[1, np.inf], [np.inf, 1]]}}, "not finite"),
-        ({"stiffness": {("k",): I2 * 1j}}, r"stiffness term \('k',\) is complex"),
-        ({"stiffness": {3: I2}}, "stiffness has the key 3"),
-        ({"stiffness": {(): I2}}, "no term names a parameter"),
         ({"stiffness": {("k",): np.diag([1.0, 0.0])}}, "mechanism: degree of freedom 1 can move"),
         ({"stiffness": {("k",): [[1, 1], [1, 1.0]]}}, "mechanism: degree of freedom 0, degree of freedom 1|1, degree"),
-        ({"mass": np.eye(3)}, r"mass term \(\) has shape \(3, 3\); expected \(2, 2\)"),
-        ({"mass": np.diag([1.0, -1.0])}, "negative eigenvalue"),
         ({"mass": np.diag([1.0, 0.0]), "n_modes": 2}, "1 of them massless, have only 1 modes"),
         ({"parameter_names": ["E"]}, r"terms name \['k'\]; expected only the parameters \['E'\]"),
         ({"parameter_names": ["k", "E"]}, r"no term names the parameters \['E'\]"),
-        ({"parameter_names": ["k", "k"]}, "expected one or more different names"),
         ({"groups": {"deck": [("E",)]}}, r"group 'deck' names the term \('E',\)"),
-        ({"groups": {"deck": []}}, "group 'deck' names no stiffness term"),
     ],
 )
 def test_affine_model_names_what_is_wrong(arguments, message):
     with pytest.raises(ValueError, match=message):
         AffineModel(**({"stiffness": {("k",): I2}, "mass": I2, "n_modes": 1} | arguments))
-
-
-def test_too_few_names_of_degrees_of_freedom_are_counted():
-    with pytest.raises(ValueError, match="dof_names holds 1 names; expected 2, one for each row"):
-        AffineModel({("k",): np.eye(2)}, np.eye(2), n_modes=1, dof_names=["a"])
-    with pytest.raises(ValueError, match="mechanism: b can move"):
-        AffineModel({("k",): np.diag([1.0, 0.0])}, np.eye(2), n_modes=1, dof_names=np.array(["a", "b"]))
 
 
 class Shaped:
@@ -190,11 +139,6 @@ def test_callable_models_of_another_shape_are_refused(vectorized, shape):
         model.frequencies([[1.0], [1.1], [1.2], [1.3]])
 
 
-def test_callable_models_of_complex_numbers_are_refused():
-    with pytest.raises(ValueError, match=r"what the model's function returned at theta = {'E': 1.0} is complex"):
-        CallableModel(lambda row: np.array([1 + 1j]), ["E"], 1).frequencies([[1.0]])
-
-
 @pytest.mark.filterwarnings("error")
 def test_numpy_integers_are_integers():
     model = make_z24(np.int8(40))
@@ -207,20 +151,6 @@ def test_numpy_integers_are_integers():
     np.testing.assert_array_equal(drawn.frequencies, expected.frequencies)
     campaign = make_truss_campaign(np.int8(2), samples_per_year=np.int16(365), samples_per_day=np.int8(1))
     assert len(campaign.temperatures) == 730
-
-
-@pytest.mark.parametrize(
-    ("names", "n_modes", "message"),
-    [
-        (["a", "a"], 1, "expected one or more different names"),
-        ([], 1, "different names"),
-        (["a"], 1.5, "n_modes is 1.5"),
-    ],
-)
-def test_callable_model_checks_what_it_is_made_of(names, n_modes, message):
-    with pytest.raises(ValueError, match=message):
-        CallableModel(np.sqrt, names, n_modes)
-    assert CallableModel(np.sqrt, "stiffness", 1).parameter_names == ("stiffness",)
 
 
 def test_dense_and_sparse_matrices_and_plain_keys_are_one_model():

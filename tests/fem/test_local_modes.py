@@ -105,17 +105,6 @@ def test_a_rescaled_model_is_the_same_structure_seen_from_another_theta(make):
     np.testing.assert_allclose(again.frequencies(theta), model.frequencies(theta), rtol=1e-9)
 
 
-def test_damage_and_rescaling_commute():
-    model = portal(3, track=True)
-    one = model.damaged({"columns": 0.3}).rescaled(ROW)
-    other = model.rescaled(ROW).damaged({"columns": 0.3})
-    theta = [[1.0, 0.9, 1.1, 1.0]]
-    np.testing.assert_allclose(one.frequencies(theta), other.frequencies(theta), rtol=1e-12)
-    np.testing.assert_allclose(
-        one.frequencies(theta), model.damaged({"columns": 0.3}).frequencies(theta * ROW), rtol=1e-12
-    )
-
-
 def test_columns_of_a_rescaled_model_stay_the_nominal_modes_where_modes_swap():
     """Two masses on springs of their own: the first mode is the second one's frequency away from nominal."""
     stiffness = {("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 1.5])}
@@ -124,25 +113,3 @@ def test_columns_of_a_rescaled_model_stay_the_nominal_modes_where_modes_swap():
     nominal = np.ones((1, 3))
     np.testing.assert_allclose((2 * np.pi * twin.frequencies(nominal)) ** 2, [[4.0, 3.0]])
     np.testing.assert_allclose(np.diagonal(twin.nominal_mac(twin.modes(nominal)[1])[0]), 1)
-
-
-@pytest.mark.parametrize(
-    ("dofs", "message"),
-    [
-        ([0, 23], "dofs holds 23; expected 0 to 22"),
-        ([-1], "dofs holds -1; expected 0 to 22"),
-        ([4, 5, 4], "dofs holds 4 more than once"),
-        ([0.0, 1.0], "type float64; expected integers in one row"),
-        ([[0, 1]], r"shape \(1, 2\) and type int64; expected integers in one row"),
-        ([], "expected integers in one row"),
-        ([True, False], "True.*; expected integers in one row"),
-    ],
-)
-def test_degrees_of_freedom_that_the_model_does_not_have_are_refused(dofs, message):
-    with pytest.raises(ValueError, match=message):
-        shape_jacobian(make_truss(), np.ones(4), dofs)
-
-
-def test_rescaling_takes_one_theta():
-    with pytest.raises(ValueError, match="2 rows; expected one"):
-        make_truss().rescaled(np.ones((2, 4)))

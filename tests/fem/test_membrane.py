@@ -151,18 +151,8 @@ WARPED = QUADRILATERAL + [[0, 0, 0], [0, 0, 0], [0, 0, 0.1], [0, 0, 0]]
         (QUADRILATERAL[[0, 2, 1, 3]], {}, "expected a convex quadrilateral"),
         (np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]), {}, "expected a convex quadrilateral"),
         (QUADRILATERAL, {"corners": (0, 0, 1, 2)}, "expected a convex quadrilateral"),
-        (QUADRILATERAL[:3], {"corners": (0, 1, 2)}, "expected four nodes"),
-        (QUADRILATERAL, {"t": 0.0}, "member 'm' has t = 0.0; expected a positive number"),
-        (QUADRILATERAL, {"nu": 0.5}, "nu is 0.5; expected a number between -1 and 0.5"),
     ],
 )
 def test_bad_membranes_are_named(points, options, message):
     with pytest.raises(ValueError, match=message):
         Structure(dict(enumerate(points)), {"m": Membrane(**(PLATE | {"corners": (0, 1, 2, 3)} | options))}, {0: "xyz"})
-
-
-def test_a_parameters_matrix_is_checked():
-    flat = sheet(1, 1, 1.0, 1.0)
-    for target in (("t", "sheet", "damping"), ("mass", "sheet", "stiffness")):
-        with pytest.raises(ValueError, match="as its matrix"):
-            flat.assemble({"p": target}, n_modes=1)

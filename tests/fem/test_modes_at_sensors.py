@@ -121,19 +121,6 @@ def test_components_of_a_missing_mode_are_nan():
     np.testing.assert_array_equal(found[~missing.reshape(2, -1)], clean[~missing.reshape(2, -1)])
 
 
-def test_errors_name_what_was_expected():
-    with pytest.raises(ValueError, match="has no method 'modes'; expected a model that gives mode shapes"):
-        evaluate_modes(
-            type("Model", (), {"parameter_names": ("k",), "n_modes": 1, "frequencies": None})(), [[1.0]], [0]
-        )
-    with pytest.raises(ValueError, match=r"dofs holds 23; expected 0 to 22"):
-        linearise_modes(TRUSS, THETA, [23])
-    with pytest.raises(ValueError, match=r"shapes are \(2, 5, 6\) and reference \(5, 6\); expected \(n_samples, n_m"):
-        shape_components(np.ones((2, 5, 6)), np.ones((5, 6)))
-    with pytest.raises(ValueError, match="reference is zero at all sensors in mode 1"):
-        shape_components(np.ones((2, 2, 3)), [[1.0, 0.0]] * 3)
-
-
 def test_repeated_frequencies_have_finite_derivatives():
     """Two equal oscillators: the bordered equations are singular."""
     model = AffineModel({("a",): np.diag([400.0, 0.0]), ("b",): np.diag([0.0, 400.0])}, np.eye(2), n_modes=2)

@@ -29,15 +29,17 @@ def test_frequencies_over_the_chosen_sensor(fem, later):
     assert display.axes_[1].get_title() == "$f_{2}$"
 
 
-def test_arrays_have_numbered_sensors(later):
+def test_arrays_have_numbered_sensors_and_records(later):
     T, F = later.temperatures.to_numpy(), later.frequencies.to_numpy()
     display = PredictionDisplay.from_predictions(F, temperature=T[:, 1])
     np.testing.assert_array_equal(display.lines_["measured"][2].get_xdata(), T[:, 1])
     assert display.axes_[0].get_xlabel() == "temperature (°C)"
-    with pytest.raises(ValueError, match="sensor is 3; expected a column's number from 0 to 2"):
-        PredictionDisplay.from_estimator(None, T, F, sensor=3)
-    with pytest.raises(ValueError, match=r"sensor is 'T9'; expected one of \['T1', 'T2', 'T3'\]"):
-        PredictionDisplay.from_estimator(None, later.temperatures, later.frequencies, sensor="T9")
+    for X, sensor in ((T, 3), (later.temperatures, "T9")):
+        with pytest.raises(ValueError, match=f"sensor is {sensor!r}; expected"):
+            PredictionDisplay.from_estimator(None, X, F, sensor=sensor)
+    display = PredictionDisplay.from_predictions(np.arange(10.0), unit="")
+    np.testing.assert_array_equal(display.lines_["measured"][0].get_xdata(), np.arange(10))
+    assert (display.axes_[0].get_xlabel(), display.axes_[0].get_ylabel()) == ("record", "$f_{1}$")
 
 
 def test_given_axes_are_used(later):
@@ -79,12 +81,6 @@ def test_time_goes_on_a_date_axis_in_order_and_lines_break_in_gaps():
     assert np.isnan(y[20])
     assert (np.diff(mdates.date2num(line.get_xdata())) > 0).all()
     assert line.get_xdata()[0] == np.datetime64("2020-01-01T00:00")  # local time
-
-
-def test_records_of_arrays_are_numbered():
-    display = PredictionDisplay.from_predictions(np.arange(10.0), unit="")
-    np.testing.assert_array_equal(display.lines_["measured"][0].get_xdata(), np.arange(10))
-    assert (display.axes_[0].get_xlabel(), display.axes_[0].get_ylabel()) == ("record", "$f_{1}$")
 
 
 def test_marks_stand_at_a_time_or_at_a_record(later):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing import ExponentialMeans
 
 REACH = 4
@@ -90,7 +91,7 @@ def test_rows_without_stamps_count_rows():
 
 def test_records_after_an_outage_say_that_they_have_no_past():
     means = ExponentialMeans(["1D"]).fit(T[:100])
-    with pytest.warns(UserWarning, match="20 of 20 rows have no record 1 day or more before") as told:
+    with pytest.warns(FewRecordsWarning, match="20 of 20") as told:
         means.transform(T[300:320])
     assert told[0].message.kind == "no records for means"
     means.transform(T[100:120])

@@ -98,9 +98,9 @@ def test_ridge_regression_goes_on_straight_beyond_the_data():
 
 
 def test_columns_without_values_and_bad_numbers_of_knots_are_errors():
-    with pytest.raises(ValueError, match="'deck' is NaN in every row; expected values to place knots at"):
+    with pytest.raises(ValueError, match="'deck'"):
         HingeFeatures().fit(AIR.assign(deck=np.nan))
-    with pytest.raises(ValueError, match="'deck' is NaN in every row"):
+    with pytest.raises(ValueError, match="'deck'"):
         HingeFeatures().fit(
             AIR.assign(deck=AIR["deck"].where(AIR["air"] > 0)), sample_weight=(AIR["air"] <= 0).astype(float)
         )

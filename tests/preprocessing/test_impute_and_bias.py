@@ -118,7 +118,7 @@ def test_imputer_keeps_arrays_and_single_precision():
 
 def test_imputer_refuses_an_empty_column_by_name():
     empty = GAPPY.assign(f2=np.nan)
-    with pytest.raises(ValueError, match=r"the columns \['f2'\] are missing in all 80 rows"):
+    with pytest.raises(ValueError, match="'f2'"):
         KNNGapImputer().fit(empty)
     filled = KNNGapImputer(keep_empty_features=True).fit_transform(empty)
     assert (filled["f2"] == 0).all()

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing import LagFeatures
 
 HOURS = pd.date_range("2025-01-01", periods=30, freq="h")
@@ -70,7 +71,7 @@ def test_records_of_fit_are_the_history_of_transform():
     lags = LagFeatures(3, freq="1h").fit(T.iloc[:20])
     np.testing.assert_array_equal(lags.transform(T.iloc[20:])[["T1_lag0", "T1_lag1", "T1_lag2"]].iloc[0], [20, 19, 18])
     np.testing.assert_array_equal(lags.transform(T.iloc[[25]])["T1_lag1"], [19])  # five hours old
-    with pytest.warns(UserWarning, match="1 of 1 rows have a lag before it that finds no record"):
+    with pytest.warns(FewRecordsWarning, match="1 of 1"):
         assert np.isnan(lags.transform(T.iloc[[29]])["T1_lag1"]).all()  # nine hours old
 
 
@@ -149,7 +150,7 @@ def test_time_zones_and_resolutions():
     np.testing.assert_array_equal(LagFeatures(3).fit_transform(local), LagFeatures(3).fit_transform(T))
     coarse = T.set_axis(T.index.as_unit("s"))
     np.testing.assert_array_equal(LagFeatures(3).fit(T).transform(coarse), LagFeatures(3).fit_transform(T))
-    with pytest.raises(ValueError, match="X has stamps in time zone Europe/Brussels; expected None"):
+    with pytest.raises(ValueError, match="Europe/Brussels"):
         LagFeatures(3).fit(T).transform(local)
 
 
@@ -205,13 +206,12 @@ def test_new_rows_without_stamps_are_padded_with_a_warning():
     lags = LagFeatures(25).fit(X)
     lags.transform(X)  # the training rows, whose padding fit documents
     lags.transform(X[:10].copy())
-    with pytest.warns(UserWarning, match="lags reach 24 rows back: the first 5 of 5 rows are padded") as record:
+    with pytest.warns(FewRecordsWarning, match="5 of 5"):
         lags.transform(X[20:25])
-    assert "give the 24 rows before, too" in str(record[0].message)
-    with pytest.warns(UserWarning, match="the first 24 of 29 rows lack lags"):
+    with pytest.warns(FewRecordsWarning, match="24 of 29"):
         LagFeatures(25, padding="nan").fit(X).transform(X[1:])
     X[0] = -1.0  # what fit keeps is a copy
-    with pytest.warns(UserWarning, match="the first 24 of 30 rows"):
+    with pytest.warns(FewRecordsWarning, match="24 of 30"):
         lags.transform(X)
 
 
@@ -219,9 +219,7 @@ def test_a_batch_without_its_past_says_so():
     training = T[:12]
     lags = LagFeatures([0, 6], freq="1h", tolerance="0h").fit(training)
     day = T[24:]
-    with pytest.warns(
-        UserWarning, match=r"lags reach 6 hours back; the first record given is 2025-01-02 00:00:00, and 6 of 6"
-    ):
+    with pytest.warns(FewRecordsWarning, match="6 of 6"):
         assert lags.transform(day)["T1_lag6"].isna().all()
     assert lags.transform(T[18:])["T1_lag6"].notna().sum() == 6  # given the 6 hours before
     lags.transform(training[6:])  # rows of fit, whose gaps are its own

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.utils import Bunch
 
+from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
 from skthermo.preprocessing.tracking._assignment import MISSED, assign
@@ -173,7 +174,7 @@ def test_with_two_sensors_close_modes_are_distinct():
 def test_a_drift_beyond_max_shift_is_followed():
     drift = np.linspace(1, 1.25, 1000)
     raw = padded(F0 * drift[:, np.newaxis], n_records=1000, extra=3)
-    with pytest.warns(UserWarning, match="max_shift"):
+    with pytest.warns(UnevaluatedRowsWarning, match="max_shift"):
         fixed = ModeTracker((F0, PHI), max_shift=0.05).fit_transform(raw)
     followed = ModeTracker((F0, PHI), max_shift=0.05, follow=20).fit_transform(raw)
     assert fixed.frequencies.isna().mean().max() > 0.7
@@ -184,7 +185,7 @@ def test_a_drift_beyond_max_shift_is_followed():
 
 def test_no_drift_beyond_max_drift_is_followed():
     raw = padded(F0 * np.linspace(1, 1.25, 1000)[:, np.newaxis], n_records=1000)
-    with pytest.warns(UserWarning, match="max_shift"):
+    with pytest.warns(UnevaluatedRowsWarning, match="max_shift"):
         modes = ModeTracker((F0, PHI), max_shift=0.05, follow=20, max_drift=0.1).fit_transform(raw)
     assert (modes.followed.max() / F0 <= 1.1 + 1e-12).all()
     assert (modes.frequencies.max() / F0 <= 1.1 * 1.05).all()
@@ -212,7 +213,7 @@ def test_following_goes_by_time():
 
 
 def test_frequency_alone_assigns_in_order():
-    with pytest.warns(UserWarning, match="1 of 3 pairs of reference modes can be confused, the first f1/f2"):
+    with pytest.warns(RecordsWarning, match="f1/f2"):
         tracker = ModeTracker((F0, None)).fit()
     modes = tracker.transform(pd.DataFrame([[2.1, 2.25, 3.9], [np.nan, 2.28, 5.0]]))
     np.testing.assert_array_equal(modes.frequencies, [[2.1, 2.25, 3.9], [np.nan, 2.28, np.nan]])
@@ -233,7 +234,7 @@ def test_sensors_are_chosen_by_name():
     np.testing.assert_allclose(modes.mac, 1)
     assert modes.shapes.shape == (N, 3, 4)
     assert list(modes.damping.columns) == ["xi_sway", "xi7", "xi_torsion"]
-    with pytest.raises(ValueError, match=r"X has no sensors \['z'\] of the reference"):
+    with pytest.raises(ValueError, match="'z'"):
         ModeTracker({**reference, "sensors": "eadz"}).fit_transform(raw)
 
 
@@ -258,7 +259,7 @@ def test_no_records_and_empty_records():
 def test_modes_never_found_and_modes_found_elsewhere_give_one_warning():
     raw = padded(F0 * [1, 1.3, 1], extra=1)
     raw.frequencies[:, 3] = np.nan
-    with pytest.warns(UserWarning, match="found in none") as caught:
+    with pytest.warns(UnevaluatedRowsWarning, match="found in none") as caught:
         ModeTracker((F0, PHI)).fit_transform(raw)
     assert len(caught) == 1
     assert "['f2', 'f3'] are found in none of 50" in str(caught[0].message)
@@ -276,78 +277,12 @@ def test_poles_without_shape_are_left_over_with_a_warning():
     raw = padded()
     raw.shapes[:5, 0] = np.nan
     raw.shapes[5:7, 1] = 0
-    with pytest.warns(UserWarning, match="7 of 150 poles have a frequency but no shape"):
+    with pytest.warns(UnevaluatedRowsWarning, match="7 of 150"):
         modes = ModeTracker((F0, PHI)).fit_transform(raw)
     assert modes.left_over.sum() == 7
 
 
 GOOD = padded(n_records=12)
-
-
-@pytest.mark.parametrize("factor", [2 * np.pi, 1 / (2 * np.pi)])
-def test_rad_per_second_is_an_error(factor):
-    with pytest.raises(ValueError, match="rad/s"):
-        ModeTracker((F0, PHI)).fit_transform({**GOOD, "frequencies": factor * GOOD.frequencies})
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"frequencies": -GOOD.frequencies}, "frequency 0 of record 0 is -2; expected positive"),
-        ({"frequencies": None}, "expected 'frequencies'"),
-        ({"frequencies": [["a"]]}, "frequencies of record 0 is .*expected numbers"),
-        ({"shapes": None}, "X has no 'shapes'"),
-        ({"shapes": GOOD.shapes[:, :, :5]}, "have 5 sensors; expected 6"),
-        ({"shapes": GOOD.shapes.transpose(0, 2, 1)}, r"shapes have shape \(12, 6, 3\); expected \(12, 3"),
-        ({"shapes": GOOD.shapes * np.inf}, "infinite"),
-        ({"shapes": [["a"]]}, "expected numbers"),
-        ({"shapes": [[1, 2], [3]]}, "expected"),
-        ({"damping": GOOD.damping * 1j}, "complex"),
-        ({"damping": GOOD.damping[:5]}, "frequencies has 12 rows and damping 5"),
-        ({"frequencies": list(GOOD.frequencies), "shapes": list(GOOD.shapes)[:5]}, "shapes has 5 records"),
-        ({"frequencies": list(GOOD.frequencies), "shapes": list(GOOD.shapes[:, :2])}, r"record 0 have shape \(2, 6\)"),
-        ({"index": HOURS[:3]}, "the index has 3 entries; expected 12"),
-        ({"sensors": list("abc")}, None),
-    ],
-)
-def test_wrong_poles_are_errors(change, message):
-    raw = {**GOOD, **change}
-    if message is None:  # names of sensors matter only if the reference has them, too
-        assert ModeTracker((F0, PHI)).fit_transform(raw).left_over.sum() == 0
-        return
-    with pytest.raises(ValueError, match=message):
-        ModeTracker((F0, PHI)).fit_transform(raw)
-
-
-@pytest.mark.parametrize(
-    ("reference", "message"),
-    [
-        ((F0, PHI.T), r"shapes have shape \(3, 6\); expected \(n_sensors, 3\): transpose"),
-        ((F0, PHI[:, :2]), r"expected \(n_sensors, 3\)"),
-        ((-F0, PHI), "expected positive values in Hz"),
-        ((F0[np.newaxis], PHI), r"expected \(n_modes,\)"),
-        ((F0, 0 * PHI), "zero at all sensors"),
-        ((F0,), "has 1 parts; expected two"),
-        ({"frequencies": F0}, r"expected also \['shapes'\]"),
-        ({"frequencies": F0, "shapes": PHI, "sensors": "ab"}, "names 2 sensors; expected 6"),
-        ("KW51", "'reference' parameter of ModeTracker"),
-    ],
-)
-def test_wrong_references_are_errors(reference, message):
-    with pytest.raises(ValueError, match=message):
-        ModeTracker(reference).fit()
-
-
-@pytest.mark.parametrize("follow", [0, True, "0h", "month"])
-def test_wrong_time_constants_are_errors(follow):
-    frame = pd.DataFrame(GOOD.frequencies, HOURS[:12])
-    with pytest.raises(ValueError, match="follow"):
-        ModeTracker((F0, PHI), follow=follow).fit_transform({"frequencies": frame, "shapes": GOOD.shapes})
-
-
-def test_a_duration_needs_stamps():
-    with pytest.raises(ValueError, match="X has no DatetimeIndex"):
-        ModeTracker((F0, PHI), follow="5D").fit_transform(GOOD)
 
 
 @pytest.mark.filterwarnings("ignore:the modes .* are found in none")

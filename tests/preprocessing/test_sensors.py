@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pandas.testing import assert_frame_equal
@@ -74,18 +73,3 @@ def test_structures_with_other_thermometers_share_a_regression():
     other = pd.DataFrame({"air mean": air + 0.5, "deck mean": T["slab"]})
     means = SensorMeans({"air mean": "air", "deck mean": "deck"}).fit_transform(other)
     np.testing.assert_allclose(one[-1].predict(means), one.predict(T))
-
-
-@pytest.mark.parametrize(
-    ("roles", "message"),
-    [
-        ({"T1": "air"}, "expected each of"),
-        (ROLES | {"T9": "air"}, "T9"),
-        (dict.fromkeys(ROLES), "one at least"),
-        (dict.fromkeys(ROLES, 3), "expected names such as 'air'"),
-        (["air"] * 4, "roles"),
-    ],
-)
-def test_wrong_roles_are_refused(roles, message):
-    with pytest.raises(ValueError, match=message):
-        SensorMeans(roles).fit(readings()[0])

@@ -9,7 +9,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.studies import DetectabilityStudy, sweep
+from skthermo.studies import sweep
+from tests.studies.studies import study_of
 
 TARGETS = [f"f{mode}" for mode in range(1, 7)]
 
@@ -34,7 +35,7 @@ def study(fem):
         "in-sample": compensated(InSample, KNeighborsRegressor(4)),
     }
     scenarios = sweep(fem, (0.1, 0.2), ["bottom", "top"])
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=3, random_state=0, uncertainty="noise")
+    study = study_of(fem, detectors, scenarios, n_repeats=3)
 
     def later_year(scenario, seed):
         year = make_truss_campaign(damage=scenario.damage, random_state=seed)

@@ -10,22 +10,17 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
-from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, pod_curve, sweep
+from skthermo.studies import Scenario, compare_extensions, pod_curve, sweep
 from skthermo.studies.detectability import Arrangement, Measurement
 from skthermo.studies.extension._compare_extensions import CampaignSimulator
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-
-YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
-MODES = list(YEAR.frequencies)
+from tests.studies.studies import MODES, WEATHER, YEAR, study_of
 
 
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01)
     study.run(WEATHER)
     return study
 
@@ -98,9 +93,7 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
     tables = []
     for chain, detector, weather in ((fem, by_name, WEATHER), (fem_of_arrays, by_position, WEATHER.to_numpy())):
         scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
-        study = DetectabilityStudy(
-            chain, detector, scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
-        )
+        study = study_of(chain, detector, scenarios, noise=0.01)
         study.run(weather)
         tables.append(
             compare_extensions(study, weather, modes=[8], baseline_factors=())
@@ -116,9 +109,7 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
     inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01, refine=0)
     fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    study = DetectabilityStudy(
-        fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]), n_repeats=2, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]))
     study.run(known)
     unrelated = np.random.RandomState(0).standard_normal(365)
     sensors = pd.DataFrame({"unrelated": unrelated, "T3": YEAR.temperatures["T3"]})
@@ -133,7 +124,7 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
         Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)
     ]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3)
     study.run(WEATHER)
     table = compare_extensions(study, WEATHER, modes=[8], baseline_factors=())
     assert table["family"].tolist() == ["mass"]
@@ -184,9 +175,7 @@ def test_impossible_candidates_are_errors(study, arguments, message):
 
 def test_sensors_must_have_the_training_rows_and_new_names(fem):
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    study = DetectabilityStudy(
-        fem, detector, sweep(fem, (0.1, 0.3), ["top"]), n_repeats=2, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, detector, sweep(fem, (0.1, 0.3), ["top"]))
     with pytest.raises(ValueError, match="expected a call of run before"):
         compare_extensions(study, WEATHER)
     study.run(WEATHER)
@@ -202,9 +191,7 @@ def test_a_model_without_other_modes_has_only_longer_baselines(fem):
     model = CallableModel(truss.frequencies, truss.parameter_names, 6)
     chain = DataInformedFEM(model, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
     scenarios = [Scenario(f"soft {s}", parameters={"top": 1 - s}, family="top", severity=s) for s in (0.2, 0.3, 0.4)]
-    study = DetectabilityStudy(
-        chain, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(chain, MahalanobisDetector(), scenarios, noise=0.01)
     study.run(WEATHER)
     assert compare_extensions(study, WEATHER)["kind"].tolist() == ["baseline"]
     with pytest.raises(ValueError, match="has no method 'with_modes'"):

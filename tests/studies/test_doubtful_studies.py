@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from sklearn.linear_model import Ridge
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
 from skthermo.studies.detectability._simulation import band_of
@@ -99,18 +98,6 @@ def test_a_sweep_of_damage_and_strengthening_has_a_curve_for_each(fem):
         assert found.index.tolist() == ["bottom strengthened", "bottom"]
         assert -0.4 < found["bottom strengthened"] < 0 < found["bottom"] < 0.4
         assert found["bottom"] == pytest.approx(alone.minimum_detectable_damage(method=method)["mdd"].iloc[0])
-
-
-def test_what_is_no_chain_or_no_detector_is_named(fem):
-    with pytest.raises(ValueError, match=r"fem is AffineModel.*expected a fitted DataInformedFEM"):
-        study(make_truss(), [Scenario("healthy")]).run(WEATHER)
-    for detector, message in (
-        (None, "detector is None, without .*expected an outlier detector"),
-        (MahalanobisDetector, "a class; expected"),
-        (Ridge(), r"Ridge\(\), without \['decision_function', 'score_samples'\]"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            DetectabilityStudy(fem, detector, [Scenario("healthy")], uncertainty="noise").run(WEATHER)
 
 
 def test_strengthening_is_compared_by_its_magnitude(fem):

@@ -60,7 +60,8 @@ def test_default_groups_are_the_smallest():
 
 def test_shift_of_known_records(fem):
     inputs = fem.weather(WEATHER).inputs
-    residuals, number = fem.residuals().expected(inputs), fem.residuals().n_expected(inputs)
+    residuals, weights = fem.residuals().expected(inputs), fem.residuals().prediction_weights(inputs)
+    number = 1 / (weights**2).sum(axis=0)
     F = (fem.predict(WEATHER) * (1 + residuals) * np.linspace(0.97, 1.02, 6)).to_numpy(copy=True)
     F[::2, 3] = np.nan
     theta = fem.predict_parameters(WEATHER).to_numpy()
@@ -87,6 +88,19 @@ def test_as_many_records_as_the_weights_say(fem):
     noise = np.random.RandomState(0).standard_normal((len(residuals.own), 600))
     means = residuals._similar_mean(noise, inputs).mean(axis=0)
     assert means.var() == pytest.approx(1 / number[0], rel=0.15)
+
+
+def test_predictions_err_as_least_squares_on_the_weather_do(fem):
+    """What depends on the weather by its functions is predicted exactly, and noise as much as the weights say."""
+    residuals = fem.residuals()
+    inputs = residuals.weather[:60]
+    weights, functions = residuals.prediction_weights(inputs), residuals.weather_functions(inputs)
+    law = np.random.RandomState(0).standard_normal((functions.shape[1], 1))
+    of_records = residuals.weather_functions(residuals.weather) @ law
+    np.testing.assert_allclose(weights.T @ of_records, np.full((6, 1), (functions @ law).mean()), atol=1e-9)
+    np.testing.assert_allclose(weights.sum(axis=0), 1)
+    similar = residuals.shares(inputs)
+    assert (weights**2).sum() > (similar**2).sum()  # a cold season is known less well than its similar records say
 
 
 def test_records_far_from_the_others():

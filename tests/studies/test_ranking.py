@@ -6,19 +6,15 @@ import pytest
 from scipy.stats import binom, ttest_1samp
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
-from sklearn.linear_model import LinearRegression
 from sklearn.metrics import roc_auc_score
-from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
 from skthermo.studies.detectability._ranking import rank
 from skthermo.studies.detectability._simulation import EvaluatedRecords
+from tests.studies.studies import WEATHER, compensated, study_of
 
-YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
-MODES = list(YEAR.frequencies)
 SIMULATED = "simulated"
 
 
@@ -42,10 +38,6 @@ class Dice(OutlierMixin, BaseEstimator):
         return self.score_samples(X) - self.share
 
 
-def compensated():
-    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-
-
 def detectors():
     return {
         "raw": MahalanobisDetector(),
@@ -60,7 +52,7 @@ def detectors():
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 100, 300)]
-    study = DetectabilityStudy(fem, detectors(), scenarios, n_repeats=8, random_state=0, uncertainty="noise")
+    study = study_of(fem, detectors(), scenarios, n_repeats=8)
     study.run(WEATHER)
     return study
 
@@ -147,13 +139,8 @@ def test_equal_detectors_tie(study):
         columns = [name for name in table if not name.startswith("pod_deficit")]
         assert table.loc["raw", columns].tolist() == table.loc["twin", columns].tolist()
         assert table.loc["raw", "pod_deficit"] == table.loc["twin", "pod_deficit"]
-    pair = DetectabilityStudy(
-        study.fem,
-        {"b": MahalanobisDetector(), "a": MahalanobisDetector()},
-        [{}, {"top": 0.2}],
-        n_repeats=3,
-        random_state=0,
-        uncertainty="noise",
+    pair = study_of(
+        study.fem, {"b": MahalanobisDetector(), "a": MahalanobisDetector()}, [{}, {"top": 0.2}], n_repeats=3
     )
     pair.run(WEATHER)
     table = pair.ranking()
@@ -242,7 +229,7 @@ def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
             return np.ones(len(X))
 
     some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=4, random_state=0, uncertainty="noise")
+    study = study_of(fem, some, [{}, {"top": 0.2}], n_repeats=4)
     study.run(WEATHER)
     table = study.ranking()
     assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
@@ -256,7 +243,7 @@ def test_records_that_are_not_evaluated_are_said(fem):
             return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
 
     some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], n_repeats=2, random_state=0, uncertainty="noise")
+    study = study_of(fem, some, [{}, {"top": 0.2}])
     study.run(WEATHER)
     share = study.ranking().loc["half", "not_evaluated"]
     assert share == pytest.approx(0.5, abs=0.01)
@@ -272,19 +259,12 @@ def test_without_other_noise_nothing_is_significant(fem, options):
         table = study.ranking(by=by)
         assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
         assert not table["significantly_worse"].any()
-    assert "do not tell which detectors are clearly worse" in study.summary()
+    assert "do not show which detectors" in study.summary()
 
 
 def test_measured_records_rank_by_what_was_found(fem):
     some = {"raw": MahalanobisDetector(), "lines": compensated(), "forest": OutlierDetector(IsolationForest())}
-    study = DetectabilityStudy(
-        fem,
-        some,
-        [Scenario("healthy"), Scenario("top", {"top": 0.2})],
-        n_repeats=2,
-        random_state=0,
-        uncertainty="noise",
-    )
+    study = study_of(fem, some, [Scenario("healthy"), Scenario("top", {"top": 0.2})])
     campaigns = {
         name: make_truss_campaign(damage=d, random_state=1) for name, d in (("healthy", None), ("top", {"top": 0.2}))
     }
@@ -310,9 +290,7 @@ def test_what_cannot_be_ranked_is_an_error(fem, study):
         with pytest.raises(ValueError, match=message):
             study.ranking(**options)
     for scenario, message in (({}, "none of them damaged"), ({"top": 0.1}, "none of them healthy")):
-        single = DetectabilityStudy(
-            fem, MahalanobisDetector(), [scenario], n_repeats=1, random_state=0, uncertainty="noise"
-        )
+        single = study_of(fem, MahalanobisDetector(), [scenario], n_repeats=1)
         with pytest.raises(ValueError, match="expected a call of run before"):
             single.ranking()
         single.run(WEATHER)

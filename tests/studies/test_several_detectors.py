@@ -9,30 +9,19 @@ import pytest
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_truss_campaign
 from skthermo.detection import (
     FusedDetector,
     MahalanobisDetector,
     OutlierDetector,
-    TemperatureCompensator,
     WindowedAlarm,
 )
 from skthermo.fem import AffineModel
-from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
+from skthermo.studies import Scenario, compare_extensions, sweep
 from skthermo.surrogate import DataInformedFEM
+from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
 
-YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
-SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
-MODES = list(YEAR.frequencies)
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
-
-
-def compensated(last=None):
-    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
 
 
 def detectors():
@@ -68,7 +57,7 @@ class Trouble(OutlierMixin, BaseEstimator):
 
 @pytest.fixture(scope="module")
 def study(fem):
-    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
+    study = study_of(fem, detectors(), SCENARIOS, n_repeats=3)
     study.run(WEATHER)
     return study
 
@@ -94,7 +83,7 @@ def test_one_row_for_each_detector_and_scenario(study):
 
 @pytest.mark.parametrize("name", list(detectors()))
 def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
-    alone = DetectabilityStudy(fem, detectors()[name], SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
+    alone = study_of(fem, detectors()[name], SCENARIOS, n_repeats=3)
     results = alone.run(WEATHER).drop(columns="detector")
     together = study.results_[study.results_["detector"] == name].drop(columns="detector").reset_index(drop=True)
     pd.testing.assert_frame_equal(results, together)
@@ -107,7 +96,7 @@ def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
 @pytest.mark.nightly
 def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
     backwards = dict(reversed(detectors().items()))
-    other = DetectabilityStudy(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2, random_state=0, uncertainty="noise")
+    other = study_of(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2)
     results = other.run(WEATHER).set_index(["detector", "scenario"])
     pd.testing.assert_frame_equal(results, study.results_.set_index(["detector", "scenario"]).loc[results.index])
     for mine, others in ((study.decisions_, other.decisions_), (study.calibration_, other.calibration_)):
@@ -134,7 +123,7 @@ def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
     found = []
     for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):
         counts.clear()
-        DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise").run(WEATHER)
+        study_of(fem, some, SCENARIOS).run(WEATHER)
         found.append(dict(counts))
     assert found[0] == found[1]
     assert found[0]["simulate"] == len(SCENARIOS)
@@ -147,7 +136,7 @@ def test_the_truth_is_asked_once_for_all_detectors(fem):
         asked[scenario.name, seed] += 1
         return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
 
-    study = DetectabilityStudy(fem, detectors(), SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise")
+    study = study_of(fem, detectors(), SCENARIOS)
     results = study.run(WEATHER, reference=truth)
     assert set(asked.values()) == {1}
     assert Counter(name for name, _ in asked) == {"healthy": 4, "bottom 10 %": 2, "top 20 %": 2}  # two calibrate
@@ -157,10 +146,7 @@ def test_the_truth_is_asked_once_for_all_detectors(fem):
 
 def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
     for name in detectors():
-        calibration, healthy = (
-            study.calibration_[name, "simulated"],
-            study.decisions_[name, "healthy", "simulated"],
-        )
+        calibration, healthy = (study.calibration_[name, "simulated"], study.decisions_[name, "healthy", "simulated"])
         assert calibration.shape == healthy.shape
         assert (calibration == healthy).mean() < 0.05
         assert np.median(calibration) == pytest.approx(np.median(healthy), abs=0.1 * float(np.std(healthy)))
@@ -168,18 +154,12 @@ def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
 
 def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
     given = [{}, {"bottom": 0.18, "top": 0.05}, pd.Series({"top": -0.1}), Scenario("other", {"top": 0.2})]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), given, n_repeats=1, random_state=0, uncertainty="noise")
+    study = study_of(fem, MahalanobisDetector(), given, n_repeats=1)
     results = study.run(WEATHER)
     assert results["scenario"].tolist() == ["healthy", "bottom 18 %, top 5 %", "top -10 %", "other"]
     assert results["measure"].tolist() == ["PFA", "POD", "POD", "POD"]
     scenarios = [Scenario(name, one.damage) for name, one in zip(results["scenario"], study.scenarios_, strict=True)]
     pd.testing.assert_frame_equal(study.set_params(scenarios=scenarios).run(WEATHER), results)
-
-
-@pytest.mark.parametrize("given", [{"deck": 0.1}, {"top": 20}, {"top": None}, {3: 0.1}])
-def test_impossible_mappings_are_errors(fem, given):
-    with pytest.raises(ValueError, match=r"deck|severit|group"):
-        DetectabilityStudy(fem, MahalanobisDetector(), [{}, given], n_repeats=1, uncertainty="noise").run(WEATHER)
 
 
 def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
@@ -189,14 +169,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
         "fused": (FusedDetector([("lines", compensated()), ("again", compensated())]), list(SIDE_BY_SIDE)),
         "week": (compensated(WindowedAlarm(7)), list(SIDE_BY_SIDE)),
     }
-    study = DetectabilityStudy(
-        fem,
-        {name: detector for name, (detector, _) in sees.items()},
-        SCENARIOS,
-        n_repeats=1,
-        random_state=0,
-        uncertainty="noise",
-    )
+    study = study_of(fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1)
     results = study.run(WEATHER, SIDE_BY_SIDE)
     pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
     for name, (_, columns) in sees.items():
@@ -220,7 +193,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, message, n_jobs):
     some = {"bad": trouble} | detectors()
-    beside = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=3, n_jobs=n_jobs, random_state=0, uncertainty="noise")
+    beside = study_of(fem, some, SCENARIOS, n_repeats=3, n_jobs=n_jobs)
     results = beside.run(WEATHER)
     bad, others = results.iloc[0], results.iloc[1:].reset_index(drop=True)
     assert bad["detector"] == "bad"
@@ -233,7 +206,7 @@ def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, mess
     assert beside.minimum_detectable_damage().index.unique("detector").tolist() == list(detectors())
     with pytest.raises(ValueError, match=r"detector is 'bad'; expected the name of one of \['raw'"):
         beside.pod_curve("top", detector="bad")
-    alone = DetectabilityStudy(fem, {"bad": trouble}, SCENARIOS, n_repeats=3, random_state=0, uncertainty="noise")
+    alone = study_of(fem, {"bad": trouble}, SCENARIOS, n_repeats=3)
     with pytest.raises((ValueError, KeyError, RuntimeError), match=message.split(": ")[1]):
         alone.run(WEATHER)
 
@@ -255,22 +228,12 @@ def test_what_is_asked_of_one_of_several_detectors(study):
 @pytest.mark.nightly
 def test_what_to_add_asks_for_a_detector_of_several(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    several = DetectabilityStudy(
-        fem,
-        {"raw": MahalanobisDetector(), "lines": compensated()},
-        scenarios,
-        n_repeats=2,
-        noise=0.01,
-        random_state=0,
-        uncertainty="noise",
-    )
+    several = study_of(fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, noise=0.01)
     several.run(WEATHER)
     with pytest.raises(ValueError, match="detector is None"):
         compare_extensions(several, WEATHER, modes=[6])
     found = compare_extensions(several, WEATHER, modes=[6], detector="raw")
-    alone = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    alone = study_of(fem, MahalanobisDetector(), scenarios, noise=0.01)
     alone.run(WEATHER)
     pd.testing.assert_frame_equal(found, compare_extensions(alone, WEATHER, modes=[6]))
 
@@ -289,7 +252,7 @@ class Doubtful(MahalanobisDetector):
 
 def test_one_warning_for_one_cause_names_the_detectors(fem):
     some = {"raw": MahalanobisDetector(), "first": Doubtful(), "second": Doubtful(0.05)}
-    study = DetectabilityStudy(fem, some, SCENARIOS, n_repeats=2, random_state=0, uncertainty="noise")
+    study = study_of(fem, some, SCENARIOS)
     with pytest.warns(UserWarning, match=r"odd|convergence") as caught:
         study.run(WEATHER)
     fit, judged = caught
@@ -305,18 +268,3 @@ def test_one_warning_for_one_cause_names_the_detectors(fem):
     with pytest.warns(UserWarning, match=r"^365 odd records \(and 2 times more|convergence") as caught:
         study.set_params(detectors=Doubtful()).run(WEATHER)
     assert str(caught[0].message) == "no convergence in 7 steps"
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({}, "expected a detector, or a mapping of names to detectors"),
-        ({3: MahalanobisDetector()}, "expected a detector, or a mapping of names to detectors"),
-        ({"": MahalanobisDetector()}, "expected a detector, or a mapping of names to detectors"),
-        ({"raw": MahalanobisDetector}, "detector 'raw' is .*a class; expected an outlier detector"),
-        ({"raw": MahalanobisDetector(), "lines": LinearRegression()}, "detector 'lines' is .*without"),
-    ],
-)
-def test_what_is_no_detector_is_an_error(fem, given, message):
-    with pytest.raises(ValueError, match=message):
-        DetectabilityStudy(fem, given, SCENARIOS, n_repeats=1, uncertainty="noise").run(WEATHER)

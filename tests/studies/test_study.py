@@ -15,19 +15,12 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.metrics import probability_of_detection, time_to_detection
-from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
+from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
 from skthermo.surrogate import DataInformedFEM
+from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
 from tests.surrogate.chains import chain
 
-YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
-SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
-MODES = list(YEAR.frequencies)
 ONLY = "MahalanobisDetector"  # name of the only detector of a study
-
-
-def compensated(last=None):
-    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
 
 
 def first_seed(random_state):
@@ -37,9 +30,7 @@ def first_seed(random_state):
 @pytest.mark.parametrize("noise", [0.01, "fitted"])
 def test_records_are_those_that_the_chain_simulates(fem, noise):
     scenarios = [Scenario("healthy"), Scenario("a fifth", {"bottom": 0.2})]
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=noise, random_state=3)
     results = study.run(WEATHER).set_index("scenario")
     detector = MahalanobisDetector().fit(YEAR.frequencies)
     assert study.thresholds_[ONLY] == pytest.approx(detector.threshold_, rel=1e-9)
@@ -55,7 +46,7 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
 
 def test_same_bits_whatever_the_jobs(fem):
     scenarios = [*sweep(fem, (0.1, 0.3), ["bottom", "top"]), ProgressiveDamage("crack", {"top": 0.3}, 50, 90)]
-    study = DetectabilityStudy(fem, compensated(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
+    study = study_of(fem, compensated(), scenarios, n_repeats=3)
     weather = WEATHER[:150]
     expected = study.run(weather, SIDE_BY_SIDE)
     twin = clone(study).set_params(n_jobs=2)
@@ -67,14 +58,11 @@ def test_same_bits_whatever_the_jobs(fem):
 
 def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
     scenarios = [Scenario("one", {"top": 0.2}), Scenario("other", {"top": 0.2})]
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=3, random_state=0, uncertainty="noise")
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3)
     one, other = study.run(WEATHER).drop(columns="scenario").itertuples(index=False)
     assert one == other
     alarms = [
-        DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=n, random_state=0, uncertainty="noise").run(
-            WEATHER
-        )["n_alarms"][0]
-        for n in (1, 2, 3)
+        study_of(fem, MahalanobisDetector(), scenarios, n_repeats=n).run(WEATHER)["n_alarms"][0] for n in (1, 2, 3)
     ]
     assert alarms[2] == one.n_alarms
     assert len({alarms[0], alarms[1] - alarms[0], alarms[2] - alarms[1]}) == 3
@@ -83,15 +71,13 @@ def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
 def test_without_a_baseline_the_detector_learns_what_the_chain_has_learned(fem):
     scenarios = sweep(fem, (0.2,), ["top"])
     for detector, baseline in ((MahalanobisDetector(), YEAR.frequencies), (compensated(), SIDE_BY_SIDE)):
-        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise")
+        study = study_of(fem, detector, scenarios)
         pd.testing.assert_frame_equal(study.run(WEATHER), study.run(WEATHER, baseline))
 
 
 def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     scenarios = sweep(fem, (0.1,), ["top"])
-    study = DetectabilityStudy(
-        fem, compensated(), scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, compensated(), scenarios, n_repeats=1, noise=0.01)
     study.run(WEATHER, SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
@@ -100,9 +86,7 @@ def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
 
 
 def test_a_detector_may_see_some_of_the_modes(fem):
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), sweep(fem, (0.3,), ["bottom"]), n_repeats=1)
     few = study.run(WEATHER, YEAR.frequencies[["f3", "f1"]])
     assert few["rate"][1] < study.run(WEATHER)["rate"][1]
     assert list(study.detectors_[ONLY].feature_names_in_) == MODES
@@ -119,10 +103,8 @@ def test_arrays_give_the_rates_of_frames(fem, fem_of_arrays):
             SIDE_BY_SIDE,
         ),
     ):
-        arrays = DetectabilityStudy(
-            fem_of_arrays, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise"
-        )
-        expected = DetectabilityStudy(fem, clone(detector), scenarios, n_repeats=2, random_state=0, uncertainty="noise")
+        arrays = study_of(fem_of_arrays, detector, scenarios)
+        expected = study_of(fem, clone(detector), scenarios)
         if isinstance(detector, MahalanobisDetector):
             frames = expected.run(WEATHER, baseline)
         else:
@@ -141,9 +123,7 @@ def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
             return None
         return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
 
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01)
     results = study.run(WEATHER, reference=truth)
     assert results["source"].tolist() == ["simulated", "simulated", "reference"]
     simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
@@ -160,7 +140,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
     side_by_side = measured.temperatures.join(frequencies)
     scenarios = sweep(fem, (0.3,), ["top"])
     for detector, records in ((MahalanobisDetector(), frequencies), (compensated(), side_by_side)):
-        study = DetectabilityStudy(fem, detector, scenarios, n_repeats=2, random_state=0, uncertainty="noise")
+        study = study_of(fem, detector, scenarios)
         results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
         row = results.loc[("top 30 %", "reference")]
         decision = study.detectors_[study.detector_name()].decision_function(records)
@@ -173,9 +153,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
 
 
 def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
-    study = DetectabilityStudy(
-        fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1)
     damaged = make_truss_campaign(damage={"top": 0.3}, random_state=1)
     alone = study.run(WEATHER, reference={"top 30 %": damaged.frequencies})
     pd.testing.assert_frame_equal(
@@ -190,9 +168,7 @@ def test_progressive_damage_counts_from_its_onset(fem):
         ProgressiveDamage("by time", {"top": 0.4}, onset, "2025-09-01"),
         ProgressiveDamage("by number", {"top": 0.4}, 59, 243),
     ]
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01)
     results = study.run(WEATHER).drop(columns=["scenario", "pi_low", "pi_high"])  # one repeat has no band
     by_time, by_number = results.itertuples(index=False)
     assert by_time == by_number
@@ -207,9 +183,7 @@ def test_progressive_damage_counts_from_its_onset(fem):
 def test_uncertain_damage_takes_another_draw_in_every_repeat(fem):
     draws = [0.05, 0.3]
     uncertain = UncertainDamage("top", pd.DataFrame({"top": draws}))
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), [uncertain], n_repeats=4, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), [uncertain], n_repeats=4, noise=0.01)
     alarms = study.run(WEATHER)["n_alarms"][0]
     seeds = np.random.RandomState(0).randint(np.iinfo(np.int32).max, size=(4, 2))[:, 0]
     expected = [
@@ -226,9 +200,7 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
         Scenario("ballast", mass=np.full(23, 500.0), family="mass", severity=0.1),
         Scenario("stiffer", parameters={"top": 1.3}),
     ]
-    results = DetectabilityStudy(
-        fem, MahalanobisDetector(), scenarios, n_repeats=2, random_state=0, uncertainty="noise"
-    ).run(WEATHER)
+    results = study_of(fem, MahalanobisDetector(), scenarios).run(WEATHER)
     assert (results["measure"] == "POD").all()
     assert (results["rate"] > 0.2).all()
 
@@ -244,16 +216,12 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
     ],
 )
 def test_any_outlier_detector_can_be_studied(fem, detector):
-    study = DetectabilityStudy(
-        fem, detector, sweep(fem, (0.3,), ["bottom"]), n_repeats=2, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, detector, sweep(fem, (0.3,), ["bottom"]), noise=0.01)
     results = study.run(WEATHER).set_index("scenario")
     assert results["rate"]["bottom 30 %"] > results["rate"]["healthy"] + 0.3
     repeated = clone(study).run(WEATHER).set_index("scenario")
     pd.testing.assert_frame_equal(repeated, results)  # random_state seeds the detector, too
-    single = DetectabilityStudy(
-        fem, detector, study.scenarios, n_repeats=1, noise=0.01, random_state=0, uncertainty="noise"
-    )
+    single = study_of(fem, detector, study.scenarios, n_repeats=1, noise=0.01)
     rates = single.run(WEATHER)["rate"]
     for rate, index in zip(rates, single.indices_.values(), strict=True):
         assert rate == pytest.approx(
@@ -263,7 +231,7 @@ def test_any_outlier_detector_can_be_studied(fem, detector):
 
 def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"])
-    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=5, random_state=0, uncertainty="noise")
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=5)
     rates = study.run(WEATHER, confidence=0.9).set_index("scenario")["rate"]
     grid, curve = (study.minimum_detectable_damage(method=method) for method in ("grid", "curve"))
     for group in ("bottom", "top"):
@@ -278,20 +246,16 @@ def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
     assert np.isnan(study.minimum_detectable_damage(level=0.999).loc[("top", "simulated"), "mdd"])
 
 
-def test_damage_between_two_severities_is_bracketed(fem):
-    study = DetectabilityStudy(
-        fem,
-        MahalanobisDetector(),
-        sweep(fem, (0.1, 0.5), ["diagonal"]),
-        n_repeats=2,
-        random_state=0,
-        uncertainty="noise",
-    )
+@pytest.mark.parametrize(
+    ("severities", "group", "bracket"), [((0.1, 0.5), "diagonal", (0.1, 0.5)), ((0.4,), "bottom", (0.0, 0.4))]
+)
+@pytest.mark.filterwarnings("ignore:the severities .* infinite or unknown")
+def test_without_a_slope_damage_is_bracketed(fem, severities, group, bracket):
+    study = study_of(fem, MahalanobisDetector(), sweep(fem, severities, [group]))
     study.run(WEATHER)
-    with pytest.warns(UserWarning, match="infinite or unknown"):
-        found = study.minimum_detectable_damage(method="curve").iloc[0]
+    found = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(found["mdd"])
-    assert (found["ci_low"], found["ci_high"]) == (0.1, 0.5)
+    assert (found["ci_low"], found["ci_high"]) == bracket
 
 
 @pytest.mark.nightly
@@ -303,7 +267,7 @@ def test_records_that_cannot_be_judged_do_not_count():
     weather = WEATHER.copy()
     weather.iloc[5:15] = np.nan
     detector = OutlierDetector(IsolationForest())
-    study = DetectabilityStudy(gappy, detector, [Scenario("healthy")], n_repeats=2, random_state=0, uncertainty="noise")
+    study = study_of(gappy, detector, [Scenario("healthy")])
     with pytest.warns(UserWarning, match="10 of 365 rows cannot be predicted") as caught:
         results = study.run(weather)
     assert len(caught) == 1
@@ -315,36 +279,13 @@ def test_records_that_cannot_be_judged_do_not_count():
 
 @pytest.mark.filterwarnings("ignore:.*nothing is changed, raise an alarm")
 def test_weather_outside_the_training_range_is_said_once(fem):
-    study = DetectabilityStudy(
-        fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2, random_state=0, uncertainty="noise"
-    )
+    study = study_of(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2)
     with pytest.warns(UserWarning, match="far outside") as caught:
         study.run(WEATHER + 60)
     texts = [str(warning.message) for warning in caught]
     assert len(texts) == len(set(texts)) <= 3
     assert sum("far outside those of the training records" in text for text in texts) == 1
     assert caught[0].filename == __file__
-
-
-@pytest.mark.filterwarnings("ignore:365 of 365 rows are not evaluated")
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"scenarios": [Scenario("a"), Scenario("a", {"top": 0.1})]}, "each with a name of its own"),
-        ({"scenarios": []}, "one or more"),
-        ({"scenarios": ["healthy"]}, "scenarios are"),
-        ({"scenarios": [Scenario("a", {"pier": 0.1})]}, r"\['pier'\] are unknown; expected some of"),
-        ({"n_repeats": 0}, "n_repeats is 0"),
-        ({"noise": "measured"}, "noise is 'measured'"),
-        ({"detectors": LinearRegression()}, "expected an outlier detector"),
-    ],
-)
-def test_impossible_studies_are_errors(fem, options, message):
-    arguments = {"fem": fem, "detectors": MahalanobisDetector(), "scenarios": [Scenario("healthy")]} | options
-    if isinstance(arguments["detectors"], LinearRegression):
-        arguments["detectors"] = make_pipeline(StandardScaler())
-    with pytest.raises(ValueError, match=message):
-        DetectabilityStudy(**arguments).run(WEATHER)
 
 
 @pytest.mark.parametrize(
@@ -365,15 +306,13 @@ def test_impossible_studies_are_errors(fem, options, message):
 )
 @pytest.mark.filterwarnings("ignore:365 of 365 rows are not evaluated")  # before the error
 def test_records_that_do_not_fit_are_errors(fem, detector, arguments, message):
-    study = DetectabilityStudy(fem, detector, [Scenario("healthy")], n_repeats=1, random_state=0, uncertainty="noise")
+    study = study_of(fem, detector, [Scenario("healthy")], n_repeats=1)
     with pytest.raises(ValueError, match=message):
         study.run(WEATHER, **arguments)
 
 
 def test_a_study_must_be_run_before_it_is_asked(fem):
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1, uncertainty="noise"
-    )
+    study = study_of(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), ["top"]), n_repeats=1)
     for ask in (study.minimum_detectable_damage, lambda: study.is_undetected("top")):
         with pytest.raises(ValueError, match="expected a call of run before"):
             ask()
@@ -384,24 +323,6 @@ def test_a_study_must_be_run_before_it_is_asked(fem):
         study.minimum_detectable_damage(level=90)
     with pytest.raises(ValueError, match="expected 'grid' or 'curve'"):
         study.minimum_detectable_damage(method="spline")
-
-
-def test_a_clone_shares_the_fitted_chain(fem):
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [Scenario("healthy")], n_repeats=3, uncertainty="noise")
-    twin = clone(study)
-    assert twin.fem is fem
-    assert twin.detectors is not study.detectors
-    assert twin.get_params(deep=False)["n_repeats"] == 3
-
-
-def test_a_family_of_one_severity_has_no_curve_but_a_bracket(fem):
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.4,), ["bottom"]), n_repeats=2, random_state=0, uncertainty="noise"
-    )
-    study.run(WEATHER)
-    mdd, lowest, highest = study.minimum_detectable_damage(method="curve").iloc[0]
-    assert np.isnan(mdd)
-    assert (lowest, highest) == (0.0, 0.4)
 
 
 @pytest.fixture(scope="module")
@@ -418,9 +339,7 @@ def in_service():
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled", "ignore:.*not evaluated")
 def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
     scenarios = [{}, {"bottom": 0.2}]
-    study = DetectabilityStudy(
-        in_service, compensated(), scenarios, n_repeats=3, gaps="fitted", random_state=0, uncertainty="noise"
-    )
+    study = study_of(in_service, compensated(), scenarios, n_repeats=3, gaps="fitted")
     results = study.run(WEATHER)
     healthy, damaged = (np.isnan(one) for one in study.decisions_.values())
     np.testing.assert_array_equal(healthy, damaged)

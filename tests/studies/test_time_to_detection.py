@@ -10,14 +10,12 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
-from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario
+from skthermo.studies import ProgressiveDamage, Scenario
 from skthermo.studies.detectability._simulation import EvaluatedRecords
 from skthermo.studies.detectability._waits import Waits
+from tests.studies.studies import WEATHER, study_of
 from tests.surrogate.chains import F, T, chain, mapper
-
-WEATHER = make_truss_campaign(random_state=1).temperatures
 
 
 def judged(decisions, index=None, scenario=None):
@@ -46,7 +44,7 @@ def study(fem):
         "three of three": WindowedAlarm(3, rule="m-of-n", m=3),
     }
     scenarios = [{}, {"bottom": 0.06}, {"bottom": 0.6}, ProgressiveDamage("crack", {"bottom": 0.1}, onset=100)]
-    study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=8, random_state=0, uncertainty="noise")
+    study = study_of(fem, detectors, scenarios, n_repeats=8)
     study.run(WEATHER)
     return study
 
@@ -165,9 +163,7 @@ def test_windows_after_an_onset_are_those_of_records_that_change_there(study, fe
 
 def test_rows_without_stamps_are_counted():
     arrays = chain(mapper=mapper(1), random_state=0).fit(T.to_numpy(), F.to_numpy())
-    study = DetectabilityStudy(
-        arrays, MahalanobisDetector(), [{"bottom": 0.3}], n_repeats=2, random_state=0, uncertainty="noise"
-    )
+    study = study_of(arrays, MahalanobisDetector(), [{"bottom": 0.3}])
     study.run(WEATHER.to_numpy()[:100])
     row = study.time_to_detection().iloc[0]
     assert row["7"] == 1
@@ -199,12 +195,12 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
     often, never = ({"d": MahalanobisDetector(0.2)}, {"d": WindowedAlarm(60, contamination=0.001)})
     words = []
     for detectors in (often, never):
-        study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=3, uncertainty="noise", random_state=0)
+        study = study_of(fem, detectors, scenarios, n_repeats=3)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of thresholds learned from too few windows
             study.run(WEATHER)
         words.append(study.time_to_detection().set_index("scenario").loc["bottom 0.1 %", "text"])
-    assert words[0].endswith("so that such an alarm tells little")
+    assert words[0].endswith("so that such an alarm says little")
     assert words[1] == "is not found in 95 of 100 cases within the 365 days of the records"
 
 

@@ -7,9 +7,7 @@ import pytest
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.multioutput import MultiOutputRegressor
 
-from skthermo.datasets import make_truss_campaign
 from skthermo.fem import CallableModel
-from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.surrogate.chains import TRUSS, F, T
 
@@ -62,17 +60,6 @@ def test_a_chain_that_misses_its_own_records_by_more_than_their_mean_says_so():
         pytest.warns(UserWarning, match=r"on average, but their mean only by 2.6 %"),
     ):
         fem.fit(T, F * [1.08, 0.94, 1.07, 0.95, 1.06, 0.94])
-
-
-def test_healthy_campaigns_with_the_right_noise_give_no_warning():
-    for seed in range(3):
-        year = make_truss_campaign(random_state=seed)
-        frequencies = BiasAligner(TRUSS).fit_transform(year.frequencies)
-        inverse = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, random_state=0)
-        with warnings.catch_warnings(record=True) as given:
-            warnings.simplefilter("always")
-            inverse.fit(frequencies).transform(frequencies)
-        assert not given
 
 
 @pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows give")

@@ -11,7 +11,6 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss
 from skthermo.fem import add_noise, sample
-from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from skthermo.surrogate.inverse._training import held_out
 from tests.surrogate.chains import TRUSS, F, T
@@ -65,14 +64,6 @@ def test_scores_read_shapes_and_reduced_models():
     assert with_shapes.score() > inverse(regressor=LinearRegression(), noise=0.002).fit().score()
     small = inverse(regressor=LinearRegression(), reduce=True).fit()
     assert small.score() == pytest.approx(inverse(regressor=LinearRegression()).fit().score(), abs=1e-3)
-
-
-def test_a_pipeline_is_scored_by_its_inverse():
-    aligned = make_pipeline(BiasAligner(TRUSS), inverse())
-    grid = {f"inversesurrogate__{name}": values for name, values in REGRESSORS.items()}
-    search = GridSearchCV(aligned, grid, cv=ONE_FOLD, refit=False).fit(F)
-    alone = GridSearchCV(inverse(), REGRESSORS, cv=ONE_FOLD, refit=False).fit(F)
-    np.testing.assert_array_equal(search.cv_results_["mean_test_score"], alone.cv_results_["mean_test_score"])
 
 
 def test_an_inverse_of_given_parameters_needs_targets():

@@ -71,8 +71,3 @@ def test_compensators_and_displays_take_it():
 def test_a_vector_of_several_modes_is_refused():
     with pytest.raises(ValueError, match="frequencies have 1 columns; expected the 6 modes"):
         DataInformedFEM(TRUSS).fit(T, F["f1"])
-
-
-def test_shapes_and_weights_are_given_by_name():
-    with pytest.raises(TypeError, match="positional"):
-        CHAIN.fit(T, F[["f1"]], None)

@@ -146,20 +146,6 @@ def test_modes_that_change_order_warn_with_their_share_unless_tracked(recwarn):
     assert not recwarn.list
 
 
-@pytest.mark.parametrize(
-    ("arguments", "X", "y", "message"),
-    [
-        ({"model": TRUSS}, np.ones((5, 4)), None, "X has 4 columns; expected the 6 modes"),
-        ({"model": TRUSS}, HELD_OUT.frequencies, HELD_OUT.theta[:, :3], r"theta has shape \(200, 3\)"),
-        ({"model": TRUSS}, HELD_OUT.frequencies, -HELD_OUT.theta, "row 0, parameter 'bottom'"),
-        ({"model": object()}, None, None, "model"),
-    ],
-)
-def test_inverse_names_what_is_wrong(arguments, X, y, message):
-    with pytest.raises(ValueError, match=message):
-        InverseSurrogate(**({"regressor": LinearRegression(), "random_state": 0} | arguments)).fit(X, y)
-
-
 def test_inverse_without_a_model_has_no_way_back():
     inverse = InverseSurrogate(regressor=LinearRegression()).fit(HELD_OUT.frequencies, HELD_OUT.theta)
     with pytest.raises(ValueError, match="InverseSurrogate has no model"):
@@ -185,22 +171,6 @@ def test_mapper_leaves_incomplete_rows_out_of_fit_and_keeps_them_in_predict():
     np.testing.assert_allclose(fitted.predict(T), reference.predict(T), rtol=1e-12)
     assert fitted.predict(holed_T).isna().all(axis=1).sum() == 1
     assert fitted.score(holed_T, THETA) == pytest.approx(reference.score(T.drop(3), THETA.drop(3)))
-
-
-@pytest.mark.parametrize(
-    ("X", "y", "message"),
-    [
-        (T.assign(T2=12.0), THETA, "temperature column 'T2' is constant .12 in all 60 rows"),
-        (T.assign(T2=np.nan), THETA, "temperature column 'T2' is NaN in all 60 rows"),
-        (T, THETA.set_axis(THETA.index + 1), r"different indices \(row 0: 0 and 1\)"),
-        (T[:1], THETA[:1], "1 complete rows of 1 samples"),
-        (T, None, "requires y to be passed"),
-        (T.mask(T["T1"] > -10), THETA, "constant|1 complete rows of 60"),
-    ],
-)
-def test_mapper_names_what_is_wrong(X, y, message):
-    with pytest.raises(ValueError, match=message):
-        TemperatureMapper(LinearRegression()).fit(X, y)
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")

@@ -177,15 +177,3 @@ def test_each_warning_counts_the_models():
 def test_errors_say_what_is_expected():
     with pytest.raises(ValueError, match="fit was called without frequency_std"):
         ModelUpdater(TRUSS).fit(MEASURED).sample_models(2)
-    updater = calibrated()
-    with pytest.raises(ValueError, match="n is 0; expected a positive number"):
-        updater.sample_models(0)
-    with pytest.raises(ValueError, match="spread is 15; expected a relative standard deviation"):
-        updater.sample_models(2, spread=15)
-    with pytest.raises(ValueError, match="unknown damage groups"):
-        updater.sample_models(2, groups=["deck"])
-    for groups in (3, True, {"deck": 1}.keys):
-        with pytest.raises(ValueError, match=r"groups is .*; expected a list of names"):
-            updater.sample_models(2, groups=groups)
-    with pytest.raises(ValueError, match="random_state is 'seed'; expected None, an integer"):
-        updater.sample_models(2, random_state="seed")

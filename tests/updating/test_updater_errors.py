@@ -18,10 +18,6 @@ EMPTY = SHAPES * [1, 1, 0, 1, 1, 1]
     ("F", "options", "message"),
     [
         (np.hstack([F, F]), {"shapes": SHAPES, "dofs": range(5)}, "F has 12 columns; expected the 6 modes"),
-        (F * [[1, -1, 1, 1, 1, 1]], {}, r"frequency 'f2' of record 0 is -27\.5.*expected Hz above 0, or NaN"),
-        (F, {"shapes": SHAPES, "dofs": [0, 1, 2, 3, -1]}, "dofs holds -1; expected 0 to 22"),
-        (F, {"shapes": SHAPES, "dofs": [0, 1, 2, 3, 3]}, "dofs holds 3 more than once"),
-        (F, {"shapes": SHAPES, "dofs": np.arange(5.0)}, "expected integers"),
         (F, {"shapes": HOLED, "dofs": range(5)}, "shape of 'f3' is NaN in row 1 but not in all"),
         (F, {"shapes": EMPTY, "dofs": range(5)}, "shape of 'f3' is zero throughout"),
     ],
@@ -31,22 +27,6 @@ def test_measurements_that_cannot_be(F, options, message):
         ModelUpdater(TRUSS).fit(F, **options)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"bounds": [[0.5, 1.5]]}, r"bounds has shape \(1, 2\); expected a half-width or \(4, 2\)"),
-        (
-            {"bounds": [[0.5, 1.5]] * 3 + [[1.2, 0.8]]},
-            "bounds of parameter 'vertical' are .* expected 0 < lowest < highest",
-        ),
-        ({"shape_weight": -1.0}, "shape_weight"),
-    ],
-)
-def test_settings_that_cannot_be(parameters, message):
-    with pytest.raises(ValueError, match=message):
-        ModelUpdater(TRUSS, **parameters).fit(F)
-
-
 def test_shapes_need_a_model_with_local_modes():
     model = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
     with pytest.raises(
@@ -54,15 +34,6 @@ def test_shapes_need_a_model_with_local_modes():
         match=r"has no 'local_modes' and no 'n_dof' and no 'track'; .* such as AffineModel",
     ):
         ModelUpdater(model).fit(F, shapes=SHAPES, dofs=range(5))
-
-
-def test_a_shape_counts_one_residual_less_than_degrees_of_freedom():
-    only_first = np.where(np.arange(6) == 0, F, np.nan)
-    shape = np.where(np.arange(6) == 0, SHAPES[:3], np.nan)
-    with pytest.warns(UserWarning, match="4 parameters are to be found from 3 residuals"):
-        ModelUpdater(TRUSS, shape_weight=1.0).fit(only_first, shapes=shape, dofs=range(3))
-    with pytest.warns(UserWarning, match="4 parameters are to be found from 1 residuals"):
-        ModelUpdater(TRUSS).fit(only_first, shapes=shape, dofs=range(3))
 
 
 def test_a_prior_goes_by_name():

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,12 +16,10 @@ from skthermo.plotting.structures._projection import Projection
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import Collection
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
 TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
 ELEVATION, AZIMUTH = 22, -60
-Cell = tuple[float, float, float, float]
 
 
 def check_structure(structure: object, groups: Iterable[str] | None) -> None:
@@ -33,24 +31,28 @@ def check_structure(structure: object, groups: Iterable[str] | None) -> None:
             raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
 
 
-def structure_axes(ax: Axes | None, view: Projection, width: float) -> Axes:
-    """Axes of a plane or of space: those that are given, or those of a new figure."""
-    if ax is None:
-        ratio = height_of(np.array(list(view.nodes.values())))
-        width /= max(ratio, 1.0)  # tall structures are as high as others are wide
-        height = width * ratio + 0.8
-        if view.is_space:
-            return space_axes(pyplot().figure(figsize=(width, height)))
-        return panels(None, ["one display"], (width, height))[0]
-    (ax,) = panels(ax, ["one display"], (width, width))
-    check_axes(ax, view)
-    return ax
-
-
-def check_axes(ax: Axes, view: Projection) -> None:
-    """Raise an error for flat axes where a structure needs space."""
-    if view.is_space and not hasattr(ax, "get_zlim"):
-        raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+def structure_axes(
+    ax: Axes | np.ndarray | None, view: Projection, names: Sequence[object], points: Array, width: float, n_columns: int
+) -> np.ndarray:
+    """Axes of a plane or of space for each name: those that are given, or those of a new figure."""
+    ratio = height_of(points)
+    width /= max(ratio, 1.0)  # tall structures are as high as others are wide
+    height = width * ratio + 0.6
+    if ax is not None or not view.is_space:
+        axes = panels(ax, names, (width, height), n_columns)
+        if view.is_space and not all(hasattr(one, "get_zlim") for one in axes):
+            raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+        return axes
+    n_columns = min(n_columns, len(names))
+    n_rows = -(-len(names) // n_columns)
+    figure = pyplot().figure(figsize=(width * n_columns, height * n_rows))
+    title = 0.4 / height
+    room = {"left": 0.02, "right": 0.98, "bottom": 0.02, "top": 1 - title / n_rows, "wspace": 0.04, "hspace": title}
+    flat = {"projection": "3d", "proj_type": "ortho", "computed_zorder": False}  # without perspective
+    axes = figure.subplots(n_rows, n_columns, squeeze=False, subplot_kw=flat, gridspec_kw=room).ravel()
+    for unused in axes[len(names) :]:
+        unused.remove()
+    return axes[: len(names)]
 
 
 def height_of(points: Array) -> float:
@@ -64,13 +66,8 @@ def height_of(points: Array) -> float:
     return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
 
 
-def space_axes(figure: Figure) -> Axes:
-    """Three-dimensional axes without perspective."""
-    return figure.add_subplot(projection="3d", proj_type="ortho", computed_zorder=False)
-
-
-def set_view(ax: Axes, points: Array, cell: Cell | None) -> None:
-    """Equal scales around the points; in space, new axes are enlarged until the points fill a cell of the figure."""
+def set_view(ax: Axes, points: Array, is_own: bool) -> None:
+    """Equal scales around the points; in space, new axes are enlarged until the points fill their place."""
     ax.set_axis_off()
     if points.shape[1] == 2:
         ax.set_aspect("equal")
@@ -85,13 +82,14 @@ def set_view(ax: Axes, points: Array, cell: Cell | None) -> None:
     ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
     ax.set_box_aspect(extent)
     ax.patch.set_visible(False)
-    if cell is not None:
+    if is_own:
         ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-        fill_cell(ax, points, cell)
+        fill_place(ax, points)
 
 
-def fill_cell(ax: Axes, points: Array, cell: Cell) -> None:
-    """Place square axes so that the projected points fill a cell (left, bottom, width, height) of the figure."""
+def fill_place(ax: Axes, points: Array) -> None:
+    """Enlarge axes so that the projected points fill the place in the figure that these axes had."""
+    left, bottom, width, height = ax.get_position(original=True).bounds
     size = ax.figure.get_size_inches()
     ax.set_position((0, 0, *(1 / size)))  # one inch, from the lower left corner
     ax.apply_aspect()
@@ -99,7 +97,7 @@ def fill_cell(ax: Axes, points: Array, cell: Cell) -> None:
     x, y, _ = project(*points.T, ax.get_proj())
     inches = ax.transData.transform(np.column_stack([x, y])) / ax.figure.dpi
     low, high = inches.min(axis=0), inches.max(axis=0)
-    place, room = np.array(cell[:2]) * size, np.array(cell[2:]) * size
+    place, room = np.array([left, bottom]) * size, np.array([width, height]) * size
     scale = (room / np.maximum(high - low, 1e-9)).min()
     origin = place + room / 2 - scale * (low + high) / 2
     ax.set_position((*(origin / size), *(scale / size)))
@@ -123,29 +121,22 @@ def corners(structure: Structure, names: Iterable[Hashable], places: Mapping[Has
     return [np.array([places[node] for node in elements[name].nodes]) for name in names]
 
 
-def add_lines(ax: Axes, lines: list[Array], **style: Any) -> Collection:
-    """Add a collection of lines in two or three dimensions."""
-    return add_collection(ax, "LineCollection", lines, capstyle="round", **style)
-
-
-def add_surfaces(ax: Axes, surfaces: list[Array], **style: Any) -> Collection:
-    """Add a collection of polygons in two or three dimensions."""
-    return add_collection(ax, "PolyCollection", surfaces, edgecolors="none", **style)
-
-
-def add_points(ax: Axes, points: list[Array], **style: Any) -> Collection:
+def add_points(ax: Axes, points: list[Array], **style: object) -> Collection:
     """Add a diamond for every spring to the ground and every point mass, in two or three dimensions."""
     return ax.scatter(*np.vstack(points).T, s=36, marker="D", edgecolors=BLACK, linewidths=0.5, clip_on=False, **style)
 
 
-def add_collection(ax: Axes, kind: str, places: list[Array], **style: Any) -> Collection:
-    """Add a collection of the kind that the axes' dimension needs."""
+def add_members(ax: Axes, kind: Literal["lines", "surfaces"], places: list[Array], **style: object) -> Collection:
+    """Add lines or polygons in two or three dimensions."""
+    name, fixed = (
+        ("LineCollection", {"capstyle": "round"}) if kind == "lines" else ("PolyCollection", {"edgecolors": "none"})
+    )
     is_space = hasattr(ax, "get_zlim")
     if is_space:
-        factory = getattr(drawing("mpl_toolkits.mplot3d.art3d"), kind.replace("Coll", "3DColl"))
+        factory = getattr(drawing("mpl_toolkits.mplot3d.art3d"), name.replace("Coll", "3DColl"))
     else:
-        factory = getattr(drawing("matplotlib.collections"), kind)
-    collection = factory(places, **style)
+        factory = getattr(drawing("matplotlib.collections"), name)
+    collection = factory(places, **fixed, **style)
     (ax.add_collection3d if is_space else ax.add_collection)(collection)
     return collection
 

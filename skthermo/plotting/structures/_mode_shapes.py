@@ -7,33 +7,24 @@ from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import check_theta
 from skthermo._tables.arrays import Array
 from skthermo.fem import ModalModel, Structure
-from skthermo.plotting._axes import panels
 from skthermo.plotting._display import Display
-from skthermo.plotting._style import LIGHT, ORANGE, pyplot
+from skthermo.plotting._style import LIGHT, ORANGE
 from skthermo.plotting.structures._members import (
-    Cell,
-    add_lines,
-    add_surfaces,
-    check_axes,
+    add_members,
     check_structure,
     corners,
     draw_supports,
-    height_of,
     set_view,
     sort_members,
-    space_axes,
+    structure_axes,
 )
 from skthermo.plotting.structures._projection import Projection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-GAP = 0.015  # space between the panels of a figure, as a share of it
 
 
 @dataclass(eq=False, repr=False)
@@ -91,7 +82,6 @@ class ModeShapesDisplay(Display):
         structure: Structure,
         model: ModalModel | None = None,
         modes: Sequence[int] | None = None,
-        theta: ArrayLike | None = None,
         *,
         groups: Sequence[str] | None = None,
         **options: object,
@@ -103,11 +93,10 @@ class ModeShapesDisplay(Display):
         structure : Structure
             Nodes, members and supports.
         model : FE model, optional
-            Assembled from the structure, with the method ``modes``; by default with its groups as parameters.
+            Assembled from the structure, with the method ``modes``, and drawn with all parameters 1; by default with
+            the structure's groups as parameters.
         modes : sequence of int, optional
             Columns of the model, from 0; by default all, or the first six of the structure.
-        theta : array-like of shape (n_parameters,), optional
-            Multipliers of the model's parameters; by default all 1.
         groups : sequence of str, optional
             Groups whose members are drawn; by default all members.
         **options : dict
@@ -131,9 +120,7 @@ class ModeShapesDisplay(Display):
             model = structure.assemble(sorted(structure.groups), n_modes=n_modes)
         if not hasattr(model, "modes"):
             raise ValueError(f"{model!r:.200} has no method 'modes'; expected a model assembled from the structure")
-        names = model.parameter_names
-        row = np.ones((1, len(names))) if theta is None else np.atleast_2d(check_theta(theta, names, one_row=True))
-        frequencies, shapes = model.modes(row)
+        frequencies, shapes = model.modes(np.ones((1, len(model.parameter_names))))
         if shapes.shape[1] != len(structure.dofs):
             raise ValueError(
                 f"the model's shapes have {shapes.shape[1]} degrees of freedom; expected the structure's "
@@ -163,7 +150,7 @@ class ModeShapesDisplay(Display):
         amplitude : float, default=0.06
             Largest displacement drawn, as a share of the structure's extent.
         linewidth : float, default=1.5
-            Width of their lines in points.
+            Width of the lines of deformed members in points.
         n_columns : int, default=2
             Panels beside each other in a new figure.
 
@@ -176,55 +163,40 @@ class ModeShapesDisplay(Display):
         moved = [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
         rest = view.nodes
         points = np.array([place for places in (rest, *moved) for place in places.values()])
-        if ax is None:
-            cells = self._new_panels(view, n_columns, height_of(points))
-        else:
-            self.axes_, cells = panels(ax, [f"mode {mode + 1}" for mode in self.modes], (4, 3)), [None] * len(moved)
+        names = [f"mode {mode + 1}" for mode in self.modes]
+        self.axes_ = structure_axes(ax, view, names, points, width=5.0, n_columns=n_columns)
         groups = [list(self.structure.members)]
         if self.groups is not None:
             groups = [list(self.structure.groups[group]) for group in self.groups]
         parts = [sort_members(self.structure, names)[1:] for names in groups]
         self.lines_ = []
-        for ax_, cell, mode, places, frequency in zip(
-            self.axes_, cells, self.modes, moved, self.frequencies, strict=True
-        ):
-            check_axes(ax_, view)
+        panels = zip(self.axes_, self.modes, moved, self.frequencies, strict=True)
+        for one, mode, places, frequency in panels:
             drawn = []
             for lines, surfaces in parts:
                 if surfaces:
-                    add_surfaces(ax_, corners(self.structure, surfaces, rest), facecolors=LIGHT, alpha=0.3)
-                    add_surfaces(ax_, corners(self.structure, surfaces, places), facecolors=ORANGE, alpha=0.3)
+                    add_members(one, "surfaces", corners(self.structure, surfaces, rest), facecolors=LIGHT, alpha=0.3)
+                    add_members(
+                        one, "surfaces", corners(self.structure, surfaces, places), facecolors=ORANGE, alpha=0.3
+                    )
                 if lines:
-                    add_lines(ax_, corners(self.structure, lines, rest), colors=LIGHT, linewidths=0.8, zorder=1)
+                    add_members(
+                        one, "lines", corners(self.structure, lines, rest), colors=LIGHT, linewidths=0.8, zorder=1
+                    )
                     style = {"colors": ORANGE, "linewidths": linewidth, "zorder": 2}
-                    drawn.append(add_lines(ax_, corners(self.structure, lines, places), **style))
+                    drawn.append(add_members(one, "lines", corners(self.structure, lines, places), **style))
             self.lines_.append(drawn)
-            draw_supports(ax_, view, size=7)
-            set_view(ax_, points, cell)
+            draw_supports(one, view, size=7)
+            top = one.get_position(original=True).y1
+            set_view(one, points, is_own=ax is None)
             title = f"$f_{{{mode + 1}}}$ = {frequency:.{3 if frequency < 10 else 2}f} Hz"
-            ax_.set_title(title, fontsize="medium", y=None if cell is None else 1.0)
-            if cell is not None:
-                ax_.title.set_y(title_height(ax_, cell))  # axes in space would scale it, were it given above
+            if ax is None and view.is_space:  # the axes may be larger than their place in the figure
+                place = one.get_position(original=True)
+                one.set_title(title, fontsize="medium", y=1.0)
+                one.title.set_y((top - place.y0) / place.height)  # axes in space would scale it, were it given above
+            else:
+                one.set_title(title, fontsize="medium")
         return self
-
-    def _new_panels(self, view: Projection, n_columns: int, ratio: float) -> list[Cell | None]:
-        """Axes of a new figure, and in space the cell of the figure that each of them should fill."""
-        n_columns = min(n_columns, len(self.modes))
-        n_rows = -(-len(self.modes) // n_columns)
-        tall = max(ratio, 1.0)  # panels of tall structures are as high as those of others are wide
-        if not view.is_space:
-            names = [f"mode {mode + 1}" for mode in self.modes]
-            self.axes_ = panels(None, names, (5.0 / tall, 5.0 * ratio / tall + 0.5), n_columns)
-            return [None] * len(self.modes)
-        inches = 5.5 * ratio / tall + 0.5
-        figure = pyplot().figure(figsize=(5.5 / tall * n_columns, inches * n_rows))
-        self.axes_ = np.array([space_axes(figure) for _ in self.modes], dtype=object)
-        width, height = 1 / n_columns, 1 / n_rows
-        places = (divmod(number, n_columns) for number in range(len(self.modes)))
-        return [
-            (column * width + GAP, 1 - (row + 1) * height + GAP, width - 2 * GAP, (1 - 0.4 / inches) * height - GAP)
-            for row, column in places
-        ]
 
 
 def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashable, Array]:
@@ -238,9 +210,3 @@ def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashab
     places = np.array(list(nodes.values()))
     scale = amplitude * np.linalg.norm(np.ptp(places, axis=0)) / (largest or 1.0)
     return {node: nodes[node] + scale * move for node, move in moves.items()}
-
-
-def title_height(ax: Axes, cell: Cell) -> float:
-    """Height of a title above the cell of a figure in shares of its axes, which may be larger than the cell."""
-    place = ax.get_position(original=True)
-    return (cell[1] + cell[3] - place.y0) / place.height

@@ -16,9 +16,8 @@ from skthermo.plotting._axes import legend_columns
 from skthermo.plotting._display import Display
 from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
-    add_lines,
+    add_members,
     add_points,
-    add_surfaces,
     check_structure,
     corners,
     draw_supports,
@@ -156,7 +155,8 @@ class StructureDisplay(Display):
         """
         is_own_figure = ax is None
         view = Projection.of(self.structure, ax)
-        self.axes_ = np.array([structure_axes(ax, view, width=9.0)], dtype=object)
+        nodes = np.array(list(view.nodes.values()))
+        self.axes_ = structure_axes(ax, view, ["one display"], nodes, width=9.0, n_columns=1)
         self.members_: dict[str, Collection] = {}
         if self.values is not None:
             width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
@@ -164,10 +164,10 @@ class StructureDisplay(Display):
         else:
             self._draw_groups(view, linewidth)
         supports = draw_supports(self.ax_, view)
-        nodes = np.array(list(view.nodes.values()))
-        below = 0.9 / self.figure_.get_figheight()
-        cell = (0.03, below, 0.84 if self.members_ and self.values is not None else 0.94, 0.97 - below)
-        set_view(self.ax_, nodes, cell if is_own_figure else None)
+        if is_own_figure and view.is_space:
+            room = {"left": 0.03, "right": 0.97 if self.values is None else 0.87, "top": 0.97}
+            self.ax_.get_gridspec().update(bottom=0.9 / self.figure_.get_figheight(), **room)
+        set_view(self.ax_, nodes, is_own_figure)
         self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure and view.is_space)
         self._draw_legend(view, supports, is_own_figure)
         return self
@@ -185,12 +185,13 @@ class StructureDisplay(Display):
             self.structure, sorted(of_member, key=lambda m: np.nan_to_num(of_member[m], nan=-np.inf))
         )
         surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
-        for kind, names, add in (("surfaces", surfaces, add_surfaces), ("lines", lines, add_lines)):
+        for kind, names in (("surfaces", surfaces), ("lines", lines)):
             if names:
                 shown = np.ma.masked_invalid([of_member[name] for name in names])
                 widths = np.where(np.ma.getmaskarray(shown), THIN, width)
                 style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
-                self.members_[kind] = add(self.ax_, corners(self.structure, names, nodes), cmap=colours, **style)
+                places = corners(self.structure, names, nodes)
+                self.members_[kind] = add_members(self.ax_, kind, places, cmap=colours, **style)
                 self.members_[kind].set_array(shown)
                 self.members_[kind].set_clim(low, high)
         points = [name for name in points if np.isfinite(of_member[name])]
@@ -222,10 +223,12 @@ class StructureDisplay(Display):
                 self.members_[name] = add_points(self.ax_, corners(self.structure, points, nodes), **style)
             if surfaces:
                 style = {"facecolors": colour, "alpha": 0.35, "label": name}
-                self.members_[name] = add_surfaces(self.ax_, corners(self.structure, surfaces, nodes), **style)
+                self.members_[name] = add_members(
+                    self.ax_, "surfaces", corners(self.structure, surfaces, nodes), **style
+                )
             if lines:
                 style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
-                self.members_[name] = add_lines(self.ax_, corners(self.structure, lines, nodes), **style)
+                self.members_[name] = add_members(self.ax_, "lines", corners(self.structure, lines, nodes), **style)
 
     def _draw_legend(self, view: Projection, supports: Mapping[str, Artist], is_own_figure: bool) -> None:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 
 from skthermo._tables.arrays import Array, as_columns, as_floats
-from skthermo._tables.frames import check_same_rows, column_names, frame_like
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts
 from skthermo.studies.detectability._pod_curve import pod_curve
+from skthermo.surrogate import FittedChain
 
 
 @dataclass(frozen=True)
@@ -25,11 +26,11 @@ class SeenColumns:
     positions: Any
     is_frame: bool
 
-    def table(self, T: Any, F: Array) -> Any:
+    def table(self, T: Table, F: Array) -> Any:
         """Temperatures and frequencies of all modes as the detector sees them."""
         return self._seen(np.hstack([as_floats(T), F]), T)
 
-    def reference(self, records: Any, T: Any, name: str) -> Any:
+    def reference(self, records: Table, T: Table, name: str) -> Any:
         """Measured records of a scenario as the detector sees them, with temperatures T where they lack their own."""
         known = self._positions_of(records, f"the reference of scenario {name!r}")
         values = np.full((len(records), len(self.names)), np.nan)
@@ -45,14 +46,14 @@ class SeenColumns:
             values[:, : self.n_sensors] = as_floats(T)
         return self._seen(values, records if isinstance(records, pd.DataFrame) or len(values) != len(T) else T)
 
-    def _seen(self, values: Array, rows: Any) -> Any:
+    def _seen(self, values: Array, rows: Table) -> Any:
         """The detector's columns of all of the chain's, on the index of some rows."""
         if not self.is_frame:
             return values[:, self.positions]
         index = rows.index if isinstance(rows, pd.DataFrame) else None
         return pd.DataFrame(values[:, self.positions], index=index, columns=[self.names[i] for i in self.positions])
 
-    def _positions_of(self, records: Any, what: str) -> Any:
+    def _positions_of(self, records: Table, what: str) -> Any:
         """Which of the chain's columns a table holds."""
         n_columns, n_all = np.shape(records)[1] if np.ndim(records) == 2 else 0, len(self.names)
         sensors, modes = list(self.names[: self.n_sensors]), list(self.names[self.n_sensors :])
@@ -72,7 +73,7 @@ class SeenColumns:
         return np.arange(n_all - n_columns, n_all)
 
 
-def read_baseline(fem: Any, detector: Any, baseline: Any) -> tuple[SeenColumns, Any]:
+def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Any]:
     """The detector's view, and the records that it learns from: by default those that the chain has learned from.
 
     Only a detector with a part that has ``targets`` sees temperatures.
@@ -92,7 +93,7 @@ def read_baseline(fem: Any, detector: Any, baseline: Any) -> tuple[SeenColumns, 
     return view, baseline.iloc[:, seen] if view.is_frame else as_columns(baseline)[:, seen]
 
 
-def has_targets(detector: Any) -> bool:
+def has_targets(detector: BaseEstimator) -> bool:
     """Whether a part of a detector takes some of its columns for targets, as `TemperatureCompensator` does."""
     return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
 
@@ -102,7 +103,7 @@ class Arrangement:
     """An unfitted detector, the names of the columns that it sees, in order, as a frame or an array, and the number of
     healthy records that it learns from."""
 
-    detector: Any
+    detector: BaseEstimator
     columns: Sequence[Hashable]
     n_baseline: int
     is_frame: bool
@@ -153,12 +154,19 @@ class Candidate:
     """A detector that has learned the healthy structure, its name, and which columns it sees."""
 
     name: str
-    detector: Any
+    detector: BaseEstimator
     view: SeenColumns
     n_baseline: int
 
     @classmethod
-    def learned(cls, name: str, detector: Any, fem: Any, baseline: Any, random_state: Any) -> "Candidate":
+    def learned(
+        cls,
+        name: str,
+        detector: BaseEstimator,
+        fem: FittedChain,
+        baseline: Table | None,
+        random_state: np.random.RandomState | None,
+    ) -> "Candidate":
         """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own."""
         view, healthy = read_baseline(fem, detector, baseline)
         fitted = clone(detector)
@@ -187,11 +195,11 @@ class Candidate:
         columns = [self.view.names[i] for i in self.view.positions]
         return Arrangement(clone(self.detector), columns, self.n_baseline, self.view.is_frame)
 
-    def decisions(self, table: Any) -> Array:
+    def decisions(self, table: Table) -> Array:
         """Decision function, NaN where there is none; float32 is as much as alarms and intervals need."""
         return np.asarray(self.detector.decision_function(table), dtype=np.float32)
 
-    def damage_index(self, table: Any, rows: Any) -> pd.Series:
+    def damage_index(self, table: Table, rows: Table) -> pd.Series:
         """Minus the detector's ``score_samples``, on the index of the records."""
         index = rows.index if isinstance(rows, pd.DataFrame) else None
         return pd.Series(-np.asarray(self.detector.score_samples(table), dtype=float), index, name="damage_index")

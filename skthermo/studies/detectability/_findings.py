@@ -14,7 +14,8 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
-from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, check_probability, families_of
+from skthermo.studies.detectability._intervals import check_probability
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
 from skthermo.studies.detectability._simulation import SIMULATED, EvaluatedRecords, Evaluation, ask_each
@@ -222,9 +223,8 @@ class StudyFindings:
     ) -> pd.DataFrame:
         """How soon damage is found: the chance to find it within some times, and the time within which it is found.
 
-        Damage may begin at any time of the records, so that each season counts with its own weather: all onsets count
-        alike, and after the last record comes the first one again. The damage of a scenario with an onset of its own
-        begins there. It is found with the first alarm.
+        Damage may begin at any time of the records, all onsets counting alike, and after the last record comes the
+        first one again; that of a scenario with an onset begins there. It is found with the first alarm.
 
         Parameters
         ----------
@@ -250,9 +250,8 @@ class StudyFindings:
 
             - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
             - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D ci_low`` and
-              ``7D ci_high``, its bounds; ``7D healthy``, the probability that the healthy structure raises an alarm
-              within the same time, which would have come without damage, too (NaN without a healthy scenario). NaN
-              where the time is shorter than that between two records, or longer than all of them;
+              ``7D ci_high``, its bounds; ``7D healthy``, the same probability of the healthy structure (NaN without a
+              healthy scenario). NaN where the time is shorter than that between two records, or longer than all;
             - ``median``: time within which half of the cases are found;
             - ``reliable``: the same for the share ``level``, and ``reliable highest``: time from which the lower
               bound of the probability is as high. NaT (NaN) where that takes longer than the records;
@@ -270,39 +269,11 @@ class StudyFindings:
         Notes
         -----
         A probability is the share of onsets in all repeats. Those next to each other wait for the same alarm: bounds
-        allow for this dependence as those of rates do. They hold the noise alone, as all of the study's.
-
-        An alarm within the time may be a false one: compare the two probabilities. With a probability h of the
-        healthy structure, damage that changes nothing is "found" in the share h of the cases.
+        allow for this dependence as those of rates do. An alarm within the time may be a false one: compare with the
+        probability of the healthy structure.
 
         Windows that begin before the damage and end in it are evaluated as such, at the onsets of ``transitions_``, of
         which there are fewer.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.detection import MahalanobisDetector
-        >>> from skthermo.studies import DetectabilityStudy, sweep
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
-        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
-        >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options)
-        >>> results = study.run(weather)
-        >>> waits = study.time_to_detection(["1D", "7D"]).set_index("scenario")
-        >>> waits[["1D", "7D", "7D ci_low", "7D ci_high", "7D healthy"]].round(2)
-                       1D    7D  7D ci_low  7D ci_high  7D healthy
-        scenario
-        healthy      0.02  0.10       0.07        0.16         0.1
-        bottom 10 %  0.22  0.83       0.79        0.86         0.1
-        bottom 20 %  0.93  1.00       0.99        1.00         0.1
-        >>> waits[["median", "reliable"]]
-                     median reliable
-        scenario
-        healthy     50 days 274 days
-        bottom 10 %  3 days  13 days
-        bottom 20 %  1 days   2 days
         """
         check_probability(level, "level")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
@@ -346,8 +317,8 @@ class StudyFindings:
     ) -> pd.DataFrame:
         """Detectors in the order of what they find, with what is not significant.
 
-        First stand those that keep the limit of false alarms, in the order of their probability of detection (POD),
-        then the others, those with the fewest false alarms first.
+        First come those that keep the limit of false alarms, by their probability of detection (POD), then the others,
+        those with the fewest false alarms first.
 
         Parameters
         ----------
@@ -370,13 +341,10 @@ class StudyFindings:
             - ``within_limit``: False only where the lower bound is above the limit;
             - ``pod``, ``pod_ci_low``, ``pod_ci_high``: the same of the damaged scenarios;
             - ``pod_at_equal_pfa``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the
-              limit
-              (less where indices are tied); NaN for measured records, which have no calibration;
+              limit (less where indices are tied); NaN for measured records, which have no calibration;
             - ``pod_deficit``, ``pod_deficit_ci_low``, ``pod_deficit_ci_high``: POD of the first row less that of this
-              one, by the
-              measure of the order; the bounds hold for all rows together, and are NaN where there is one repeat;
-            - ``significantly_worse``: whether the lower bound is above 0. The choice among the others is not
-              significant;
+              one, by the measure of the order; the bounds hold for all rows together, and need two repeats;
+            - ``significantly_worse``: whether the lower bound is above 0;
             - ``auc``: area under the ROC curve, the mean over the damaged scenarios; 0.5 is chance;
             - ``time_to_detection``: mean over the damaged scenarios; NaN where one of them raises no alarm;
             - ``not_evaluated``: share of the records that the detector cannot evaluate, which count nowhere else;
@@ -392,15 +360,15 @@ class StudyFindings:
 
         Notes
         -----
-        The default order is by detectors as they will be used. On the truss, simulation and truth agree on it better
-        than on the order at equal false alarms: simulated noise is resampled from the records that the detectors have
-        learned, so that those that overfit them need too low a threshold in the simulation.
+        The default order is by detectors as they will be used: detectors that overfit the records from which simulated
+        noise is drawn need too low a threshold in the simulation, so that the order at equal false alarms agrees less
+        with the truth on the truss.
 
-        Differences are paired: all detectors evaluate the same records in every repeat (common random numbers). Their
-        bounds are t intervals of jackknife pseudo-values over the repeats, which hold the error of the moved threshold,
-        too, with Bonferroni's correction for all comparisons with the first row. They hold the noise alone: neither
-        another baseline nor an error of the model is in them. A threshold learned from n independent records at 2 %
-        has itself a true rate with a standard deviation of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
+        Differences are paired, as all detectors evaluate the same records in every repeat. Their bounds are t intervals
+        of jackknife pseudo-values over the repeats, with the error of the moved threshold and Bonferroni's correction
+        for all comparisons with the first row. They hold the noise alone: neither another baseline nor an error of the
+        model. A threshold learned from n independent records at 2 % has itself a true rate with a standard deviation
+        of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
 
         Examples
         --------
@@ -532,8 +500,7 @@ class StudyFindings:
         Returns
         -------
         str
-            A line on what the bands hold, one on the scenario with the widest band, and one on rates that are outside
-            their bands, as those of a model that the training records contradict are.
+            A line on what the bands hold, one on the scenario with the widest band, and one on rates outside theirs.
 
         Raises
         ------

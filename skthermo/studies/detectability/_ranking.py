@@ -182,7 +182,7 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
         lines = [f"No detector keeps the limit of {limit:.1%} false alarms. With the fewest, {lines[0]}"]
     behind = quiet.drop(index=best.name, errors="ignore")
     if len(behind) and behind["pod_deficit_ci_low"].isna().all():
-        lines.append("Records of one repeat do not tell which detectors are clearly worse.")
+        lines.append("Records of one repeat do not show which detectors are clearly worse.")
     else:
         is_clear = behind["significantly_worse"]
         for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):

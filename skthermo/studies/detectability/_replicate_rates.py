@@ -17,6 +17,7 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import Table
 from skthermo.exceptions import ModelWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod_curve
@@ -31,8 +32,9 @@ from skthermo.studies.detectability._simulation import (
 )
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario
+from skthermo.surrogate import FittedChain
 
-N_DRAWS = 3  # draws of the noise in each replicate, which tell its share from that of what else varies
+N_DRAWS = 3  # draws of the noise in each replicate, to separate its share from that of what else varies
 MOST_FAILURES = 0.5  # share of replicates that may fail
 SMALL = 0.1  # share of a variance that is not worth a word
 NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}
@@ -42,7 +44,7 @@ NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 class ReplicateRates:
     """Rates of alarms in replicates, (n_replicates, n_parts, n_draws), by detector and scenario, as parts are added
     one after the other, and ``own`` rates of the study's repeats; ``n_records`` are evaluated in each draw, and
-    ``with_noise`` tells whether bands hold the noise, too."""
+    ``with_noise`` says whether bands hold the noise, too."""
 
     rates: Mapping[Key, Array]
     own: Mapping[Key, Array]
@@ -221,7 +223,9 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
     }
 
 
-def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int) -> dict[Key, tuple[Array, float]]:
+def _rates(
+    simulation: Simulation, chain: FittedChain, T: Table, seeds: Array, first: int
+) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms, (n_draws,), and the mean number of evaluated records, by detector and scenario."""
     clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first)
     drawn = replace(simulation, fem=chain, T=T, clean=clean)
@@ -233,7 +237,7 @@ def _rates(simulation: Simulation, chain: Any, T: Any, seeds: Array, first: int)
     return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
 
 
-def _counted(evaluation: Evaluation, scenarios: Sequence[BaseScenario], T: Any) -> dict[Key, tuple[Array, float]]:
+def _counted(evaluation: Evaluation, scenarios: Sequence[BaseScenario], T: Table) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms among simulated records, (n_repeats,), and how many are evaluated, by detector and scenario."""
     rows, by_name = pd.Series(np.nan, getattr(T, "index", pd.RangeIndex(len(T)))), {one.name: one for one in scenarios}
     found = {}

@@ -17,12 +17,13 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.frames import Table, column_names, frame_like
 from skthermo._tables.times import row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._intervals import rate_of
 from skthermo.studies.scenarios import BaseScenario
+from skthermo.surrogate import FittedChain
 
 SIMULATED, REFERENCE = "simulated", "reference"
 
@@ -151,7 +152,7 @@ def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
     return float(lowest), float(highest)
 
 
-def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Any) -> Any:
+def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     """Mean time to the first alarm over the repeats that have one, in records or as a Timedelta."""
     detected = alarms[alarms.any(axis=1)].argmax(axis=1)
     if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
@@ -170,9 +171,9 @@ class Records:
 
     scenario: BaseScenario
     source: str
-    values: Any
-    T: Any
-    rows: Any
+    values: ArrayLike
+    T: Table
+    rows: Table
     healthy: Array | None = None
 
     @property
@@ -202,11 +203,11 @@ class Measurement:
     outliers: Any
 
     @classmethod
-    def asked(cls, fem: Any, noise: Any, gaps: Any, outliers: Any) -> Measurement:
+    def asked(cls, fem: FittedChain, noise: Any, gaps: Any, outliers: Any) -> Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
-    def of(self, fem: Any, T: Any, seed: int) -> tuple[Array, Any]:
+    def of(self, fem: FittedChain, T: Table, seed: int) -> tuple[Array, Any]:
         """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
         weather = fem.weather(T)
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
@@ -221,10 +222,10 @@ class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
     every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
 
-    fem: Any
+    fem: FittedChain
     candidates: Mapping[str, Candidate]
     scenarios: Sequence[BaseScenario]
-    T: Any
+    T: Table
     clean: Mapping[str, Sequence[Array]]
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
@@ -342,7 +343,7 @@ def transitions_of(decisions: Array, n_window: int) -> Array:
 
 
 def clean_frequencies(
-    fem: Any, scenarios: Sequence[BaseScenario], T: Any, n_repeats: int, first: int = 0
+    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
 ) -> dict[str, list[Array]]:
     """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
     clean = {}
@@ -356,7 +357,7 @@ def clean_frequencies(
     return clean
 
 
-def _of_draws(fem: Any, draws: Sequence[Mapping[str, float]], T: Any) -> list[Array]:
+def _of_draws(fem: FittedChain, draws: Sequence[Mapping[str, float]], T: Table) -> list[Array]:
     """Frequencies of the structure with one damage after the other, solved together by one model."""
     groups = list(draws[0])
     severities = np.array([[draw[group] for group in groups] for draw in draws])

@@ -19,9 +19,10 @@ from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
 from skthermo._tables.arrays import as_random_state, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
+from skthermo.fem import FEModel
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
@@ -32,6 +33,7 @@ from skthermo.studies.detectability._simulation import (
 )
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.surrogate import FittedChain
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 P, Answer = ParamSpec("P"), TypeVar("Answer")
@@ -90,16 +92,15 @@ class DetectabilityStudy(BaseEstimator):
         - "model": another FE model of ``models`` in the chain;
         - "all": all of these, without "model" if there are no ``models`` and none can be drawn.
 
-        Beside the repeats, this takes ``n_replicates`` replicates, in each of which all of it is drawn at once. On one
-        core, a year of days of the truss in 13 scenarios with one detector takes 2 s with the noise alone, which is
-        enough to compare detectors, 19 s with "baseline" and "weather", and 42 s with "all", where 20 chains are
-        refitted.
+        In each of ``n_replicates`` replicates, all of it is drawn at once. On one core, a year of days of the truss in
+        13 scenarios with one detector takes 2 s with the noise alone, which is enough to compare detectors, 19 s with
+        "baseline" and "weather", and 42 s with "all", where 20 chains are refitted.
     models : sequence of FE models, optional
         Which the structure may have, with parameters, damage groups and modes like the chain's. By default
         `~skthermo.updating.ModelUpdater.sample_models` draws ``n_replicates`` from the mean of the training records,
         as it was measured, to which a perfect model would come within 0.5 %; stiffnesses are known to 15 % before.
     n_replicates : int, default=20
-        How many replicates the bands stand on.
+        How many replicates the bands are computed from.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None
@@ -156,22 +157,20 @@ class DetectabilityStudy(BaseEstimator):
 
     Notes
     -----
-    All scenarios and sources have the same weather, and repeat r has the same noise, gaps and outliers in all scenarios
-    (common random numbers), and all detectors evaluate the same records, so that differences between scenarios or
-    detectors are more certain than each rate. A detector's rates do not depend on which others are in the study.
+    Repeat r has the same weather, noise, gaps and outliers in all scenarios (common random numbers), and all detectors
+    evaluate the same records, so that differences between scenarios or detectors are more certain than each rate. A
+    detector's rates do not depend on which others are in the study.
 
-    The bounds ``ci_low`` and ``ci_high`` are those of a rate over noise, for this weather, this baseline and this
-    model: another year, another baseline or an error of the model is not in them, but in the bands, as far as
-    ``uncertainty`` says so. Records are serially dependent: the effective number of records is their number over the
-    design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten correlation times in
-    different repeats, to that of independent records. With it, Clopper-Pearson bounds keep their confidence also for
-    rates of 0 and 1 [KG98]_. Measured records are one repeat only; their variance between blocks of time holds that of
-    the weather, too.
+    The bounds ``ci_low`` and ``ci_high`` are of a rate over noise, for this weather, baseline and model; others are in
+    the bands, as far as ``uncertainty`` says so. Records are serially dependent: their effective number is their number
+    over the design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten correlation
+    times in different repeats, to that of independent records. With it, Clopper-Pearson bounds keep their confidence
+    also for rates of 0 and 1 [KG98]_. Measured records are one repeat; their variance between blocks holds that of the
+    weather, too.
 
-    A replicate is a structure that could have given the training records. The detectors have learned measured records,
-    and stay: what a chain does not know of the structure moves records away from what they have learned. Bands are
-    those of Student's law on the scale of the logit, with the variances between and within replicates (three draws of
-    the noise in each), about the study's own rate, moved by the mean effect of other weather and models.
+    A replicate is a structure that could have given the training records; the detectors stay as they have learned.
+    Bands are those of Student's law on the scale of the logit, with the variances between and within replicates (three
+    draws of the noise in each), about the study's own rate, moved by the mean effect of other weather and models.
     ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
 
     References
@@ -205,7 +204,7 @@ class DetectabilityStudy(BaseEstimator):
 
     def __init__(
         self,
-        fem: Any,
+        fem: FittedChain,
         detectors: Any,
         scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,
@@ -214,7 +213,7 @@ class DetectabilityStudy(BaseEstimator):
         gaps: float | Literal["fitted"] | None = "fitted",
         outliers: ArrayLike | Literal["fitted"] | None = "fitted",
         uncertainty: Literal["all"] | Sequence[str] = "all",
-        models: Sequence[Any] | None = None,
+        models: Sequence[FEModel] | None = None,
         n_replicates: int = 20,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
@@ -401,7 +400,7 @@ class DetectabilityStudy(BaseEstimator):
         return type(self)(**self.get_params(deep=False) | {"detectors": twins})  # the chain is fitted, and shared
 
 
-def check_detector(detector: Any, what: str) -> None:
+def check_detector(detector: BaseEstimator, what: str) -> None:
     """Raise an error for what is not an outlier detector."""
     needed = ("get_params", "fit", "decision_function", "score_samples")
     lacking = [name for name in needed if not hasattr(detector, name)]

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
@@ -18,16 +18,16 @@ from skthermo._estimators.arguments import check_names, check_size
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once
 from skthermo._tables.arrays import Array, as_columns, as_floats, as_random_state, positive_integer
-from skthermo._tables.frames import column_names
+from skthermo._tables.frames import Table, column_names
 from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
-from skthermo.studies.detectability._intervals import Rate, rate_of
-from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.surrogate import FittedChain
 
 FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
 
@@ -103,11 +103,11 @@ class TaskScorer:
     sensors: Sequence[Hashable]
     max_false_alarms: float
 
-    def __call__(self, estimator: Any, X: pd.DataFrame, y: ArrayLike | None = None) -> float:
+    def __call__(self, estimator: BaseEstimator, X: pd.DataFrame, y: ArrayLike | None = None) -> float:
         """Share of the damaged records that are found within the limit of false alarms."""
         return self.decisions(estimator, X, y).score(self.max_false_alarms)
 
-    def decisions(self, estimator: Any, X: pd.DataFrame, y: ArrayLike | None = None) -> Decisions:
+    def decisions(self, estimator: BaseEstimator, X: pd.DataFrame, y: ArrayLike | None = None) -> Decisions:
         """Decisions on rows of the task; lags and windows of a state see no record of another."""
         check_detector(estimator, "the detector")
         self._check_columns(estimator, X)
@@ -125,7 +125,7 @@ class TaskScorer:
         repeat, scenario = np.divmod(state, self.n_scenarios)
         return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
-    def _rows(self, X: Any) -> NDArray[np.intp]:
+    def _rows(self, X: Table) -> NDArray[np.intp]:
         """Positions of the rows among the simulated ones."""
         if not isinstance(X, pd.DataFrame):
             raise ValueError(f"X is of type {type(X).__name__}; expected a frame: rows of the task's X, with its index")
@@ -138,7 +138,7 @@ class TaskScorer:
             )
         return rows
 
-    def _check_columns(self, estimator: Any, X: Any) -> None:
+    def _check_columns(self, estimator: BaseEstimator, X: Table) -> None:
         """Refuse a detector that would take temperatures for frequencies."""
         seen = [name for name in self.sensors if name in getattr(X, "columns", ())]
         if seen and not (has_targets(estimator) or isinstance(estimator, Pipeline)):
@@ -210,7 +210,7 @@ class DetectionTask(Bunch):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
 
-    def refit(self, detector: Any) -> Any:
+    def refit(self, detector: BaseEstimator) -> Any:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
         Parameters
@@ -320,7 +320,7 @@ class DetectionTask(Bunch):
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
         return table
 
-    def _rates(self, detector: Any, confidence: float) -> dict[str, Any]:
+    def _rates(self, detector: BaseEstimator, confidence: float) -> dict[str, Any]:
         """Score and false alarms of a fitted detector on all simulated records, with bounds."""
         limit = self.scoring.max_false_alarms
         found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
@@ -344,7 +344,7 @@ class DetectionTask(Bunch):
 
 
 def detection_task(
-    fem: Any,
+    fem: FittedChain,
     T: ArrayLike,
     scenarios: Sequence[BaseScenario | Mapping[str, float]],
     *,
@@ -419,24 +419,20 @@ def detection_task(
     Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
     among them. ``task.refit(search)`` fits it to the baseline.
 
-    The score is the probability of detection at a limit of false alarms. An alarm is a record beyond the detector's own
+    The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
+    from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
-    until no more do. The share of a scenario's records in alarm, from the onset of its damage on, is averaged over the
-    scenarios, which count alike. A damaged record that is not evaluated is not found. Where false alarms by the own
-    threshold exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound.
-
-    All scenarios have the same weather, and a repeat the same noise in all of them (common random numbers), so that
-    settings are compared more certainly than each is known.
+    until no more do. A damaged record that is not evaluated is not found. Where false alarms by the own threshold
+    exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound. All
+    scenarios have the same weather, and a repeat the same noise in all of them (common random numbers).
 
     Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
-    into another. Its first records, for which lags and windows lack records before, may not be evaluated: T should be
-    long beside both. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days,
-    where so many years do not fit), a month or more after the state before, so that lags and windows of time stay apart
-    in a single call, too. Windows of a number of records, and lags of rows without stamps, do so only in ``scoring``.
+    into another. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
+    so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
+    records, and lags of rows without stamps, do so only in ``scoring``.
 
-    The chain has made the effect of weather in the simulated records: as a compensator, the chain itself, or a
-    regression of the kind that its mapper is, looks better there than it is. Choose the kind of regression by measured
-    records.
+    A compensator of the kind that the chain is looks better in its simulations than it is: choose the kind of
+    regression by measured records.
 
     The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
     with noise that took no part.
@@ -479,14 +475,14 @@ def detection_task(
 
 
 def _task(
-    fem: Any,
-    T: Any,
+    fem: FittedChain,
+    T: Table,
     scenarios: Any,
     baseline: pd.DataFrame,
     measurement: Measurement,
     limit: float,
     n_splits: int,
-    seeds: Any,
+    seeds: Sequence[int],
 ) -> DetectionTask:
     """A task with the noise of some seeds."""
     names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
@@ -525,7 +521,7 @@ def _task(
     )
 
 
-def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
+def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
     """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
     T, F = fem.training_records_
     names, n_sensors = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_
@@ -538,7 +534,7 @@ def _baseline(fem: Any, baseline: Any) -> pd.DataFrame:
     return pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
 
 
-def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
+def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     """Rows of all states, one after the other: stamps of T moved into the future, or numbers after the baseline's."""
     if not has_stamps(baseline):
         return pd.RangeIndex(len(baseline), len(baseline) + n_states * _num_samples(T))
@@ -567,7 +563,7 @@ def _moved(T: Any, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     )
 
 
-def _labels(scenarios: Sequence[BaseScenario], T: Any) -> NDArray[np.intp]:
+def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
     """+1 where a scenario is healthy or its damage has not begun, else -1, (n_scenarios, n_records)."""
     times = row_times(T)
     labels = np.ones((len(scenarios), len(times)), dtype=int)
@@ -592,7 +588,7 @@ def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) ->
     return [name for name in baseline.columns if name in chosen]
 
 
-def _seeds(n_repeats: Any, random_state: Any) -> NDArray[np.intp]:
+def _seeds(n_repeats: Any, random_state: np.random.RandomState | None) -> NDArray[np.intp]:
     """Seeds of the noise of each repeat: of a task, and of its confirmation."""
     size = positive_integer(n_repeats, "n_repeats"), 2
     return as_random_state(random_state).randint(LARGEST_SEED, size=size)

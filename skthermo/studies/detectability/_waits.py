@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, is_real
+from skthermo._tables.frames import Table
 from skthermo._tables.text import counted, duration_text
 from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
@@ -17,7 +18,7 @@ from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
 FEW = 10  # number of cases found, or not found, below which their dependence is not estimated
-TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time tells little
+TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time says little
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class Clock:
     length: pd.Timedelta | None
 
     @classmethod
-    def of(cls, rows: Any) -> "Clock":
+    def of(cls, rows: Table) -> "Clock":
         """The median time between records, or their numbers where they have no stamps."""
         times = row_times(rows)
         if not has_stamps(rows):
@@ -42,7 +43,7 @@ class Clock:
         """Number of steps from the first record to the last."""
         return int(self.steps.max()) + 1
 
-    def count(self, within: Any) -> int:
+    def count(self, within: Sequence[str | int] | None) -> int:
         """Number of records that come within a time; 0 if that is shorter than a step."""
         if self.length is None:
             return int(within)
@@ -128,7 +129,7 @@ class Waits:
         return float(highest) if highest <= self.clock.n_steps else float("inf")
 
 
-def read_within(within: Any, is_stamped: bool) -> dict[str, Any]:
+def read_within(within: Sequence[str | int] | None, is_stamped: bool) -> dict[str, Any]:
     """Times by their names in a table: durations, or numbers of records where there are no stamps."""
     if within is None:
         within = ("1D", "7D", "30D") if is_stamped else (1, 7, 30)
@@ -154,7 +155,7 @@ def _time(one: Any, is_stamped: bool) -> Any:
 def waits_table(
     records: Mapping[tuple[str, str, str], EvaluatedRecords],
     transitions: Mapping[tuple[str, str, str], Array],
-    within: Any,
+    within: Sequence[str | int] | None,
     level: float,
     confidence: float,
 ) -> pd.DataFrame:
@@ -213,10 +214,10 @@ def waits_told(waits: Waits, false: Waits | None, level: float) -> str:
         return f"{text}; how often a healthy structure alarms by then is not known"
     by_chance = false.found(min(int(number), clock.n_steps), level)[0]
     text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
-    return f"{text}, so that such an alarm tells little" if by_chance > TELLS_LITTLE else text
+    return f"{text}, so that such an alarm says little" if by_chance > TELLS_LITTLE else text
 
 
-def soonest(table: pd.DataFrame, within: Any) -> pd.DataFrame:
+def soonest(table: pd.DataFrame, within: Sequence[str | int] | None) -> pd.DataFrame:
     """Of each detector and family, the row of the smallest severity that is found reliably, or of the largest.
 
     It is found within the longest of some times.

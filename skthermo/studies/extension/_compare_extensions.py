@@ -18,11 +18,12 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_floats, as_random_state, positive_integer, real_array
-from skthermo._tables.frames import check_same_rows, column_names
+from skthermo._tables.frames import Table, check_same_rows, column_names
 from skthermo.exceptions import ResultWarning
-from skthermo.fem import linearise
+from skthermo.fem import FEModel, linearise
 from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
 from skthermo.studies.scenarios import Scenario
+from skthermo.surrogate import FittedChain
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
 """What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
@@ -38,8 +39,8 @@ class CampaignSimulator:
     the model, and ``scatter`` the relative standard deviations of their noise; they are missing where all others are.
     """
 
-    fem: Any
-    T: Any
+    fem: FittedChain
+    T: Table
     changes: ChangesBySeverity
     measurement: Measurement
     n_baseline: int
@@ -69,20 +70,20 @@ class CampaignSimulator:
         tables = {key: self._table(seen, frequencies * factors) for key, frequencies in changed.items()}
         return pd.concat(periods).iloc[: self.n_baseline], tables
 
-    def _clean(self, T: Any, changes: Mapping[str, Any]) -> Array:
+    def _clean(self, T: Table, changes: Mapping[str, Any]) -> Array:
         measured = as_floats(self.fem.simulate(T, **changes))
         if not self.modes:
             return measured
         return np.hstack([measured, self.fem.thermal_.simulated(self.fem.weather(T), self.modes, **changes)])
 
-    def _measured(self, T: Any, seeds: Any) -> tuple[Array, Any]:
+    def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Any]:
         """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
         measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
         further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
         further[np.isnan(measured).all(axis=1)] = np.nan
         return 1 + np.hstack([measured, further]), seen
 
-    def _table(self, T: Any, frequencies: Array, period: int = 0) -> pd.DataFrame:
+    def _table(self, T: Table, frequencies: Array, period: int = 0) -> pd.DataFrame:
         """Temperatures and frequencies side by side; a later period repeats the weather of the first."""
         table = pd.DataFrame(np.hstack([as_floats(T), frequencies]), columns=self.names)
         index = getattr(T, "index", None)
@@ -112,7 +113,9 @@ class Trials:
     present: Arrangement
     candidates: dict[tuple[str, str], Arrangement]
 
-    def repeats(self, seeds: Any, n_jobs: int | None) -> dict[tuple[str, str], list[dict[str, tuple[float, float]]]]:
+    def repeats(
+        self, seeds: Sequence[int], n_jobs: int | None
+    ) -> dict[tuple[str, str], list[dict[str, tuple[float, float]]]]:
         """For each candidate and repeat, the smallest detectable severity of each family now and then."""
         with single_blas_thread():
             clean = self.simulator.clean()
@@ -285,7 +288,7 @@ def changes_by_severity(study: DetectabilityStudy, detector: str | None = None) 
     return changes
 
 
-def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
+def _further_modes(model: FEModel, modes: Sequence[int] | None) -> list[int]:
     """Ranks of modes that are not measured yet."""
     if not hasattr(model, "with_modes"):
         if modes is None:
@@ -301,7 +304,7 @@ def _further_modes(model: Any, modes: Sequence[int] | None) -> list[int]:
     return [int(mode) for mode in modes]
 
 
-def _warn_of_unknown_modes(fem: Any, ranks: Sequence[int]) -> None:
+def _warn_of_unknown_modes(fem: FittedChain, ranks: Sequence[int]) -> None:
     """Warn of modes whose frequencies the parameters of the chain predict badly."""
     theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
     measured, further = (
@@ -355,7 +358,7 @@ def _with_sensors(
     return trials
 
 
-def _beside(T: Any, name: Hashable, values: Array) -> Any:
+def _beside(T: Table, name: Hashable, values: Array) -> Any:
     if isinstance(T, pd.DataFrame):
         if name in T.columns:
             raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")

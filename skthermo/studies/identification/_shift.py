@@ -75,13 +75,13 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
     inputs = fem.weather(T).inputs[(~np.isnan(shifts)).any(axis=1)]
-    shares, judged, factor = fem.residuals().shares(inputs), ~np.isnan(mean), 1.0
+    trained, judged, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
         wider = np.where(spread**2 > limit, spread, 1.0)
         new = new * np.outer(wider, wider)
-    parts = new + scatter.of_sums(shares, np.arange(len(shares)))
+    parts = new + scatter.of_sums(trained, np.arange(len(trained)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
         n_evaluated, of_correlations = judged.sum(), freedom + scatter.n_pseudo

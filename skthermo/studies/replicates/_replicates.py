@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, positive_integer
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.frames import Table, column_names, frame_like
 from skthermo._tables.times import has_stamps, row_times
 from skthermo.exceptions import ResultWarning
+from skthermo.fem import FEModel
+from skthermo.surrogate import FittedChain
 from skthermo.updating import ModelUpdater
 
 DEVIATION = 0.005  # relative, of measured mean frequencies from those of a perfect model
@@ -21,7 +23,7 @@ SPREAD = 0.15  # relative deviation of stiffnesses before anything is measured
 HALF_WIDTH = 0.6  # of the box in which stiffnesses are looked for
 
 
-def drawn_models(fem: Any, number: int, seed: int) -> list[Any]:
+def drawn_models(fem: FittedChain, number: int, seed: int) -> list[FEModel]:
     """Models calibrated to the mean of the training records, as far as these determine stiffnesses."""
     mean = np.nanmean(as_floats(fem.training_records_[1]), axis=0)
     with without_warnings():
@@ -35,7 +37,7 @@ def drawn_models(fem: Any, number: int, seed: int) -> list[Any]:
             ) from error
 
 
-def checked_models(fem: Any, models: Any) -> list[Any]:
+def checked_models(fem: FittedChain, models: Any) -> list[FEModel]:
     """Models that a chain can be refitted with, or an error."""
     if isinstance(models, str) or not isinstance(models, Sequence) or not len(models):
         raise ValueError(
@@ -59,7 +61,7 @@ BLOCK = 7  # days that stay together
 SEASON = 15  # days by which a block may be earlier or later in the year
 
 
-def resampled_days(T: Any, random: np.random.RandomState) -> Any:
+def resampled_days(T: Table, random: np.random.RandomState) -> Any:
     """The temperatures of other days of the same season for each row, whole weeks together, at the same time of day.
 
     Rows keep their stamps, so that onsets of damage and waits keep their meaning. Rows without stamps count as a year.
@@ -97,7 +99,7 @@ def _nearest(times: Array, wanted: Array) -> tuple[NDArray[np.intp], Array]:
     return near, np.abs(times[near] - wanted)
 
 
-def other_years(T: Sequence[Any]) -> list[Any]:
+def other_years(T: Sequence[Table]) -> list[FEModel]:
     """Every year of weather on the stamps of the first: row by row, or matched by the time of the year."""
     first = T[0]
     return [first, *(_on_stamps_of(first, one, number) for number, one in enumerate(T[1:], start=1))]
@@ -144,15 +146,17 @@ class Replicates:
     Every replicate is drawn from its own seed alone. Without "noise" among what varies, all replicates have the same.
     """
 
-    fem: Any
+    fem: FittedChain
     parts: Sequence[str]
     with_noise: bool
-    years: Sequence[Any]
-    models: Sequence[Any]
+    years: Sequence[Table]
+    models: Sequence[FEModel]
     seeds: Sequence[int]
 
     @classmethod
-    def of(cls, fem: Any, uncertainty: Any, T: Any, models: Any, number: Any, seed: Any) -> Replicates:
+    def of(
+        cls, fem: FittedChain, uncertainty: str | Sequence[str], T: Table, models: Any, number: Any, seed: Any
+    ) -> Replicates:
         """So many replicates in which the named parts vary; without models, these are drawn from the training
         records."""
         asked = checked_parts(uncertainty)
@@ -192,7 +196,7 @@ class Replicates:
             yield part, chain, T
 
 
-def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
+def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> list[FEModel]:
     """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""
     try:
         return drawn_models(fem, number, seed)
@@ -203,7 +207,7 @@ def _models_of(fem: Any, number: int, seed: int, is_needed: bool) -> list[Any]:
         return []
 
 
-def checked_parts(uncertainty: Any) -> list[str]:
+def checked_parts(uncertainty: str | Sequence[str]) -> list[str]:
     """What varies, or an error."""
     if _is_all(uncertainty):
         return list(PARTS)
@@ -214,5 +218,5 @@ def checked_parts(uncertainty: Any) -> list[str]:
     return asked
 
 
-def _is_all(uncertainty: Any) -> bool:
+def _is_all(uncertainty: str | Sequence[str]) -> bool:
     return isinstance(uncertainty, str) and uncertainty == ALL

@@ -14,8 +14,11 @@ from numpy.typing import ArrayLike
 
 from skthermo._estimators.arguments import as_mapping, check_names
 from skthermo._tables.arrays import HUGE, is_real, real_array
+from skthermo._tables.frames import Table
 from skthermo._tables.times import row_times, time_of
 from skthermo._validation import check_is_fitted
+from skthermo.fem import FEModel
+from skthermo.surrogate import FittedChain
 
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
 
@@ -43,7 +46,7 @@ class BaseScenario(ABC):
         """Whether nothing is changed, so that alarms are false."""
         return not self.groups
 
-    def changes(self, T: Any, repeat: int = 0) -> dict[str, Any]:
+    def changes(self, T: Table, repeat: int = 0) -> dict[str, Any]:
         """Arguments of `~skthermo.surrogate.DataInformedFEM.simulate` that change the structure as in this scenario.
 
         Parameters
@@ -68,11 +71,11 @@ class BaseScenario(ABC):
         return self._changes(T, int(repeat))
 
     @abstractmethod
-    def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         """Hook: the arguments that differ from those of the healthy structure."""
 
 
-def check_chain(fem: Any) -> None:
+def check_chain(fem: FittedChain) -> None:
     """Raise an error for what is not a fitted chain."""
     if isinstance(fem, type) or not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
@@ -118,7 +121,7 @@ def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
         )
 
 
-def mapping_of(values: Any, what: str, expected: str) -> Mapping[str, Any]:
+def mapping_of(values: ArrayLike, what: str, expected: str) -> Mapping[str, Any]:
     """A mapping, or a Series with names as one; None becomes an empty one."""
     mapping = {} if values is None else as_mapping(values)
     if not isinstance(mapping, Mapping):
@@ -212,7 +215,7 @@ class Scenario(BaseScenario):
             self.stiffness is None and self.mass is None
         )
 
-    def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         asked = {"damage": self.damage or None, "parameters": self.parameters or None}
         asked |= {"stiffness": self.stiffness, "mass": self.mass}
         return {name: value for name, value in asked.items() if value is not None}
@@ -221,7 +224,7 @@ class Scenario(BaseScenario):
         return f"Scenario({', '.join([repr(self.name), *(f'{k}={_short(v)}' for k, v in self.changes(None).items())])})"
 
 
-def read_scenarios(given: Any, model: Any) -> list[BaseScenario]:
+def read_scenarios(given: Table, model: FEModel) -> list[BaseScenario]:
     """Scenarios of a study of a model, mappings of groups to severities among them; an error if they are wrong."""
     if isinstance(given, type) or not isinstance(given, Iterable):
         raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
@@ -236,7 +239,7 @@ def read_scenarios(given: Any, model: Any) -> list[BaseScenario]:
     return scenarios
 
 
-def _as_scenario(given: Any) -> Any:
+def _as_scenario(given: Table) -> Any:
     """A scenario of a mapping of groups to severities, with a name such as "soil 18 %, piers 5 %"; others as they are.
 
     An empty mapping is the healthy structure.
@@ -249,13 +252,13 @@ def _as_scenario(given: Any) -> Any:
     return Scenario(name or "healthy", damage)
 
 
-def _short(value: Any) -> str:
+def _short(value: ArrayLike) -> str:
     shape = getattr(value, "shape", None)
     return repr(value) if shape is None else f"<{'x'.join(map(str, shape))} matrix>"
 
 
 def sweep(
-    model: Any, severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5), groups: Sequence[str] | None = None
+    model: FEModel, severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5), groups: Sequence[str] | None = None
 ) -> list[Scenario]:
     """The healthy structure, and damage of every group at every severity.
 
@@ -372,7 +375,7 @@ class ProgressiveDamage(BaseScenario):
         """Damage groups that it changes."""
         return tuple(group for group, severity in self.damage.items() if severity)
 
-    def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         times, onset = row_times(T), time_of(T, self.onset, "onset")
         end = onset if self.end is None else time_of(T, self.end, "end")
         if not np.isfinite(end) or end < onset or onset > times.max():
@@ -444,7 +447,7 @@ class UncertainDamage(BaseScenario):
         """Damage groups that it changes."""
         return tuple(self.draws.columns)
 
-    def _changes(self, T: Any, repeat: int) -> dict[str, Any]:
+    def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         draw = self.draws.iloc[repeat % len(self.draws)]
         return {"damage": {group: float(severity) for group, severity in draw.items()}}
 

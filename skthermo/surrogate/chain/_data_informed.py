@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypeAlias, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,7 @@ from skthermo._estimators.regressors import (
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, is_real
 from skthermo._tables.frames import (
+    Table,
     check_columns,
     check_same_rows,
     check_temperatures,
@@ -79,8 +80,6 @@ from skthermo.surrogate.inverse import InverseSurrogate
 START_SAMPLES, START_PENALTY = 200, 1e-3
 """Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
 
-Table: TypeAlias = NDArray[np.float64] | pd.DataFrame
-
 
 class Simulated(TypedDict, total=False):
     """Options of `DataInformedFEM.simulate`, for checkers of types."""
@@ -128,17 +127,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
         Whether M1, predictions and simulations use a reduced model, ``model.reduced``, much faster for large models.
-        "auto" reduces where that is expected to save time and where a basis is accurate; ``report_`` says which. True
-        allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Every
-        `InverseSurrogate` of the inverse whose own ``reduce`` is "auto" gets this value. Predictions use its reduced
-        model if the box of that covers the parameters that M2 gives for the training weather, plus a quarter of their
-        range on either side, else one of their own for this box. Rows outside the box are solved by the model itself,
-        with a warning that counts them; so are all where no basis is as accurate as that, with a warning unless "auto"
-        decides.
+        "auto" reduces where that is expected to save time and a basis is accurate; ``report_`` says which. True allows
+        a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. An
+        `InverseSurrogate` whose own ``reduce`` is "auto" gets this value, and predictions use its reduced model if that
+        covers the parameters of the training weather, plus a quarter of their range on either side. Rows outside the
+        box of a reduced model are solved by the model itself, with a warning that counts them.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
-        and the parameters of these records, so that a search over the mapper's settings, or over detectors behind the
-        chain, makes them once for each set of training records. See ``memory`` of `InverseSurrogate`.
+        and the parameters of these records, so that searches make them once. See ``memory`` of `InverseSurrogate`.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -194,14 +190,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     the training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
 
-    Similar weather, for intervals and fitted noise, is looked for among all training records or, of more than 20,000,
-    among one in each of as many equal parts of them; a mean over a tenth of the records is one over the nearest 500 of
-    5000. Time and memory then grow in proportion to the rows.
+    Similar weather, for intervals and fitted noise, is looked for among at most 20,000 training records, spread evenly,
+    so that time and memory grow in proportion to the rows.
 
-    A mapper that states its own uncertainty by a method ``predict_covariance(X)``, (n_samples, n_parameters,
-    n_parameters), such as one that has learned from a fleet, makes standard deviations and intervals as wide as it is
-    uncertain. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, it says where it stands on
-    records of others.
+    A mapper with a method ``predict_covariance(X)``, (n_samples, n_parameters, n_parameters), such as one that has
+    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain. With ``reach_``, a range
+    of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others.
 
     Examples
     --------
@@ -294,9 +288,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Warns
         -----
         UserWarning
-            One warning, with counts, for each kind of doubtful data in ``report_``: what
-            `~skthermo.preprocessing.check_records` finds, few rows, rows left out, modes that are far from the model's
-            or look like others of its modes, parameters far outside the bounds of the inverse.
+            One, with counts, for each kind of doubtful data in ``report_``, and for what
+            `~skthermo.preprocessing.check_records` finds.
         """
         T, F = self._read_records(X, y)
         tolerance(self.model, self.reduce)
@@ -515,7 +508,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         UserWarning
             If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records, or a sensor departs from what the others foretell; `predict`, `predict_interval` and `simulate`
+            records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
         weather = self.weather(X)
@@ -572,19 +565,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         ndarray of shape (n_samples, n_modes, n_modes)
             In Hz squared, in the measured domain, to first order: G C G' with the covariance C of the parameters that
-            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and the exact derivatives G = d f / d theta of
-            the model (of its reduced model within its box), times the discrepancy. Without the scatter of the
-            measurement. NaN where nothing is predicted.
+            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and G = d f / d theta, times the discrepancy.
+            Without the scatter of the measurement. Errors of records in similar weather do not average out.
 
         Raises
         ------
         ValueError
             If the mapper does not state how uncertain it is.
-
-        Notes
-        -----
-        The same draw of the mapper's uncertain coefficients moves all records of a season together, so that the errors
-        of records in similar weather do not average out.
         """
         check_is_fitted(self)
         if not offers(self.mapper_, "predict_covariance"):
@@ -624,20 +611,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals [LGR18]_: the training records are divided into blocks of a week or more, which are
-        dealt in turn to five folds, and each fold is predicted by a mapper fitted to the others. The width is a
-        multiple of the spread of these residuals in similar weather; the multiple is the order statistic that the folds
-        themselves needed. If new records are exchangeable with the training records, the interval holds a mode with
-        about the probability asked; the share of a short period varies more, because records of one structure are
-        serially correlated. Beyond the training range, the interval is widened by the distance (see
-        `extrapolation_distance`). Where a temperature was filled, it is widened by the change of the prediction when
-        that temperature is wrong by its standard deviation, sensor by sensor in quadrature.
+        Split-conformal intervals [LGR18]_ from `residuals`. The width is a multiple of their spread in similar weather;
+        the multiple is the order statistic that the folds themselves needed. If new records are exchangeable with the
+        training records, the interval holds a mode with about the probability asked; the share of a short period varies
+        more, because records are serially correlated. Beyond the training range, the interval is widened by the
+        distance (see `extrapolation_distance`), and where a temperature was filled, by what its standard deviation
+        changes in the prediction.
 
-        A mapper that knows how uncertain it is (`predict_covariance`) says so in place of that distance: its standard
-        deviation is added in quadrature, and the residuals count without what it explains of them. Only beyond the
-        weather that such a mapper stands on, its ``reach_``, is the interval widened by the distance as well. What a
-        mapper does not know stays the same for a season: the share that is held differs more from one structure to the
-        next than from one year to the next.
+        With a mapper that states its uncertainty (`predict_covariance`), its standard deviation is added in quadrature
+        in place of that distance, which counts beyond its ``reach_`` only.
 
         Examples
         --------
@@ -888,7 +870,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 seed_parts(part, random_state)
         return inverse, mapper, aligner, imputer
 
-    def _read_records(self, X: Any, y: Any) -> tuple[Any, Any]:
+    def _read_records(self, X: Table, y: Any) -> tuple[Any, Any]:
         """Copies of temperatures and frequencies, checked; frames stay frames."""
         check_model(self.model)
         if y is None:
@@ -905,11 +887,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_columns(T, "temperature", varying=True)
         return T, F
 
-    def _findings(self, T: Any, F: Any) -> Any:
+    def _findings(self, T: Table, F: Table) -> Any:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
 
-    def _fit_inverse(self, inverse: ChainInverse, T: Any, F: Any, shapes: ArrayLike | None) -> Any:
+    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Any:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
@@ -931,12 +913,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.parameters_ = frame_like(self.records_.temperatures, self.records_.targets, self.parameter_names_)
         return self
 
-    def _as_targets(self, X: Any, frequencies: Array) -> Any:
+    def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
 
-def named(T: Any, theta: Array, names: Sequence[str]) -> pd.DataFrame:
+def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.arguments import seem_rad_per_s
 from skthermo._estimators.regressors import offers, reach_of
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._tables.frames import column_names, columns_by_sensor
+from skthermo._tables.frames import Table, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import last_step
@@ -30,7 +31,7 @@ from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
-MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is told
+MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
@@ -111,7 +112,7 @@ class FitReport(SavesFrames):
         With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
     follows : mapping or None
-        Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
+        Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
 
@@ -170,8 +171,8 @@ class FitReport(SavesFrames):
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
             lines.append(
-                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
-                "apart."
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot distinguish all "
+                "of them."
             )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
@@ -184,7 +185,8 @@ class FitReport(SavesFrames):
             )
         if self.fleet is not None:
             lines.append(
-                f"In weather that these records have not seen, predictions stand on a fleet: {self._listed_weather()}."
+                "In weather that these records have not seen, predictions are based on a fleet: "
+                f"{self._listed_weather()}."
             )
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
@@ -390,7 +392,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
 
 
 def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
+    """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
@@ -404,7 +406,7 @@ def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
     return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
 
 
-def filled(T: Any, sensors: SensorRegression) -> pd.DataFrame:
+def filled(T: Table, sensors: SensorRegression) -> pd.DataFrame:
     """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
     deviations, found = sensors.fill(T)[1], {}
     for sensor, columns in columns_by_sensor(T).items():
@@ -432,7 +434,7 @@ def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     return pd.Series(counts, dtype=int)
 
 
-def periods(T: Any, rows: NDArray[np.bool_]) -> str:
+def periods(T: Table, rows: NDArray[np.bool_]) -> str:
     """When some rows of a table were taken: their period, or the longest one and how many there are."""
     order = np.argsort(row_times(T), kind="stable")
     places = np.flatnonzero(rows[order])
@@ -443,7 +445,7 @@ def periods(T: Any, rows: NDArray[np.bool_]) -> str:
     return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
 
 
-def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
+def _labels(T: Table, rows: NDArray[np.intp]) -> list[str]:
     """What rows are called: their stamps, or their numbers."""
     if not has_stamps(T):
         return [f"row {row}" for row in rows]
@@ -452,19 +454,19 @@ def _labels(T: Any, rows: NDArray[np.intp]) -> list[str]:
     return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 
-def mode_offsets(model: FEModel, F: Any) -> pd.Series:
+def mode_offsets(model: FEModel, F: Table) -> pd.Series:
     """Mean measured frequency against the model's nominal one, by mode, in percent."""
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
 
 
-def hidden_offsets(aligner: Any, F: Any) -> pd.Series:
+def hidden_offsets(aligner: BaseEstimator, F: Table) -> pd.Series:
     """Mean measured frequency against the mean that the model sees behind an aligner, by mode, in percent."""
     seen = np.nanmean(as_floats(aligner.transform(F)), axis=0)
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
 
 
-def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Array) -> float:
+def unexplained_offset(hidden: pd.Series, predicted: Array, T: Table, errors: Array) -> float:
     """Size of hidden offsets as a share of what weather, errors of the means and a calibrated model may leave."""
     offsets = 100 * np.log1p(hidden.to_numpy() / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]
@@ -477,7 +479,7 @@ def unexplained_offset(hidden: pd.Series, predicted: Array, T: Any, errors: Arra
     return float(size / (MOST_UNEXPLAINED if n_months >= MOST_OF_A_YEAR else MOST_OF_FEW_MONTHS))
 
 
-def mode_warnings(model: FEModel, F: Any) -> Iterator[SkthermoWarning]:
+def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
     """Warnings about the order and the units of the modes."""
     offsets = mode_offsets(model, F)
     ratios = 1 + offsets.to_numpy() / 100

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.regressors import inputs_of_last_step
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.frames import Table, column_names, frame_like
 from skthermo._validation import last_step
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import shape_components
@@ -25,11 +26,8 @@ UNLIKE = 5.0  # distance of median components from those of the model, in deviat
 
 @dataclass(frozen=True)
 class Estimates:
-    """What M1 finds for each training record: parameters and, where it refines, how the steps ended.
-
-    ``full_solves`` tells how often the full model was solved for each because its steps left the box of the reduced
-    model.
-    """
+    """What M1 finds for each training record: parameters and, where it refines, how the steps ended, and how often the
+    full model was solved because they left the box of the reduced one."""
 
     theta: Array
     n_unconverged: int | None = None
@@ -40,7 +38,7 @@ class Estimates:
 class ChainInverse:
     """M1 of a chain: an `InverseSurrogate`, a pipeline that ends with one, or any other transformer."""
 
-    estimator: Any
+    estimator: BaseEstimator
 
     @property
     def surrogates(self) -> list[InverseSurrogate]:
@@ -60,7 +58,7 @@ class ChainInverse:
         part = next((part for part in self.surrogates if part.dofs is not None), None)
         return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
 
-    def estimates(self, aligned: Any, parameter_names: list[str]) -> Estimates:
+    def estimates(self, aligned: Table, parameter_names: list[str]) -> Estimates:
         """What the fitted inverse finds for aligned records, with warnings where they determine little."""
         last = self.refining
         if last is None:
@@ -81,7 +79,7 @@ class ChainInverse:
             )
         return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
 
-    def with_shapes(self, F: Any, shapes: ArrayLike | None) -> Any:
+    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Any:
         """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
         inputs = self.shape_inputs
         if inputs is None:
@@ -101,7 +99,7 @@ class ChainInverse:
         names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
         return frame_like(F, np.hstack([as_floats(F), components]), names)
 
-    def shape_warnings(self, aligned: Any) -> Iterator[SkthermoWarning]:
+    def shape_warnings(self, aligned: Table) -> Iterator[SkthermoWarning]:
         """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
         inverse = self.refining
         if inverse is None:

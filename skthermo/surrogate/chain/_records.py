@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
@@ -30,7 +30,7 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import check_columns, check_same_rows, column_names, frame_like
+from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import row_times
 from skthermo._validation import last_step
@@ -55,7 +55,7 @@ class TrainingRecords(SavesFrames):
     the targets.
     """
 
-    temperatures: Any
+    temperatures: Table
     frequencies: Any
     inputs: Array
     targets: Array
@@ -82,7 +82,7 @@ class TrainingRecords(SavesFrames):
         """Measured over modelled frequencies, which a discrepancy learns, (n_rows, n_modes)."""
         return self.usable / self.modelled
 
-    def learns(self, regressor: Any, mapper: Any, sensors: SensorRegression) -> Discrepancy:
+    def learns(self, regressor: BaseEstimator, mapper: BaseEstimator, sensors: SensorRegression) -> Discrepancy:
         """The discrepancy that a regressor learns of these records, beside a fitted mapper."""
         folds = BlockedKFold(N_FOLDS).fold_of(as_frame(self.temperatures))
         chain = {"mapper": mapper, "sensors": sensors}
@@ -108,16 +108,12 @@ class TrainingRecords(SavesFrames):
             weights = np.zeros(len(targets))
             weights[order] = self.weights[residuals.rows[taken]]
         return replace(
-            self,
-            frequencies=frame_like(self.frequencies, measured),
-            usable=measured,
-            targets=targets,
-            weights=weights,
+            self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
         )
 
     def out_of_fold(
         self,
-        mapper: Any,
+        mapper: BaseEstimator,
         frequencies_of: Callable[[Array], Array],
         discrepancy: Discrepancy,
         folds: BaseCrossValidator | None = None,
@@ -125,10 +121,9 @@ class TrainingRecords(SavesFrames):
     ) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        Given are the fitted mapper, the function from parameters to frequencies in the measured domain, the discrepancy
-        and, for a mapper that states its errors, the function from parameters and their covariances to covariances of
-        ln f. By default, a fold holds every fifth of blocks of a week, or longer if
-        the residuals remember for longer.
+        ``frequencies_of`` gives frequencies in the measured domain, and ``propagated`` covariances of ln f for a mapper
+        that states its errors. By default, a fold holds every fifth of blocks of a week, or longer where residuals are
+        correlated for longer.
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
@@ -178,7 +173,7 @@ class TrainingRecords(SavesFrames):
         return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
 
 
-def check_frequencies(F: Any, model: FEModel) -> None:
+def check_frequencies(F: Table, model: FEModel) -> None:
     """Raise an error unless there is a column for each mode of a model, and all values are positive or NaN."""
     if F.shape[1] != model.n_modes:
         raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
@@ -193,7 +188,7 @@ def check_frequencies(F: Any, model: FEModel) -> None:
     check_columns(F, "frequency")
 
 
-def without_outliers(findings: RecordFindings, F: Any) -> Any:
+def without_outliers(findings: RecordFindings, F: Table) -> Any:
     """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
     far = findings.outliers
     if isinstance(F, pd.DataFrame) and far.index.is_unique:
@@ -203,7 +198,7 @@ def without_outliers(findings: RecordFindings, F: Any) -> Any:
     return frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
 
 
-def measurement_noise(mapper: Any, T: Any, F: Any) -> Array:
+def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
     """Relative standard deviations of frequencies about a regression on what an unfitted mapper sees of the weather.
 
     Out of fold, and by medians, so that outliers and rare weather hardly move them; (n_modes,).
@@ -226,8 +221,8 @@ def measurement_noise(mapper: Any, T: Any, F: Any) -> Array:
     return np.minimum(robust_deviation(residuals), MOST_NOISE)
 
 
-def as_frame(table: Any) -> pd.DataFrame:
-    """A frame of records, of which the index tells the times."""
+def as_frame(table: Table) -> pd.DataFrame:
+    """A frame of records, whose index holds the times."""
     return table if isinstance(table, pd.DataFrame) else pd.DataFrame(as_floats(table), copy=False)
 
 
@@ -242,14 +237,8 @@ LARGEST_SEED = np.iinfo(np.int32).max
 class ServiceRecords:
     """Gaps and outliers of training records in order of time, as `RecordSimulator.service_of` gives them.
 
-    Parameters
-    ----------
-    missing : ndarray of bool of shape (n_records, n_sensors + n_modes)
-        Which temperatures and frequencies are not there.
-    outliers : ndarray of shape (n_records, n_modes)
-        Relative residuals of outliers, NaN where a value is none.
-    places : ndarray of shape (n_records, n_coordinates)
-        Weather of the records, in coordinates in which similar weather is near.
+    ``missing`` temperatures and frequencies, (n_records, n_sensors + n_modes); relative residuals of ``outliers``,
+    (n_records, n_modes), NaN where a value is none; ``places``, (n_records, n_coordinates), near for similar weather.
     """
 
     missing: NDArray[np.bool_]
@@ -265,12 +254,9 @@ class ServiceRecords:
 
     @classmethod
     def of_raw(
-        cls, records: TrainingRecords, residuals: BaselineResiduals, raw: Any, predicted: Array
+        cls, records: TrainingRecords, residuals: BaselineResiduals, raw: ArrayLike, predicted: Array
     ) -> ServiceRecords:
-        """Learn from the training records before they were cleaned: what cleaning has changed or removed is an outlier.
-
-        Given are these frequencies, and those that are predicted for the rows.
-        """
+        """Learn from raw frequencies of the training records: what cleaning has changed or removed is an outlier."""
         measured = as_floats(raw)
         if measured.shape != np.shape(records.frequencies):
             raise ValueError(
@@ -316,11 +302,8 @@ class ServiceRecords:
         return taken
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
-        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none.
-
-        Their sizes are smoothed run by run, with the bandwidth of Silverman's rule on logarithms: the largest of a few
-        is not the largest of all that come.
-        """
+        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
+        run by run, with the bandwidth of Silverman's rule on logarithms."""
         drawn, logs = self.outliers[taken], np.log(np.abs(self.outliers))
         n_runs = _begins(self.outliers).sum()
         if n_runs < 2:
@@ -485,10 +468,7 @@ class RecordSimulator(SavesFrames):
 
 
 def fault_streams(random_state: np.random.RandomState) -> list[np.random.RandomState]:
-    """Random states of the records drawn from, of gaps and of outliers, beside the one of the noise.
-
-    They are the same whatever noise is drawn, and noise is the same without any faults.
-    """
+    """Random states of the records drawn from, of gaps and of outliers, the same whatever noise is drawn."""
     return [np.random.RandomState(seed) for seed in deepcopy(random_state).randint(LARGEST_SEED, size=3)]
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
 
 from skthermo._estimators.arguments import as_mapping
 from skthermo._estimators.regressors import (
@@ -34,7 +35,7 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import check_same_rows, column_names, frame_like
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
@@ -52,13 +53,12 @@ MOST = 20_000  # records, spread evenly, that a discrepancy is learned from
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    ``learned`` holds the fitted regressors of the ratios; modes of which too little is known have none, so that the FE
-    model counts alone. They learn from the inputs of the temperature ``mapper``; missing temperatures are filled by
-    ``sensors``. ``levels`` and ``shares``, (n_modes,): a share of what a regressor adds to the mean level counts, the
-    slope of a regression of the ratios on what it predicts out of fold. ``regressor`` is the unfitted one.
+    ``learned`` holds the fitted regressors of the ratios, from inputs of the ``mapper``; modes with few records have
+    none. The changes that they add to the ``levels`` of the modes count by ``shares``, the slopes of the ratios over
+    what is predicted out of fold.
     """
 
-    regressor: Any
+    regressor: BaseEstimator
     learned: tuple[Ratios, ...]
     levels: Array
     shares: Array
@@ -67,7 +67,13 @@ class Discrepancy:
 
     @classmethod
     def of(
-        cls, regressor: Any, inputs: Array, ratios: Array, weights: Array | None, folds: NDArray[np.intp], **chain: Any
+        cls,
+        regressor: BaseEstimator,
+        inputs: Array,
+        ratios: Array,
+        weights: Array | None,
+        folds: NDArray[np.intp],
+        **chain: Any,
     ) -> Discrepancy:
         """Learn from inputs of M2, ratios of measured over modelled frequencies, weights and the folds of the rows."""
         n_modes = ratios.shape[1]
@@ -95,7 +101,7 @@ class Discrepancy:
         )
         return replace(self, learned=some)
 
-    def __call__(self, X: Any) -> Array:
+    def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
         T = frame_like(X, self.sensors.fill(as_floats(X))[0])
         with without_warnings():
@@ -117,10 +123,10 @@ class Ratios:
 
     modes: NDArray[np.intp]
     rows: NDArray[np.intp]
-    regressor: Any
+    regressor: BaseEstimator
 
     def refitted(
-        self, regressor: Any, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.intp]
+        self, regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.intp]
     ) -> Ratios:
         """The same modes learned from other rows."""
         if len(rows) < FEWEST or not np.ptp(inputs[rows], axis=0).all():
@@ -135,7 +141,7 @@ class Ratios:
         return np.log(as_columns(self.regressor.predict(inputs)))
 
 
-def ratios_of(regressor: Any, inputs: Array, ratios: Array, weights: Array | None) -> tuple[Ratios, ...]:
+def ratios_of(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> tuple[Ratios, ...]:
     """Regressors of the modes, of which those that are there in the same rows are learned together.
 
     Rows in which a mode is far from its median are left out.
@@ -159,7 +165,7 @@ def ratio_regressor() -> TemperatureMapper:
 
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
-ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
+ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 
 
@@ -170,10 +176,10 @@ class Weather:
     ``mapper`` is the fitted M2 whose last step sees them as ``inputs``, lags included.
     """
 
-    given: Any
-    filled: Any
+    given: Table
+    filled: Table
     deviations: Array
-    mapper: Any
+    mapper: BaseEstimator
 
     def __len__(self) -> int:
         return len(self.filled)
@@ -193,13 +199,12 @@ class Weather:
 class ThermalModel(SavesFrames):
     """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
 
-    ``parameter_names`` and ``mode_names`` are the columns of theta and of the frequencies. ``sensors`` and
-    ``training_range`` tell unusual weather.
+    ``sensors`` and ``training_range`` detect unusual weather.
     """
 
-    mapper: Any
+    mapper: BaseEstimator
     simulator: Simulator
-    aligner: Any
+    aligner: BaseEstimator
     discrepancy: Discrepancy
     sensors: SensorRegression
     training_range: TrainingRange
@@ -293,7 +298,7 @@ class ThermalModel(SavesFrames):
         """Covariances of ln f because temperatures were filled, (n_rows, n_modes, n_modes)."""
         n_parameters = len(self.parameter_names)
 
-        def predict(filled: Any) -> Array:
+        def predict(filled: Table) -> Array:
             return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
 
         def log_frequencies(both: Array) -> Array:
@@ -310,7 +315,7 @@ class ThermalModel(SavesFrames):
         return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
 
 
-def frequencies_of(simulator: Simulator, aligner: Any, theta: Array, n_jobs: int | None) -> Array:
+def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
     return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
 

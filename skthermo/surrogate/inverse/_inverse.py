@@ -60,8 +60,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Number of simulations.
     narrow_bounds : bool, default=False
         Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
-        records that `fit` sees have their parameters, as far as the first regressor can tell. An inverse that is not
-        refined becomes more accurate there.
+        records that `fit` sees have their parameters, by the first regressor. An inverse that is not refined becomes
+        more accurate there.
     noise : "auto", float or array-like of shape (n_modes,), default="auto"
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, the regressor learns the posterior mean of the parameters, and refining finds the posterior mode.
@@ -86,19 +86,15 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         that of values spread evenly over the box.
     reduce : "auto", bool or float, default="auto"
         Whether to simulate and refine with the reduced model ``model.reduced(bounds)``, much faster for large models.
-        "auto" reduces where ``model.reduction_pays``, given the simulations and the records of `fit`, and a basis is
-        accurate. True allows a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error
-        allowed. If the records that `fit` sees have parameters outside the bounds, it is made for a wider box that
-        holds them, within the limits of estimates (three times the half-width of the bounds, in ln theta). Rows that
-        end outside that box are solved by the full model, with a warning that counts them. `inverse_transform` and
-        `round_trip` use the full model for the way back.
+        "auto" reduces where ``model.reduction_pays`` and a basis is accurate. True allows a relative error of 1e-5 in
+        the frequencies, as "auto" does; a number sets the error allowed. The box of the reduced model is widened to
+        hold the parameters of the records that `fit` sees (at most three times the half-width of the bounds, in ln
+        theta). Rows that end outside it are solved by the full model, with a warning that counts them.
     memory : str or joblib.Memory, optional
-        Folder for what is computed in `fit` and for the inversion of the records that `fit` saw, so that searches and
-        cross-validation make each only once: simulations and their reduced model, by model, bounds, number and seed;
-        the regressor, by its parameters and what it learns from; the inversion, by the model, the settings of the
-        refinement and the records. Processes that need the same wait for the one that makes it; warnings come again
-        with what is read. With ``random_state=None``, what is stored is always the same. Clear the memory when the
-        program behind a model or a regressor of your own changes. See Notes.
+        Folder for simulations, reduced model, regressor and inversion of the records that `fit` saw, so that searches
+        and cross-validation make each only once. Processes that need the same wait for the one that makes it; warnings
+        come again with what is read. With ``random_state=None``, what is stored is always the same. Clear the memory
+        when the program behind a model or a regressor of your own changes. See Notes.
     n_jobs : int, optional
         Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
@@ -147,10 +143,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     material property.
 
     The steps of a row start on a response surface, a polynomial fitted to the simulations and to solutions near 200 of
-    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step that is below 0.1 % of each
-    parameter's posterior standard deviation and whose curvature changes no frequency by more than 0.1 % of the noise.
-    The noise is what is stated or, where the residuals of the row show more, what they show. Frequencies that count as
-    exact end below a step of 1e-6.
+    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step below 0.1 % of each
+    parameter's posterior standard deviation whose curvature changes no frequency by more than 0.1 % of the noise, or,
+    where frequencies count as exact, with a step below 1e-6.
 
     Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 %. Not refined, the default
     network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %, a Gaussian process by
@@ -160,10 +155,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of 30 %, noise of 0.1 % on frequencies
     and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
 
-    For each simulation, a ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes, more with ``dofs``, and for each
-    training record in each set of training records ``8 * (2 n_parameters + n_modes + 3) + n_parameters + 1`` bytes;
-    with ``reduce`` also the reduced model with the full one, once for the bounds and again for each set of training
-    records that leaves them. ``reduce_size`` of ``joblib.Memory(folder)`` removes what has not been used for longest.
+    A ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes for each simulation, more with ``dofs``, and about
+    ``8 * (2 n_parameters + n_modes + 3)`` for each record of each set of training records; with ``reduce`` also the
+    models. ``reduce_size`` of ``joblib.Memory(folder)`` removes what has not been used for longest.
 
     Examples
     --------
@@ -453,8 +447,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Notes
         -----
         The 500 simulations are always the same, so that scores of different regressors and numbers of samples can be
-        compared; those of different ``bounds`` or ``noise`` cannot. Measured records do not matter, and one fold is
-        enough. With ``refine=0``, `fit` leaves out what no score needs.
+        compared; those of different ``bounds`` or ``noise`` cannot. One fold is enough, and ``refine=0`` the fastest.
 
         Examples
         --------
@@ -597,11 +590,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
             self._learn_inverse(inputs, theta, seed)
 
     def _learn_simulations(
-        self,
-        X: ArrayLike | None,
-        random: np.random.RandomState,
-        seed: np.random.RandomState | None,
-        stages: Stages,
+        self, X: ArrayLike | None, random: np.random.RandomState, seed: np.random.RandomState | None, stages: Stages
     ) -> None:
         """Learn from simulations, and once more from a narrower box if that is asked for."""
         check_model(self.model)

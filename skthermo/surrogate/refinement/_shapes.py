@@ -1,14 +1,13 @@
 """Mode shapes as data beside frequencies: how their columns are read, and how they differ from computed ones."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import by_mode, check_dofs
 from skthermo._tables.arrays import Array, real_array
-from skthermo.fem import evaluate_modes, shape_components
+from skthermo.fem import FEModel, evaluate_modes, shape_components
 
 NODE = 1e-6
 """Largest component at the sensors, as a share of the largest of the shape, below which a mode does not move them."""
@@ -27,7 +26,7 @@ class ShapeInputs:
     noise: Array
 
     @classmethod
-    def of(cls, model: Any, dofs: ArrayLike, noise: ArrayLike) -> "ShapeInputs":
+    def of(cls, model: FEModel, dofs: ArrayLike, noise: ArrayLike) -> "ShapeInputs":
         """The columns for a model and sensors, which must be able to see each mode."""
         if not hasattr(model, "modes"):
             raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
@@ -77,7 +76,7 @@ class ShapeInputs:
         shapes = inputs[:, self.n_modes :].reshape(len(inputs), self.n_modes, self.n_sensors)
         return shapes / np.sqrt(self.n_sensors)
 
-    def of_parameters(self, model: Any, theta: Array, n_jobs: int | None = None) -> Array:
+    def of_parameters(self, model: FEModel, theta: Array, n_jobs: int | None = None) -> Array:
         """Inputs that the model gives for rows of theta, without noise."""
         frequencies, shapes = evaluate_modes(model, theta, self.dofs, n_jobs=n_jobs)
         return np.hstack([frequencies, shape_components(shapes.swapaxes(1, 2), self.reference)])

@@ -1,0 +1,24 @@
+"""Records, detectors and studies of the truss that tests of studies share."""
+
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.studies import DetectabilityStudy
+
+YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+WEATHER = LATER.temperatures
+SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
+MODES = list(YEAR.frequencies)
+
+
+def compensated(last=None):
+    """A detector that compensates for temperature by linear regression."""
+    return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
+
+
+def study_of(fem, detectors, scenarios, **options):
+    """A study of two repeats with the noise alone, unless asked otherwise."""
+    options = {"n_repeats": 2, "random_state": 0, "uncertainty": "noise"} | options
+    return DetectabilityStudy(fem, detectors, scenarios, **options)
