@@ -611,8 +611,8 @@ class Monitor(SavesFrames, Estimator):
             f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
             f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
             f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
-            f"damage events: open with {counted(self.persistence, 'record')} in a row above {self.threshold_:.4g}, close "
-            f"at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            f"damage events: open with {counted(self.persistence, 'record')} in a row above {self.threshold_:.4g}, "
+            f"close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
             *_events_in_words(self.events_),
         ]
         faults = self.faults_
