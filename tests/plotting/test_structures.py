@@ -158,9 +158,8 @@ def test_flat_axes_for_a_structure_in_space_are_refused():
 def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplitude():
     structure = king_post()
     model = structure.assemble(["ties", "rafters", "post"], n_modes=3)
-    theta = [1.2, 0.8, 1.0]
-    display = ModeShapesDisplay.from_structure(structure, model, [2, 0], theta, amplitude=0.1)
-    frequencies, shapes = model.modes([theta])
+    display = ModeShapesDisplay.from_structure(structure, model, [2, 0], amplitude=0.1)
+    frequencies, shapes = model.modes([[1.0, 1.0, 1.0]])
     titles = [ax.get_title() for ax in display.axes_]
     assert titles == [f"$f_{{{m + 1}}}$ = {frequencies[0, m]:.2f} Hz" for m in (2, 0)]
     extent = np.hypot(6, 2)

@@ -141,9 +141,9 @@ def test_identified_damage_is_said_first_and_in_full(page, found):
 def test_groups_that_are_not_seen_have_no_amount():
     page = Page(identified_damage(identified(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unseen=["piers"])))
     assert "piers" in page.heads
-    assert page.cells.count("cannot be seen") == 1
+    assert page.cells.count("unobservable") == 1
     page = Page(identified_damage(identified(EXPLANATIONS, rest=0.0)))
-    assert "All groups can be seen and told apart by the measured modes." in page.text
+    assert "The measured modes show and distinguish all groups." in page.text
 
 
 @pytest.mark.usefixtures("blank_drawings")
