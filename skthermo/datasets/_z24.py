@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -159,7 +158,7 @@ def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(columns), [STATES[0]] * count + [STATES[1]] * (len(data) - count)
 
 
-def _matlab_hours(content: dict[str, Any], n_records: int, file: Path) -> NDArray[np.float64]:
+def _matlab_hours(content: dict[str, object], n_records: int, file: Path) -> NDArray[np.float64]:
     if "idx" not in content:
         return np.arange(float(n_records))
     mask = _matlab_field(content, "idx", file).ravel()
@@ -171,7 +170,7 @@ def _matlab_hours(content: dict[str, Any], n_records: int, file: Path) -> NDArra
     return np.flatnonzero(mask).astype(float)
 
 
-def _matlab_field(content: dict[str, Any], name: str, file: Path) -> NDArray[np.float64]:
+def _matlab_field(content: dict[str, object], name: str, file: Path) -> NDArray[np.float64]:
     if name not in content:
         raise ValueError(f"{file}: no field {name!r}; found {sorted(content)}")
     matrix = content[name]

@@ -12,16 +12,16 @@ MOST_EVENTS = 5  # that are told, the latest ones
 
 
 def in_words(monitor: Any) -> str:
-    """State, records, promise, events, sensors and drift of a fitted monitor."""
+    """State, records, false-alarm rate, events, sensors and drift of a fitted monitor."""
     begin = f"State: {monitor.state()} ({monitor.last_})" if len(monitor.records_) else "No record since the baseline."
-    counts, promise = monitor.counts_, monitor.false_alarm_estimate_
+    counts, estimate = monitor.counts_, monitor.false_alarm_estimate_
     lines = [
         begin,
         f"Records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
         f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too far "
         f"ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out.",
-        f"Damage events open above {monitor.threshold_:.4g} and close at or below "
-        f"{monitor.clear_threshold_:.4g}: {promise}.",
+        f"Damage events open with {counted_number(estimate.rule.persistence, 'record')} in a row above "
+        f"{monitor.threshold_:.4g} and close at or below {monitor.clear_threshold_:.4g}: {estimate}.",
         *_events(monitor.events_),
         *_sensors(monitor.faults_),
     ]

@@ -17,7 +17,7 @@ from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._residuals import Point, Residuals
 
 WIDEST = 4.0
 """Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays
@@ -65,7 +65,7 @@ class RandomisedResiduals:
 class RandomisedPoint:
     """Randomised residuals at one theta."""
 
-    point: Any
+    point: Point
     weights: Array
     values: Array
 
