@@ -57,7 +57,7 @@ from skthermo._validation import (
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import BiasAligner, check_records
+from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._memory import remembered
@@ -749,7 +749,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self.recorder_.residuals
 
     @property
-    def training_records_(self) -> tuple[Any, Any]:
+    def training_records_(self) -> tuple[Table, Table]:
         """Temperatures and frequencies that `fit` was given."""
         check_is_fitted(self)
         return self.records_.temperatures, self.records_.frequencies
@@ -857,7 +857,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 seed_parts(part, random_state)
         return inverse, mapper, aligner, imputer
 
-    def _read_records(self, X: Table, y: Any) -> tuple[Any, Any]:
+    def _read_records(self, X: Table, y: Any) -> tuple[Table, Table]:
         """Copies of temperatures and frequencies, checked; frames stay frames."""
         check_model(self.model)
         if y is None:
@@ -874,11 +874,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_columns(T, "temperature", varying=True)
         return T, F
 
-    def _findings(self, T: Table, F: Table) -> Any:
+    def _findings(self, T: Table, F: Table) -> RecordFindings:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
 
-    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Any:
+    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Table:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))

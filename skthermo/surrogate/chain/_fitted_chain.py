@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import Table
 from skthermo.fem import FEModel
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
@@ -43,15 +45,15 @@ class FittedChain(Protocol):
     n_features_in_: int
     mode_names_: list[Any]
     parameter_names_: list[str]
-    inverse_: Any
-    mapper_: Any
-    aligner_: Any
+    inverse_: BaseEstimator
+    mapper_: BaseEstimator
+    aligner_: BaseEstimator
     discrepancy_: Discrepancy
     simulator_: Simulator
     sensors_: SensorRegression
     training_range_: TrainingRange
     box_: Box | None
-    parameters_: Any
+    parameters_: Table
     noise_: Array
     thermal_: ThermalModel
     recorder_: RecordSimulator
@@ -59,7 +61,7 @@ class FittedChain(Protocol):
     report_: Any
 
     @property
-    def training_records_(self) -> tuple[Any, Any]:
+    def training_records_(self) -> tuple[Table, Table]:
         """Temperatures and frequencies that ``fit`` was given."""
 
     def residuals(self) -> BaselineResiduals:
@@ -74,7 +76,7 @@ class FittedChain(Protocol):
             Temperatures in degrees Celsius.
         """
 
-    def predict(self, X: ArrayLike) -> Any:
+    def predict(self, X: ArrayLike) -> Table:
         """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
 
         Parameters
@@ -83,7 +85,7 @@ class FittedChain(Protocol):
             Temperatures in degrees Celsius.
         """
 
-    def predict_parameters(self, X: ArrayLike) -> Any:
+    def predict_parameters(self, X: ArrayLike) -> Table:
         """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
 
         Parameters
@@ -92,7 +94,7 @@ class FittedChain(Protocol):
             Temperatures in degrees Celsius.
         """
 
-    def simulate(self, X: ArrayLike, **options: Any) -> Any:
+    def simulate(self, X: ArrayLike, **options: Any) -> Table:
         """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
 
         Parameters

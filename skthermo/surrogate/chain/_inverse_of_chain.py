@@ -5,7 +5,6 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from joblib import Memory
@@ -99,7 +98,7 @@ class ChainInverse:
             )
         return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
 
-    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Any:
+    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Table:
         """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
         inputs = self.shape_inputs
         if inputs is None:
