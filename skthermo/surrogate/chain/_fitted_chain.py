@@ -63,68 +63,42 @@ class FittedChain(Protocol):
         """Temperatures and frequencies that ``fit`` was given."""
 
     def residuals(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records by weather.
-
-        Returns
-        -------
-        BaselineResiduals
-            Relative.
-        """
+        """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
 
     def weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled.
+        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        Weather
-            As ``thermal_``, ``recorder_`` and residuals take them.
         """
 
     def predict(self, X: ArrayLike) -> Any:
-        """Frequencies of the healthy structure.
+        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz.
         """
 
     def predict_parameters(self, X: ArrayLike) -> Any:
-        """Parameters of the FE model.
+        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
         """
 
     def simulate(self, X: ArrayLike, **options: Any) -> Any:
-        """Frequencies of the structure, healthy or damaged, as monitoring would record them.
+        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
         **options : dict
-            Damage, noise, gaps and outliers, as `DataInformedFEM.simulate` takes them.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz.
+            Damage, noise, gaps and outliers.
         """
