@@ -60,7 +60,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
 
     Notes
     -----
-    The time stamp is the number of hours in ``record`` added to 1997-11-11 00:00, the day on which monitoring began; the
+    The time stamp is ``record``, in hours, added to 1997-11-11 00:00, the day on which monitoring began; the
     hour of the first record is not documented, so that times of day are nominal. Without ``idx``, rows of a MATLAB file
     are taken as consecutive hours.
 
