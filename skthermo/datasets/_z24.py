@@ -60,10 +60,9 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
 
     Notes
     -----
-    Records are numbered by hours; hours without an identified record are missing. The time stamp is this number of
-    hours added to 1997-11-11 00:00, the day on which monitoring began; the hour of the first record is not documented,
-    so that times of day are nominal. The meaning of the letters in a sensor's name is not documented either.
-    Without ``idx``, rows of a MATLAB file are taken as consecutive hours.
+    The time stamp is ``record``, in hours, added to 1997-11-11 00:00, the day on which monitoring began; the
+    hour of the first record is not documented, so that times of day are nominal. Without ``idx``, rows of a MATLAB file
+    are taken as consecutive hours.
 
     References
     ----------

@@ -83,20 +83,8 @@ class RandomisedPoint:
 class Ensemble:
     """Draws of a model's parameters, and of the stiffness of its damage groups, given measured modes.
 
-    Parameters
-    ----------
-    model : FE model
-        As it was before calibration.
-    measured : Measured
-        Modes with their noise.
-    bounds : ndarray of shape (n_parameters, 2)
-        Box of the parameters.
-    prior : ndarray of shape (n_parameters,)
-        Standard deviation of each parameter about 1.
-    groups : list of str
-        Damage groups whose stiffness is not known either.
-    spread : float
-        Standard deviation of their stiffness about 1.
+    ``bounds`` and ``prior`` are those of the parameters, ``groups`` the damage groups whose stiffness is not known
+    either, and ``spread`` is the standard deviation of that about 1.
     """
 
     def __init__(
