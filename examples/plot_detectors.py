@@ -63,7 +63,7 @@ ranking = study.ranking(max_false_alarms=0.03)
 print((100 * ranking[["false_alarms", "pod", "pod_at_equal_pfa", "pod_deficit"]]).round(1).to_string())
 
 # %%
-# The order by simulated records. Detectors whose difference from the best may be chance are not clearly behind it.
+# The order by simulated records. Detectors whose difference from the best may be chance are not significantly worse.
 
 DetectorsDisplay.from_estimator(study, max_false_alarms=0.03)
 
@@ -96,7 +96,7 @@ print(f"rank correlation of damage found: {true['pod'].corr(ranking['pod'], meth
 # -----------------------------------
 # Some of them in a year that is 10 °C colder. Neighbours and forests find frequencies there that no record of the
 # baseline had, and call them damage. Principal components left out and cointegration hold as long as frequencies move
-# together as before. The simulation foretells that, before the cold year comes. It favours broken lines, however: the
+# together as before. The simulation predicts that, before the cold year comes. It favours broken lines, however: the
 # chain, too, continues by broken lines where it has no records, and so cannot know that they err there.
 
 cold = later.temperatures - 10

@@ -59,7 +59,7 @@ print(fleet.summary())
 # What they have in common
 # ------------------------
 # The deck of a girder and that of a truss share a name and little else, so that each kind has its own families. Each
-# family is pooled only if the other bridges foretell a bridge's records better than it does alone.
+# family is pooled only if the other bridges predict a bridge's records better than it does alone.
 
 families = {
     name: {part: f"{bridge.kind} {part}" for part in bridge.model.parameter_names} for name, bridge in campaign.items()
@@ -89,7 +89,10 @@ for name in new:
         for label, chain in chains[name].items()
     }
     follows = chains[name]["30 days and the fleet"].mapper_[-1].pooling_probability_
-    errors[f"{name} ({campaign[name].kind})"] |= {"alien": campaign[name].is_atypical, "follows": max(follows.values())}
+    errors[f"{name} ({campaign[name].kind})"] |= {
+        "atypical": campaign[name].is_atypical,
+        "follows": max(follows.values()),
+    }
 print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 
 # %%

@@ -51,7 +51,7 @@ baseline, later = records[:"2025"], records["2026":]
 # %%
 # A detector, an FE model, a promise
 # ----------------------------------
-# The detector is any of ``skthermo.detection``: here residuals of broken lines in the temperatures, judged by the
+# The detector is any of ``skthermo.detection``: here residuals of broken lines in the temperatures, evaluated by the
 # mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
 # share of the records, but what an owner asks for: one false alarm a year.
 
@@ -104,7 +104,7 @@ print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB")
 # ---------------------
 # :func:`~skthermo.monitoring.track_parameters` looks back over all records until the damage, and tells ageing from
 # weather and noise. Records of the days on which a sensor failed are left out first: this truss's thermometers are so
-# independent of each other that they foretell little of one that is missing.
+# independent of each other that they predict little of one that is missing.
 
 trusted = records[:"2027-11"]
 for _, fault in monitor.faults_.iterrows():

@@ -117,7 +117,7 @@ fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", nco
 # --------------------------------
 # :func:`~skthermo.studies.identify_damage` compares the last month with what the healthy bridge would do in its
 # weather, and weighs what explains the shifts of all modes: damage of up to three groups of members, alone or beside
-# something else. It warns of groups that these modes cannot tell apart.
+# something else. It warns of groups that these modes cannot distinguish.
 
 fem, found = identify(bridge)
 print(found.summary())
@@ -224,7 +224,7 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 #
 # All measured false alarms lie in their bands, 20 of 22 rates of damage found do, and the detectors stand in nearly the
 # same order. The two others are of detectors that find little, and their measured rates are 0.8 points above their
-# bands: the something else that the identification sees beside the damage is not simulated. Failures are foretold, too:
+# bands: what the identification calls "something else" is not simulated. Failures are predicted, too:
 # the 17 % false alarms of the local outlier factor, and the 12 and 23 % of linear regression. But the bands of found
 # damage are wide, since the severities are uncertain, and the damage was identified from the very records that it is
 # compared with. The mean of the campaigns is below the measured rate for most detectors that find the damage, by up to

@@ -270,7 +270,7 @@ def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
 
     "auto" reduces models that state by ``reduction_pays`` that it saves time for a number of solves.
     """
-    if is_auto(reduce):
+    if isinstance(reduce, str):
         pays = hasattr(model, "reduced") and hasattr(model, "reduction_pays") and model.reduction_pays(n_solves)
         return DEFAULT_TOLERANCE if pays else None
     if not reduce:

@@ -188,7 +188,7 @@ def warnings_of_detector(name: str | None) -> Iterator[None]:
     with recorded() as caught:
         yield
     for one in caught:
-        one.message.detector = name
+        vars(one.message)["detector"] = name
         warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
 
 
@@ -221,9 +221,9 @@ def give_again(told: Iterable[warnings.WarningMessage]) -> None:
 
 
 def _again(caught: warnings.WarningMessage, text: str) -> None:
-    kind = getattr(caught.message, "kind", "")
-    caught.message.args = (text,)
-    if kind or caught.category is UserWarning:
-        _give(caught.category(text, kind) if kind else UserWarning(text), f"again: {text}")
+    warning: Any = caught.message
+    warning.args = (text,)
+    if isinstance(warning, SkthermoWarning) or caught.category is UserWarning:
+        _give(warning, f"again: {text}")
     else:
-        warnings.warn_explicit(caught.message, caught.category, caught.filename, caught.lineno)
+        warnings.warn_explicit(warning, caught.category, caught.filename, caught.lineno)

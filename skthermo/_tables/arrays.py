@@ -63,7 +63,7 @@ def as_floats(values: Any) -> Array:
     if scipy.sparse.issparse(values):
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
     is_pandas = hasattr(values, "iloc")
-    dtypes = np.ravel(values.dtypes).tolist() if is_pandas else [getattr(values, "dtype", None)]
+    dtypes: list[Any] = np.ravel(values.dtypes).tolist() if is_pandas else [getattr(values, "dtype", None)]
     if dtypes and all(dtype == np.float64 for dtype in dtypes):
         return np.array(values) if is_pandas else np.asarray(values)
     refuse_no_numbers(values)

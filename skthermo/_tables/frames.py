@@ -15,6 +15,7 @@ from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
 Table: TypeAlias = Array | pd.DataFrame
+
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
 ABSURD = 20  # robust standard deviations from the median

@@ -23,11 +23,7 @@ class FEModel(Protocol):
 
     See Also
     --------
-    ModalModel : Gives mode shapes.
-    DifferentiableModel : Gives derivatives of its frequencies.
-    DamageableModel : Takes damage.
-    LocalModel : Gives everything about its modes at one theta.
-    BatchModel : States how many rows are best solved together.
+    ModalModel, DifferentiableModel, DamageableModel, LocalModel, BatchModel : What a model may offer beside.
 
     Notes
     -----
@@ -137,7 +133,7 @@ class DamageableModel(FEModel, Protocol):
     """
 
     @property
-    def groups(self) -> Mapping[str, Any]:
+    def groups(self) -> Mapping[str, object]:
         """The damage groups by name."""
 
     def damaged(self, damage: Mapping[str, float]) -> DamageableModel:

@@ -58,7 +58,7 @@ class Failure:
 
     @classmethod
     def of(cls, stage: str, error: BaseException) -> Failure:
-        """What there is to tell of an error that was caught."""
+        """What is known of an error that was caught."""
         return cls(stage, type(error).__name__, str(error), _place(error))
 
     def __str__(self) -> str:
@@ -66,14 +66,14 @@ class Failure:
 
 
 Table = ArrayLike | pd.DataFrame
-Told = tuple[str, str, int]  # kind and text of a warning, and how often it came
+Warned = tuple[str, str, int]  # kind and text of a warning, and how often it came
 
 
 @dataclass(frozen=True)
 class BridgeOutcome:
     """All that is known of a bridge, fitted or not, beside its fitted objects, which are bytes.
 
-    ``content`` tells by which records, estimator and versions it was fitted.
+    ``content`` identifies the records, estimator and versions by which it was fitted.
     """
 
     name: Hashable
@@ -82,8 +82,8 @@ class BridgeOutcome:
     facts: dict[str, float] = field(default_factory=dict)
     standing: dict[str, Any] = field(default_factory=lambda: dict(NOT_WATCHED))
     events: pd.DataFrame | None = None
-    warnings: tuple[Told, ...] = ()
-    late_warnings: tuple[Told, ...] = ()  # of the last update
+    warnings: tuple[Warned, ...] = ()
+    late_warnings: tuple[Warned, ...] = ()  # of the last update
     failures: tuple[Failure, ...] = ()
     seconds: float = 0.0
     n_bytes: int = 0
@@ -95,7 +95,7 @@ class BridgeOutcome:
 
 
 class Result(NamedTuple):
-    """What a worker sends back: fitted objects as bytes where they are new, and judgements of new records."""
+    """What a worker sends back: fitted objects as bytes where they are new, and evaluations of new records."""
 
     outcome: BridgeOutcome
     fitted: bytes | None = None
@@ -137,9 +137,9 @@ class BridgeFit:
             except (Exception, SystemExit) as error:
                 failure, fitted = Failure.of(stage, error), None
                 if not outcome.content:
-                    return self.lost(failure, outcome.facts, told(counts))
+                    return self.lost(failure, outcome.facts, warned(counts))
                 outcome = BridgeOutcome(self.name, facts=outcome.facts, failures=(failure,))
-        return Result(replace(outcome, warnings=told(counts), seconds=time.perf_counter() - start), fitted)
+        return Result(replace(outcome, warnings=warned(counts), seconds=time.perf_counter() - start), fitted)
 
     def _watched(
         self, outcome: BridgeOutcome, chain: BaseEstimator, T: Table, F: Table
@@ -153,7 +153,9 @@ class BridgeFit:
         except (Exception, SystemExit) as error:
             return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
 
-    def lost(self, failure: Failure, facts: dict[str, float] | None = None, warnings: tuple[Told, ...] = ()) -> Result:
+    def lost(
+        self, failure: Failure, facts: dict[str, float] | None = None, warnings: tuple[Warned, ...] = ()
+    ) -> Result:
         """What is known if the records or the estimator cannot be had: what was fitted before, not evaluated any
         more."""
         if self.known is not None and self.known.is_fitted:
@@ -168,39 +170,39 @@ class BridgeUpdate:
     name: Hashable
     outcome: BridgeOutcome
     records: Any
-    kept: Any
+    storage: Any
     fitted: bytes = b""
 
     def __getstate__(self) -> dict[str, Any]:
         """What travels to a worker: fitted objects are read when it is its turn."""
-        return vars(self) | {"kept": None, "fitted": self.kept.fitted(self.name)}
+        return vars(self) | {"storage": None, "fitted": self.storage.fitted(self.name)}
 
     def __call__(self) -> Result:
-        """What is known now, fitted objects as bytes, and judgements."""
+        """What is known now, fitted objects as bytes, and evaluations."""
         stage = "new records"
         with _on_its_own() as counts:
             try:
                 new = call(self.records)
                 new = joined(*new) if isinstance(new, tuple) else new
                 stage = "update"
-                chain, monitor = unpickled(self.fitted or self.kept.fitted(self.name))
+                chain, monitor = unpickled(self.fitted or self.storage.fitted(self.name))
                 if monitor is None:
                     raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
                 answers = monitor.update(new)
                 fitted = pickled((chain, monitor))
                 known: dict[str, Any] = {"standing": standing_of(monitor), "events": monitor.events_}
             except (Exception, SystemExit) as error:
-                return self.lost(Failure.of(stage, error), told(counts))
-        known |= {"failures": (), "late_warnings": told(counts), "n_bytes": len(fitted)}
+                return self.lost(Failure.of(stage, error), warned(counts))
+        known |= {"failures": (), "late_warnings": warned(counts), "n_bytes": len(fitted)}
         return Result(replace(self.outcome, **known), fitted, _answers(self.name, answers))
 
-    def lost(self, failure: Failure, warnings: tuple[Told, ...] = ()) -> Result:
-        """The bridge as it was, with one row that says why no new record is judged."""
+    def lost(self, failure: Failure, warnings: tuple[Warned, ...] = ()) -> Result:
+        """The bridge as it was, with one row that says why no new record is evaluated."""
         failure = replace(failure, stage="new records" if failure.stage == "new records" else "update")
         return Result(_not_evaluated(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
 
 
-def _not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Told, ...]) -> BridgeOutcome:
+def _not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warned, ...]) -> BridgeOutcome:
     """The bridge as it was; it is not healthy, because nothing is known of it."""
     standing = dict(outcome.standing)
     if outcome.is_watched:
@@ -289,15 +291,15 @@ def standing_of(monitor: Monitor) -> dict[str, Any]:
     return standing
 
 
-def _answers(name: Hashable, judged: pd.DataFrame) -> pd.DataFrame:
-    """Judgements with the name of their bridge."""
-    judged = judged.rename_axis("time").reset_index()
-    judged.insert(0, "bridge", pd.Series([name] * len(judged), dtype=object))
-    return judged
+def _answers(name: Hashable, evaluations: pd.DataFrame) -> pd.DataFrame:
+    """Evaluations with the name of their bridge."""
+    table = evaluations.rename_axis("time").reset_index()
+    table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
+    return table
 
 
 def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
-    """One row for a bridge of which no new record was judged."""
+    """One row for a bridge of which no new record was evaluated."""
     row = {
         "bridge": name,
         "time": pd.NaT,
@@ -309,7 +311,7 @@ def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
     return pd.DataFrame([row | {"revised": False}])
 
 
-def told(counts: Counter[tuple[str, str]]) -> tuple[Told, ...]:
+def warned(counts: Counter[tuple[str, str]]) -> tuple[Warned, ...]:
     """Kind, text and number of warnings, in the order in which they first came."""
     return tuple((kind, text, times) for (kind, text), times in counts.items())
 

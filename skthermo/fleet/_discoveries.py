@@ -1,145 +1,192 @@
-"""Events that stand out among those of many bridges."""
+"""Events that are significant after correction for many bridges."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import false_discovery_control
+from scipy.stats import false_discovery_control, genpareto
 
 from skthermo._estimators.arguments import check_size
 from skthermo._tables.arrays import Array
-from skthermo._tables.text import counted_number, percent, significant
+from skthermo._tables.text import counted_number, listed, percent, significant
 from skthermo.monitoring import Monitor
+
+FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned
+HEAVIEST = 0.9  # shape of a tail: from 1 on it has no mean
+COLUMNS = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
 
 
 @dataclass(frozen=True, repr=False)
 class Discoveries:
-    """Events of all bridges, of which those are called that stand out among all.
+    """Events of all bridges, and which of those that are open are significant after correction for many bridges.
 
     Parameters
     ----------
-    share : float
-        Share of false ones among the bridges that are called, on average.
+    fdr : float
+        False discovery rate: share of healthy ones among the bridges with a significant event, on average.
     table : DataFrame
         Damage events that are open or recent, and were not acknowledged as harmless: ``bridge``, ``event`` (its number
         in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value`` (`Monitor.event_p_values`),
-        and ``is_discovery``.
+        ``acknowledged``, and ``is_discovery``: it is open, and its bridge is significant.
     p_values : Series
-        By bridge that was judged: that of its highest event, 1 without one.
+        By bridge that was evaluated: that of its highest open event, 1 without one.
+    level : float
+        P value up to which bridges are significant.
     not_evaluated : list
-        Names of bridges with a monitor that nothing is known of: they count neither as healthy nor as called.
-    expected_false_per_year : float
-        Bridges that would be called in a year, if all were healthy, by the level at which bridges are called now.
-    promised_false_per_year : float
-        What the monitors' own promises add up to.
+        Names of bridges with a monitor of which nothing is known: they count neither as healthy nor as significant.
+    false_discoveries_per_year : float
+        Expected number of bridges with a significant event in a year at this level, if all are healthy.
+    false_alarms_per_year : float
+        Number for which all monitors together are set.
 
     Notes
     -----
-    Benjamini and Hochberg's procedure on the bridges' p values. It allows for the number of bridges, and keeps the
-    share also where common weather moves them together; that p values are right in weather that no baseline has seen,
-    it cannot promise.
+    Benjamini and Hochberg's procedure on the bridges' p values, which also holds where common weather makes them
+    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others:
+    a generalised Pareto law of their excesses, each over the mean excess of its own baseline, never lighter than an
+    exponential one. So it allows for outliers that the bridge's own baseline does not show, but not for weather that no
+    baseline shows. With few other bridges, the tail is that of `Monitor.event_p_values`.
+
+    References
+    ----------
+    Benjamini and Hochberg, *J. R. Stat. Soc. B* 57 (1995) 289-300.
     """
 
-    share: float
+    fdr: float
     table: pd.DataFrame
     p_values: pd.Series
+    level: float
     not_evaluated: list[Hashable]
-    expected_false_per_year: float
-    promised_false_per_year: float
+    false_discoveries_per_year: float
+    false_alarms_per_year: float
 
     @property
-    def called(self) -> list[Hashable]:
-        """Names of the bridges that are called, the least probable first."""
+    def bridges(self) -> list[Hashable]:
+        """Names of the bridges with a significant open event, the least probable first."""
         return self.table.loc[self.table["is_discovery"]].sort_values("p_value")["bridge"].unique().tolist()
 
     @property
+    def unexplained(self) -> pd.DataFrame:
+        """Events that have ended, would be significant, and were not acknowledged."""
+        ended = self.table["end"].notna() & ~self.table["acknowledged"].astype(bool)
+        return self.table[ended & (self.table["p_value"].astype(float) <= self.level)]
+
+    @property
     def n_evaluated(self) -> int:
-        """Number of bridges that were judged."""
+        """Number of bridges that were evaluated."""
         return len(self.p_values)
 
     def __repr__(self) -> str:
         return self.summary()
 
     def summary(self) -> str:
-        """Which bridges are called, and how many false ones to expect.
+        """Which bridges are in alarm significantly, and how many false alarms and discoveries to expect.
 
         Returns
         -------
         str
             Plain sentences.
         """
-        promised, left = (
-            counted_number(float(significant(number, 2)), "false alarm")
-            for number in (self.promised_false_per_year, self.expected_false_per_year)
+        names, is_open = self.bridges, self.table["end"].isna()
+        n_open = self.table.loc[is_open, "bridge"].nunique()
+        alarms, false = (
+            counted_number(float(significant(number, 2)), what)
+            for number, what in (
+                (self.false_alarms_per_year, "false alarm"),
+                (self.false_discoveries_per_year, "false discovery"),
+            )
         )
-        names = ", ".join(map(str, self.called))
+        found = f"{len(names)} of them significantly after correction for many bridges{': ' if names else ''}"
         lines = [
-            f"{len(self.called)} of {self.n_evaluated} judged bridges stand out{f': {names}' if names else ''}.",
-            f"Where p values hold, {percent(self.share)} of those called are false on average, and about {left} a year "
-            f"over all bridges, where single monitors promise {promised}. Outliers and new weather make more.",
+            f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
+            if n_open
+            else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
+            f"If all bridges stay healthy, expect {alarms} a year over all bridges, and {false}; of the significant "
+            f"bridges {percent(self.fdr)} are healthy on average.",
         ]
         if self.not_evaluated:
-            lines.append(f"Not evaluated, and so not known to be healthy: {', '.join(map(str, self.not_evaluated))}.")
+            lines.append(f"Not evaluated, and so not known to be healthy: {listed(self.not_evaluated)}.")
         return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def discover(
-    monitors: Mapping[Hashable, Monitor], standings: Mapping[Hashable, Mapping[str, Any]], share: float, days: float
+    monitors: Mapping[Hashable, Monitor], standings: Mapping[Hashable, Mapping[str, Any]], fdr: float, days: float
 ) -> Discoveries:
     """Compare the events of all monitors that were open within so many days before the newest record of all."""
-    share = check_size(share, "share", 0, 1, "a number between 0 and 1, such as 0.1")
+    fdr = check_size(fdr, "fdr", 0, 1, "a number between 0 and 1, such as 0.1")
     window = pd.Timedelta(days=check_size(days, "days", 0, np.inf, "a number of days, such as 365"))
     last = [without_zone(standing["last"]) for standing in standings.values() if not pd.isna(standing["last"])]
     begin = max(last, default=pd.NaT) - window
-    tables, p_values, years, promised, not_evaluated = [], {}, {}, 0.0, []
+    excesses, expected, watched, not_evaluated = {}, 0.0, {}, []
     for name in monitors:
         try:
             monitor = monitors[name]
-            promised += monitor.false_alarm_estimate_.expected
-            table, n_years = _compared(monitor, begin)
-        except Exception:  # damaged files raise errors of every type, and the table of errors tells them
+            estimate = monitor.false_alarm_estimate_
+            excesses[name], expected = np.array(estimate.tail.excesses), expected + estimate.expected
+            watched[name] = _events_since(monitor, begin)
+        except Exception:  # damaged files raise errors of every type, which are in the table of errors
             not_evaluated.append(name)
-            continue
+            watched.pop(name, None)
+    tables, p_values, years = [], {}, {}
+    for name, events in watched.items():
+        table, n_years = events.table, events.n_years
+        if len(table):
+            shape = tail_shape([one for other, one in excesses.items() if other != name])
+            p = monitors[name].event_p_values(events.since, tail_shape=shape)
+            table = table.assign(p_value=p.reindex(table.index)).reset_index().assign(bridge=name)[COLUMNS]
         is_blind = standings[name]["state"] == "not evaluated" or not n_years
-        if (is_blind and not len(table)) or table["p_value"].isna().any():
+        if (is_blind and not len(table)) or (len(table) and table["p_value"].isna().any()):
             not_evaluated.append(name)
             continue
-        p_values[name], years[name] = table["p_value"].min() if len(table) else 1.0, n_years
-        table = table.reset_index()
-        table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
-        tables.append(table)
+        is_open = table["end"].isna() if len(table) else []
+        p_values[name] = table.loc[is_open, "p_value"].min() if np.any(is_open) else 1.0
+        years[name] = n_years
+        tables += [table] if len(table) else []
     p = pd.Series(p_values, dtype=float)
-    limit, level = _limits(p.to_numpy(), share)
-    columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value"]
-    tables = [table for table in tables if len(table)]
-    table = pd.concat(tables, ignore_index=True)[columns] if tables else pd.DataFrame(columns=columns)
-    table["is_discovery"] = table["p_value"].astype(float) <= limit
+    is_significant, level = significant_bridges(p.to_numpy(), fdr)
+    table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COLUMNS)
+    table["is_discovery"] = table["end"].isna() & table["bridge"].isin(p.index[is_significant])
     false = float((-np.log1p(-level) / np.array(list(years.values()), dtype=float)).sum()) if len(p) else 0.0
-    return Discoveries(share, table, p, not_evaluated, false, promised)
+    return Discoveries(fdr, table, p, level, not_evaluated, false, expected)
 
 
-def _limits(p_values: Array, share: float) -> tuple[float, float]:
-    """The highest p value that is called, negative if none is, and the level at which p values are called."""
-    n = len(p_values)
-    if not n:
-        return -1.0, 0.0
-    called = p_values[false_discovery_control(p_values) <= share]
-    return (float(called.max()) if len(called) else -1.0), share * max(len(called), 1) / n
+@dataclass(frozen=True)
+class _Watched:
+    """Events of a monitor that are open or have ended since a time, and the years that it has evaluated since then."""
+
+    table: pd.DataFrame
+    since: pd.Timestamp
+    n_years: float
 
 
-def _compared(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
-    """Events of a monitor with their p values, and the years that it has watched since then, or since the first."""
+def _events_since(monitor: Monitor, begin: pd.Timestamp) -> _Watched:
+    events = monitor.events_
+    events = events[(events["kind"] == "damage") & ~events["harmless"].astype(bool)]
     if not len(monitor.days_) or pd.isna(begin):
-        return monitor.events_.iloc[:0].assign(p_value=0.0), 0.0
+        return _Watched(events.iloc[:0], begin, 0.0)
     since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
-    chances = monitor.event_p_values(since)
-    table = monitor.events_.loc[chances.index].assign(p_value=chances)
-    table = table[~table["harmless"].astype(bool)]
-    return table, monitor.years_watched(min([since, *table.loc[table["end"].isna(), "start"]]))
+    events = events[events["end"].isna() | (events["end"] >= since)]
+    return _Watched(events, since, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]])))
+
+
+def tail_shape(excesses: Sequence[Array]) -> float | None:
+    """Shape of the generalised Pareto tail of excesses of baselines, each over its mean; None if they are few."""
+    if sum(map(len, excesses)) < FEWEST_EXCESSES:
+        return None
+    pooled = np.concatenate([one / one.mean() for one in excesses])
+    return float(np.clip(genpareto.fit(pooled, floc=0)[0], 0.0, HEAVIEST))
+
+
+def significant_bridges(p_values: Array, fdr: float) -> tuple[Array, float]:
+    """Which p values are significant at a false discovery rate, and the level up to which they are."""
+    if not len(p_values):
+        return np.zeros(0, dtype=bool), 0.0
+    found = false_discovery_control(p_values) <= fdr
+    return found, fdr * max(np.count_nonzero(found), 1) / len(p_values)
 
 
 def without_zone(stamp: pd.Timestamp) -> pd.Timestamp:

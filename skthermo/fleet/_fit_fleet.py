@@ -16,9 +16,9 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of, unpickled
-from skthermo.fleet._crew import work_off
 from skthermo.fleet._fleet import Fleet, named, warn_of_bridges
-from skthermo.fleet._kept import Kept
+from skthermo.fleet._storage import Storage
+from skthermo.fleet._workers import run_tasks
 from skthermo.monitoring import Monitor
 
 
@@ -72,7 +72,7 @@ def fit_fleet(
     -----
     UserWarning
         If bridges could not be fitted: how many and why; one that counts the warnings of all bridges by kind; if a
-        monitor that has judged records is replaced, because its bridge has changed.
+        monitor that has evaluated records is replaced, because its bridge has changed.
 
     See Also
     --------
@@ -88,9 +88,9 @@ def fit_fleet(
     one job and no such back end, all runs in this process, which nothing protects. The back end "multiprocessing" of
     joblib hangs when a process is killed.
 
-    What has changed is told by content: records, the estimator with its model, versions, and the code of ``monitor``.
-    Code that other modules hold is not looked into: use another folder when it has changed. Files are read with
-    ``pickle``, which can run any code: use only folders of your own.
+    Changes are found by content: records, the estimator with its model, versions, and the code of ``monitor``. Code
+    that other modules hold is not looked into: use another folder when it has changed. Files are read with ``pickle``,
+    which can run any code: use only folders of your own.
 
     Examples
     --------
@@ -112,17 +112,17 @@ def fit_fleet(
             f"monitor is {type(monitor).__name__!r}; expected a function of a fitted estimator that gives a Monitor"
         )
     base = _base(random_state)
-    kept = Kept(None if folder is None else check_path(folder, "folder"))
-    with kept.alone():
-        kept.read()
+    storage = Storage(None if folder is None else check_path(folder, "folder"))
+    with storage.alone():
+        storage.read()
         tasks = {
-            name: BridgeFit(name, makers[name], records[name], monitor, seed_of(base, name), kept.outcomes.get(name))
+            name: BridgeFit(name, makers[name], records[name], monitor, seed_of(base, name), storage.outcomes.get(name))
             for name in makers
         }
-        kept.outcomes = {name: kept.outcomes[name] for name in makers if name in kept.outcomes}
+        storage.outcomes = {name: storage.outcomes[name] for name in makers if name in storage.outcomes}
         n_done, begun_again = 0, []
         try:
-            work = work_off(tasks, n_jobs)
+            work = run_tasks(tasks, n_jobs)
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
                 if not result.is_as_before:
                     before = tasks[name].known
@@ -131,36 +131,36 @@ def fit_fleet(
                         and before.standing["n_evaluated"]
                         and before.content != result.outcome.content
                     ):
-                        kept.set_aside(name)
+                        storage.set_aside(name)
                         begun_again.append(name)
-                    kept.put(result.outcome, result.fitted)
+                    storage.put(result.outcome, result.fitted)
                 elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
-                    _restore(kept, name)
+                    _restore(storage, name)
                 n_done += 1
         except KeyboardInterrupt as interrupt:
-            interrupt.add_note(_where_to_go_on(n_done, len(tasks), kept.folder))
+            interrupt.add_note(_where_to_go_on(n_done, len(tasks), storage.folder))
             raise
-    kept.outcomes = {name: kept.outcomes[name] for name in makers}
-    fleet = Fleet._of(kept)
+    storage.outcomes = {name: storage.outcomes[name] for name in makers}
+    fleet = Fleet._of(storage)
     warn_of_bridges(fleet)
     if begun_again:
         warn_user(
             f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "
             f"monitor have changed ({named(begun_again)}): their monitors begin again, without the records that they "
-            "had judged and their events; files ending in .replaced hold these: expected Fleet(folder) to go on with "
-            "them as they were",
+            "had evaluated and their events; files ending in .replaced hold these: expected Fleet(folder) to go on "
+            "with them as they were",
             SkthermoWarning,
             "monitors that begin again",
         )
     return fleet
 
 
-def _restore(kept: Kept, name: Hashable) -> None:
+def _restore(storage: Storage, name: Hashable) -> None:
     """Take back what was said of a bridge while its records could not be had."""
-    fitted = kept.fitted(name)
+    fitted = storage.fitted(name)
     watch = unpickled(fitted)[1]
     standing = {} if watch is None else {"standing": standing_of(watch)}
-    kept.put(replace(kept.outcomes[name], failures=(), **standing), fitted)
+    storage.put(replace(storage.outcomes[name], failures=(), **standing), fitted)
 
 
 def _base(random_state: Any) -> int:

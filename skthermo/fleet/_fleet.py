@@ -17,9 +17,9 @@ from skthermo._io import with_progress
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, pickled, unpickled
-from skthermo.fleet._crew import work_off
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
-from skthermo.fleet._kept import Kept
+from skthermo.fleet._storage import Storage
+from skthermo.fleet._workers import run_tasks
 from skthermo.monitoring import Monitor
 
 MOST_NAMED = 5  # bridges or kinds in a sentence
@@ -55,7 +55,7 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
         state = watched["state"]
         yield (
             f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not evaluated').sum()} "
-            f"cannot judge, {(state == 'healthy').sum()} saw no change in their newest record."
+            f"cannot evaluate it, {(state == 'healthy').sum()} saw no change in their newest record."
         )
         if (state == "alarm").any():
             yield f"In alarm: {named(watched.index[state == 'alarm'])}."
@@ -97,7 +97,7 @@ class Fleet:
     Attributes
     ----------
     chains, monitors : mapping of name to estimator and to Monitor
-        Those that are fitted, read when asked for, each time anew: what is done to them is not kept.
+        Those that are fitted, read when asked for, each time anew: what is done to them is not storage.
     table : DataFrame
         A row for each bridge, of which the columns are listed below.
     events : DataFrame
@@ -127,11 +127,11 @@ class Fleet:
     in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor ("healthy",
     "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the
     newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``; ``alarm_rate``, the share of
-    judged records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest
+    evaluated records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest
     change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted
     objects.
 
-    A bridge whose new records could not be judged is "not evaluated", or "alarm" while an event is open.
+    A bridge whose new records could not be evaluated is "not evaluated", or "alarm" while an event is open.
 
     Examples
     --------
@@ -146,15 +146,15 @@ class Fleet:
         path = check_path(folder, "folder")
         if not path.is_dir():
             raise ValueError(f"there is no folder {str(path)!r}; expected that of a fit_fleet")
-        self._kept = Kept(path)
-        self._kept.read()
-        if not self._kept.outcomes:
+        self._storage = Storage(path)
+        self._storage.read()
+        if not self._storage.outcomes:
             raise ValueError(f"the folder {str(path)!r} holds no bridge; expected that of a fit_fleet")
 
     @classmethod
-    def _of(cls, kept: Kept) -> Fleet:
+    def _of(cls, storage: Storage) -> Fleet:
         fleet = cls.__new__(cls)
-        fleet._kept = kept
+        fleet._storage = storage
         return fleet
 
     def __len__(self) -> int:
@@ -163,25 +163,25 @@ class Fleet:
     def __repr__(self) -> str:
         states = self._states()
         watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
-        told = {"alarm": "in alarm", "not evaluated": "not evaluated"}
-        watched += [f"{states[state]} {words}" for state, words in told.items() if states.get(state)]
+        words = {"alarm": "in alarm", "not evaluated": "not evaluated"}
+        watched += [f"{states[state]} {text}" for state, text in words.items() if states.get(state)]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
 
     @property
     def _outcomes(self) -> dict[Hashable, BridgeOutcome]:
-        return self._kept.outcomes
+        return self._storage.outcomes
 
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
         """Fitted estimators by name, read when asked for."""
-        return ReadWhenAsked({n: (self._kept, 0) for n, one in self._outcomes.items() if one.is_fitted})
+        return ReadWhenAsked({n: (self._storage, 0) for n, one in self._outcomes.items() if one.is_fitted})
 
     @property
     def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
         watched = (n for n, one in self._outcomes.items() if one.is_fitted and one.is_watched)
-        return ReadWhenAsked(dict.fromkeys(watched, (self._kept, 1)))
+        return ReadWhenAsked(dict.fromkeys(watched, (self._storage, 1)))
 
     @property
     def table(self) -> pd.DataFrame:
@@ -217,8 +217,8 @@ class Fleet:
         rows = [
             (name, stage, kind, text, times)
             for name, one in self._outcomes.items()
-            for stage, told in (("fit", one.warnings), ("update", one.late_warnings))
-            for kind, text, times in told
+            for stage, warned in (("fit", one.warnings), ("update", one.late_warnings))
+            for kind, text, times in warned
         ]
         return pd.DataFrame(rows, columns=["bridge", "stage", "kind", "message", "times"])
 
@@ -235,7 +235,7 @@ class Fleet:
     def update(
         self, records: Mapping[Hashable, Any], n_jobs: int | None = None, *, progress: bool | None = None
     ) -> pd.DataFrame:
-        """Judge records that came since, each bridge by its own monitor; each fails alone.
+        """Evaluate records that came since, each bridge by its own monitor; each fails alone.
 
         Parameters
         ----------
@@ -250,8 +250,8 @@ class Fleet:
         Returns
         -------
         DataFrame
-            A row for each record that was judged: ``bridge``, ``time`` and the columns of
-            `~skthermo.monitoring.Monitor.update`. A bridge whose records could not be judged has one row without a
+            A row for each record that was evaluated: ``bridge``, ``time`` and the columns of
+            `~skthermo.monitoring.Monitor.update`. A bridge whose records could not be evaluated has one row without a
             time: "not evaluated", and the error as the reason.
 
         Raises
@@ -268,7 +268,7 @@ class Fleet:
 
         Notes
         -----
-        Monitors that were fitted in a folder are kept there as soon as they have judged their records. Records that
+        Monitors that were fitted in a folder are kept there as soon as they have evaluated their records. Records that
         come again are known, so that an update that was stopped is simply called again.
         """
         check_jobs(n_jobs)
@@ -279,15 +279,17 @@ class Fleet:
                 f"{len(self)} bridges"
             )
         answers: dict[Hashable, pd.DataFrame] = {}
-        kept = self._kept
-        with kept.alone():
-            known = set(kept.outcomes)
-            kept.read()  # another process may have updated the folder since
-            kept.outcomes = {name: one for name, one in kept.outcomes.items() if name in known}
-            tasks = {name: BridgeUpdate(name, kept.outcomes[name], given, kept) for name, given in records.items()}
-            work = work_off(tasks, n_jobs)
+        storage = self._storage
+        with storage.alone():
+            known = set(storage.outcomes)
+            storage.read()  # another process may have updated the folder since
+            storage.outcomes = {name: one for name, one in storage.outcomes.items() if name in known}
+            tasks = {
+                name: BridgeUpdate(name, storage.outcomes[name], given, storage) for name, given in records.items()
+            }
+            work = run_tasks(tasks, n_jobs)
             for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
-                kept.put(result.outcome, result.fitted)
+                storage.put(result.outcome, result.fitted)
                 answers[name] = result.answers
         warn_of_bridges(self, list(records), "update")
         tables = [answers[name] for name in records if len(answers[name])]
@@ -319,36 +321,36 @@ class Fleet:
             raise ValueError(
                 f"{bridge!r:.100} is no bridge with a monitor; expected one of {list(self.monitors)!r:.200}"
             )
-        kept = self._kept
-        with kept.alone():
-            chain, monitor = unpickled(kept.fitted(bridge))
+        storage = self._storage
+        with storage.alone():
+            chain, monitor = unpickled(storage.fitted(bridge))
             monitor.acknowledge(event, harmless=harmless, note=note)
-            kept.put(replace(kept.outcomes[bridge], events=monitor.events_), pickled((chain, monitor)))
+            storage.put(replace(storage.outcomes[bridge], events=monitor.events_), pickled((chain, monitor)))
 
-    def discoveries(self, share: float = 0.1, *, days: float = 365.25) -> Discoveries:
-        """Which events stand out among those of all bridges.
+    def discoveries(self, fdr: float = 0.1, *, days: float = 365.25) -> Discoveries:
+        """Which open events are significant after correction for many bridges.
 
         Parameters
         ----------
-        share : float, default=0.1
-            Share of false ones among the bridges that are called, on average.
+        fdr : float, default=0.1
+            False discovery rate: share of healthy ones among the significant bridges, on average.
         days : float, default=365.25
             Events that are open, or ended within so many days before the newest record of all bridges, are compared.
 
         Returns
         -------
         Discoveries
-            Events with their p values, and which bridges are called.
+            Events with their p values, and which bridges are significant.
 
         Raises
         ------
         ValueError
-            If no bridge has a monitor, or the share is not between 0 and 1.
+            If no bridge has a monitor, or ``fdr`` is not between 0 and 1.
         """
         if not len(self.monitors):
             raise ValueError("no bridge has a monitor; expected fit_fleet(..., monitor=function of a chain)")
         standings = {name: self._outcomes[name].standing for name in self.monitors}
-        return discover(self.monitors, standings, share, days)
+        return discover(self.monitors, standings, fdr, days)
 
     def summary(self) -> str:
         """How many bridges were fitted, failed, and are in which state, in a few lines.
@@ -365,14 +367,14 @@ class Fleet:
 
 
 class ReadWhenAsked(Mapping):
-    """Fitted objects by name, each read from what is kept when it is asked for."""
+    """Fitted objects by name, each read from the storage when it is asked for."""
 
-    def __init__(self, places: Mapping[Hashable, tuple[Kept, int]]):
+    def __init__(self, places: Mapping[Hashable, tuple[Storage, int]]):
         self._places = places
 
     def __getitem__(self, name: Hashable) -> Any:
-        kept, place = self._places[name]
-        return unpickled(kept.fitted(name))[place]
+        storage, place = self._places[name]
+        return unpickled(storage.fitted(name))[place]
 
     def __iter__(self) -> Iterator[Hashable]:
         return iter(self._places)

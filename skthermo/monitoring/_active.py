@@ -21,8 +21,8 @@ from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
+from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import EventRule, Promise, promised_rule, release_level
 from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
 
 DECIMALS = 6  # of a damage index
@@ -90,9 +90,9 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the responses; records go through ``corrections`` before. Without a direction, all changes are damage. There is a
-    promise for each kind of event that has a damage index. After a new baseline, ``prior`` are records from before the
-    intervention, which was complete ``since`` then.
+    the responses; records go through ``corrections`` before. Without a direction, all changes are damage. There is an
+    estimate of false alarms for each kind of event that has a damage index. After a new baseline, ``prior`` are records
+    from before the intervention, which was complete ``since`` then.
     """
 
     detector: Any
@@ -105,7 +105,7 @@ class ActiveDetector(SavesFrames):
     weather: TrainingRange
     corrections: Corrections
     direction: Direction | None
-    promises: dict[str, Promise]
+    estimates: dict[str, FalseAlarmEstimate]
     prior: pd.DataFrame | None = None
     since: pd.Timestamp | None = None
 
@@ -121,6 +121,7 @@ class ActiveDetector(SavesFrames):
         *,
         by_direction: bool,
         per_year: float,
+        persistence: int = 1,
     ) -> ActiveDetector:
         """Learned from what the detector was fitted on; ``by_direction`` tells softening from stiffening."""
         temperatures = [name for name in trained.columns if name not in targets]
@@ -129,27 +130,28 @@ class ActiveDetector(SavesFrames):
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind = None, {DAMAGE: index}
+        direction, by_kind, release = None, {DAMAGE: index}, release_level(index, DAY, persistence)
         if by_direction:
             direction = Direction.of(detector, trained[columns], targets)
-            stiffer = direction.of_rows(trained[columns]) < 0
-            by_kind = {DAMAGE: index.mask(stiffer & index.notna(), 0.0)}
-            by_kind[STIFFENING] = index.mask(~stiffer & index.notna(), 0.0)
-        release = release_level(index, DAY)
-        promises = {kind: promised_rule(one, per_year, hold=DAY, release=release) for kind, one in by_kind.items()}
-        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, promises)
+            is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
+            by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
+        estimates = {
+            kind: estimate_false_alarms(one, per_year, hold=DAY, persistence=persistence, release=release)
+            for kind, one in by_kind.items()
+        }
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, estimates)
         return cls(detector, trained, *parts)
 
     @property
     def rules(self) -> dict[str, EventRule]:
         """By which events of each kind open and close."""
         set_aside = EventRule(threshold=0.5, release=0.5, hold=pd.Timedelta(0))
-        return {kind: promise.rule for kind, promise in self.promises.items()} | {MEASUREMENT: set_aside}
+        return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
 
     @property
     def threshold(self) -> float:
         """A damage event opens with an index above it."""
-        return self.promises[DAMAGE].rule.threshold
+        return self.estimates[DAMAGE].rule.threshold
 
     @property
     def baseline_index(self) -> pd.Series:
@@ -172,7 +174,7 @@ class ActiveDetector(SavesFrames):
         if self.direction is None:
             return {DAMAGE: index}
         with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.promises[DAMAGE].rule.release)
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimates[DAMAGE].rule.release)
         stiffer = np.zeros(len(index), dtype=bool)
         if wanted.any():
             begin = self.memory.start(records.index.asi8, first)

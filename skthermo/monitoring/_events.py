@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo.monitoring._promise import EventRule, EventState
+from skthermo.monitoring._false_alarms import EventRule, EventState
 
 DAMAGE, STIFFENING, MEASUREMENT = "damage", "stiffening", "measurement or structure"
 """Kinds of events; the last one is that of responses set aside as implausible or stuck."""
@@ -45,13 +45,14 @@ class EventLog:
         times: NDArray[np.int64],
     ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
-        is_open, states = {}, dict(self.states)
+        is_open, levels, states = {}, {}, dict(self.states)
         for kind, index in by_kind.items():
-            is_open[kind], states[kind] = rules[kind].follow(states.get(kind, EventState()), index, times)
+            before = states.get(kind, EventState())
+            is_open[kind], levels[kind], states[kind] = rules[kind].follow(before, index, times)
         events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
-        for kind, index in by_kind.items():
+        for kind, level in levels.items():
             own = [n for n, event in enumerate(events) if event.kind == kind and event.end is None]
             begins = np.searchsorted(times, [events[n].start for n in own])
             for n, begin, end in zip(own, begins, [*begins, len(times)][1:], strict=True):
@@ -59,7 +60,7 @@ class EventLog:
                 numbers[kind][inside] = n + 1
                 closing = np.flatnonzero(~is_open[kind][begin:end])
                 end_time = int(times[begin + closing[0]]) if len(closing) else None
-                events[n] = _grown(events[n], index, times, modes[kind], inside, end_time)
+                events[n] = _grown(events[n], level, times, modes[kind], inside, end_time)
         return numbers, EventLog(states, tuple(events))
 
     def is_open_after(
@@ -88,18 +89,18 @@ class EventLog:
 
 def _grown(
     event: Event,
-    index: Array,
+    level: Array,
     times: NDArray[np.int64],
     modes: Sequence[str],
     inside: NDArray[np.intp],
     end: int | None,
 ) -> Event:
     """The event with the records in which it was open."""
-    evaluated = inside[~np.isnan(index[inside])]
+    evaluated = inside[~np.isnan(level[inside])]
     if len(evaluated):
-        peak = evaluated[np.argmax(index[evaluated])]
-        if index[peak] > event.peak:
-            found = {"peak": float(index[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
+        peak = evaluated[np.argmax(level[evaluated])]
+        if level[peak] > event.peak:
+            found = {"peak": float(level[peak]), "peak_time": int(times[peak]), "modes": modes[peak]}
             event = replace(event, **found)
     return replace(event, end=end, n_alarms=event.n_alarms + len(evaluated))
 

@@ -17,6 +17,7 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.frames import positions_of
 from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import counted, probability_text
 from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
@@ -33,15 +34,15 @@ from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, Acknowledgement, event_table
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
-from skthermo.monitoring._in_words import in_words
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._promise import Promise
 from skthermo.monitoring._records import RecordStore, read_records
 from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 MOST_CAUSES = 3  # in a warning
+MOST_EVENTS = 5  # in a summary, the latest ones
 
 
 class Monitor(SavesFrames, Estimator):
@@ -63,6 +64,9 @@ class Monitor(SavesFrames, Estimator):
         A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
     false_alarms_per_year : float, default=1.0
         Damage events that a healthy structure has in a year, on average.
+    persistence : int, default=3
+        Number of evaluated records in a row above the threshold by which an event opens: single outliers raise no
+        alarm, and damage is found by so many records later. 1 means that a single record does.
     direction : {"both", "softening"}, default="both"
         Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
     max_delay : str or timedelta, default="7D"
@@ -94,16 +98,17 @@ class Monitor(SavesFrames, Estimator):
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
     threshold_ : float
-        A damage event opens with an index above it.
+        A damage event opens with an index above it, of ``persistence`` evaluated records in a row.
     clear_threshold_ : float
-        An event closes when the index has stayed at or below it.
+        An event closes when, for a day, no ``persistence`` records in a row have been above it.
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage", "stiffening", or "measurement or structure": responses
         that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it is open),
-        ``peak`` (highest index; of the last kind, the largest number of responses set aside), ``peak_time``, ``modes``,
-        ``n_alarms`` (records while it was open), ``acknowledged``, ``harmless`` and ``note``.
+        ``peak`` (highest index that ``persistence`` records in a row reached; of the last kind, the largest number of
+        responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open), ``acknowledged``,
+        ``harmless`` and ``note``.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
@@ -179,6 +184,7 @@ class Monitor(SavesFrames, Estimator):
         "targets": ["array-like", None],
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
+        "persistence": [Interval(Integral, 1, None, closed="left")],
         "direction": [StrOptions({"both", "softening"})],
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
@@ -198,6 +204,7 @@ class Monitor(SavesFrames, Estimator):
         reference: Sequence[Hashable] | None = None,
         fem: Any = None,
         false_alarms_per_year: float = 1.0,
+        persistence: int = 3,
         direction: Literal["both", "softening"] = "both",
         max_delay: str | timedelta = "7D",
         max_jump: str | timedelta | None = None,
@@ -212,6 +219,7 @@ class Monitor(SavesFrames, Estimator):
         self.reference = reference
         self.fem = fem
         self.false_alarms_per_year = false_alarms_per_year
+        self.persistence = persistence
         self.direction = direction
         self.max_delay = max_delay
         self.max_jump = max_jump
@@ -374,13 +382,16 @@ class Monitor(SavesFrames, Estimator):
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
-    def event_p_values(self, since: Any = None) -> pd.Series:
+    def event_p_values(self, since: Any = None, *, tail_shape: float | None = None) -> pd.Series:
         """How probable so high a peak is for a healthy structure, by event.
 
         Parameters
         ----------
         since : str or Timestamp, optional
             Only events that are open, or have ended since then; by default all.
+        tail_shape : float, optional
+            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges (`Fleet.discoveries`);
+            0 is an exponential tail. By default the baseline decides whether that is heavy enough.
 
         Returns
         -------
@@ -390,12 +401,11 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        A p value: for a healthy structure, that of its highest event is at most p with probability p or less, if
-        squared peaks have an exponential tail, as those of normal residuals have. Single outliers make heavier tails. A
-        detector that needs several records, such as ``WindowedAlarm("5D", rule="m-of-n")``, is not moved by them, and
-        where the baseline shows one, a heavier tail is taken. The chance comes from the highest excursions of the
-        baseline, by which the detector in charge when the event began was given its threshold; however few these are,
-        that they are few is allowed for.
+        For a healthy structure, the p value of its highest event is at most p with probability p or less, if squared
+        peaks over their scale in the season have an exponential tail, as those of normal residuals have. Single
+        outliers are no peaks where ``persistence`` is more than 1; where the baseline shows a heavier tail, that is
+        taken. The p value comes from the highest excursions of the baseline, by which the detector in charge when the
+        event began was given its threshold, and allows for their number, however small.
         """
         check_is_fitted(self)
         events = self.events_[self.events_["kind"] == DAMAGE]
@@ -404,13 +414,13 @@ class Monitor(SavesFrames, Estimator):
             events = events[events["end"].isna() | (events["end"] >= begin)]
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
-        chances = [
-            [promise for taken, promise in self._state.promises if taken <= event["start"]][-1].chance(
-                event["peak"], n_years
+        p_values = [
+            [estimate for taken, estimate in self._state.estimates if taken <= event["start"]][-1].p_value(
+                event["peak"], n_years, tail_shape
             )
             for _, event in events.iterrows()
         ]
-        return pd.Series(chances, events.index, dtype=float, name="chance")
+        return pd.Series(p_values, events.index, dtype=float, name="p_value")
 
     def acknowledge(self, event: int, *, harmless: bool, note: str = "") -> None:
         """Record what the owner has found out about an event.
@@ -539,6 +549,7 @@ class Monitor(SavesFrames, Estimator):
             Memory.of(detector) if self.lookback is None else Memory.of_time(_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
+            persistence=self.persistence,
         )
 
     def _take_over(self, retraining: Retraining) -> None:
@@ -594,7 +605,30 @@ class Monitor(SavesFrames, Estimator):
             State, records, events, sensors and drift.
         """
         check_is_fitted(self)
-        return in_words(self)
+        counts, drift = self.counts_, self.drift_
+        lines = [
+            f"state: {self.state()} ({f'newest record {self.last_}' if len(self.records_) else 'no record came yet'})",
+            f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
+            f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
+            f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
+            f"damage events: open with {counted(self.persistence, 'record')} in a row above {self.threshold_:.4g}, "
+            f"close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            *_events_in_words(self.events_),
+        ]
+        faults = self.faults_
+        for _, fault in faults[faults["until"].isna()].iterrows():
+            lines.append(f"sensor: {fault['column']} {fault['kind']} since {fault['since']}")
+        if drift is not None:
+            found = "the structure drifts" if drift["significant"].any() else "none is seen"
+            lines.append(f"drift: {found} (probability by chance {probability_text(drift['p_value'].iloc[0])})")
+            lines += [
+                f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
+                f"{'; beyond the limit' if one['beyond_limit'] else ''}"
+                for group, one in drift[drift["significant"]].iterrows()
+            ]
+            n_days = self._state.corrections.drift.n_left_out
+            lines += [f"drift: not followed for {counted(n_days, 'day')}, as responses changed at once"] * (n_days > 0)
+        return "\n".join(lines)
 
     @property
     def detector_(self) -> Any:
@@ -612,9 +646,9 @@ class Monitor(SavesFrames, Estimator):
         return self._active.memory
 
     @property
-    def false_alarm_estimate_(self) -> Promise:
+    def false_alarm_estimate_(self) -> FalseAlarmEstimate:
         """How the threshold was set, and how many false events to expect."""
-        return self._active.promises[DAMAGE]
+        return self._active.estimates[DAMAGE]
 
     @property
     def threshold_(self) -> float:
@@ -724,6 +758,22 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     if any(name not in columns for name in wanted) or len(set(wanted)) < len(wanted):
         raise ValueError(f"{what} is {wanted}; expected different names among the columns {columns}")
     return wanted
+
+
+def _events_in_words(events: pd.DataFrame) -> list[str]:
+    """A line for each of the latest events, and one for those that nobody has acknowledged."""
+    if not len(events):
+        return ["events: none"]
+    lines, n_earlier = [], max(len(events) - MOST_EVENTS, 0)
+    for number, event in events.iloc[n_earlier:].iterrows():
+        until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
+        said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
+        note = f" ({event['note']})" if event["note"] else ""
+        peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
+        lines.append(f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}")
+    lines += [f"events: {n_earlier} earlier ones are in events_"] if n_earlier else []
+    waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
+    return lines + ([f"ended, not acknowledged: event {', '.join(map(str, waiting))}"] if len(waiting) else [])
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:

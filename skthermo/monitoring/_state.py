@@ -16,7 +16,7 @@ from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, Acknowledgement, EventLog
-from skthermo.monitoring._promise import Promise
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
 
 ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
@@ -45,7 +45,7 @@ class MonitorState(SavesFrames):
     log: EventLog
     evaluations: pd.DataFrame
     days: pd.DataFrame
-    promises: tuple[tuple[pd.Timestamp, Promise], ...]
+    estimates: tuple[tuple[pd.Timestamp, FalseAlarmEstimate], ...]
     acknowledgements: tuple[Acknowledgement, ...] = ()
     n_repeated: int = 0
     n_late: int = 0
@@ -60,7 +60,7 @@ class MonitorState(SavesFrames):
         checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
         memory = active.corrections.cleaned(store.baseline.iloc[start:])[list(active.trained.columns)]
         days = _days_of(nothing, np.zeros(0, dtype=np.int64))
-        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.promises[DAMAGE]),))
+        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimates[DAMAGE]),))
 
     @property
     def corrections(self) -> CorrectionState:
@@ -161,9 +161,9 @@ class MonitorState(SavesFrames):
             log, start = log.ended(end), active.corrections.start()
             points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
         day = points[-1].day
-        promises = (*self.promises, (self.store.last, active.promises[DAMAGE]))
+        estimates = (*self.estimates, (self.store.last, active.estimates[DAMAGE]))
         kept = self.evaluations[self.evaluations.index < day]
-        state = replace(self, checkpoints=points, log=log, evaluations=kept, promises=promises)
+        state = replace(self, checkpoints=points, log=log, evaluations=kept, estimates=estimates)
         today = self.store.kept.index[self.store.kept.index >= day]
         return state.advanced(active, today)[0] if len(today) else state
 

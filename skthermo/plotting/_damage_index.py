@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
@@ -11,19 +11,18 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
+from skthermo._tables.arrays import is_real
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import date_axis, figure_legend, on_axis
 from skthermo.plotting._display import Display
 from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
 from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
-from skthermo.plotting._tables import as_table, check_study, in_time, names_from
+from skthermo.plotting._tables import as_table, in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
-
-    from skthermo.studies import DetectabilityStudy
 
 
 @dataclass(eq=False, repr=False)
@@ -33,7 +32,7 @@ class DamageIndexDisplay(Display):
     Records without an index, which are not evaluated, are grey ticks at the bottom, with their number. A few indices
     far above the others do not stretch the axis: triangles at its edge and a number stand for them.
 
-    It is best made by `from_estimator`, `from_predictions`, or `from_study` with a panel for each detector.
+    It is best made by `from_estimator` or `from_predictions`.
 
     Parameters
     ----------
@@ -111,55 +110,6 @@ class DamageIndexDisplay(Display):
         indices = {label: index_of(estimator, records) for label, records in tables.items()}
         name = DAMAGE_INDEX if isinstance(last, MahalanobisDetector) else "damage index"
         return cls.from_predictions(indices, threshold, **{"label": name, **options})
-
-    @classmethod
-    def from_study(
-        cls,
-        study: DetectabilityStudy,
-        scenarios: Sequence[str] | None = None,
-        *,
-        detectors: Sequence[str] | None = None,
-        source: str = "simulated",
-        **options: object,
-    ) -> DamageIndexDisplay:
-        """Draw the records of the first repeat of a study, one panel for each detector.
-
-        Parameters
-        ----------
-        study : DetectabilityStudy
-            With results.
-        scenarios : sequence of str, optional
-            Those that are drawn beside each other in each panel; by default all.
-        detectors : sequence of str, optional
-            Those that are drawn; by default all that did not fail.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        **options : dict
-            ``onset`` and ``label`` of the display, and options of `plot`.
-
-        Returns
-        -------
-        DamageIndexDisplay
-
-        Raises
-        ------
-        NotFittedError
-            If the study has no results.
-        ValueError
-            If a detector or scenario has no records of this source, or a detector no threshold.
-        """
-        check_study(study)
-        keys = [key for key in study.indices_ if key[2] == source]
-        chosen = names_from(detectors, dict.fromkeys(key[0] for key in keys), "detectors")
-        states = names_from(scenarios, dict.fromkeys(key[1] for key in keys), "scenarios")
-        shown = {
-            name: {state: study.indices_[name, state, source] for state in states if (name, state, source) in keys}
-            for name in chosen
-        }
-        thresholds = {name: study.thresholds_[name] for name in chosen}
-        is_distance = all(isinstance(last_step(study.detectors_[name]), MahalanobisDetector) for name in chosen)
-        options = {"label": DAMAGE_INDEX if is_distance else "damage index"} | options
-        return cls.from_predictions(shown, thresholds, **options)
 
     @classmethod
     def from_predictions(
@@ -282,10 +232,7 @@ def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:
 
 def as_threshold(value: object, title: str) -> float:
     """A threshold as a number."""
-    try:
-        threshold = float(value)
-    except (TypeError, ValueError):
-        threshold = float("nan")
-    if not abs(threshold) < float("inf"):
+    threshold = float(value) if is_real(value) else np.nan
+    if not np.isfinite(threshold):
         raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
     return threshold

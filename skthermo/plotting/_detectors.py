@@ -408,7 +408,7 @@ def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None
 
 
 def small_rates(ax: Axes, drawn: Array) -> None:
-    """An axis from 0 to the largest of some rates in percent, whose square root is even: small ones are told apart."""
+    """An axis from 0 to the largest of some rates in percent, on a square-root scale, which spreads small ones."""
     largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
     functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []

@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import check_same_rows, column_names
+from skthermo._tables.frames import check_same_rows
 from skthermo.plotting._axes import date_axis, draw_marks, figure_legend, panel_names, size_in_time
 from skthermo.plotting._display import Display
 from skthermo.plotting._limits import hold_outliers
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 FREQUENCIES, PARAMETERS = ("measured", "predicted"), ("from frequencies", "from temperatures")
-KINDS = ("time", "points", "lines", "scatter", "temperature")
+KINDS = ("time", "points", "lines", "scatter")
 
 
 @dataclass(eq=False, repr=False)
@@ -118,8 +118,8 @@ class PredictionDisplay(Display):
             Measured frequencies in Hz; needed if X is given.
         what : {"frequencies", "parameters"}, default="frequencies"
             Parameters are those that a chain estimates from the frequencies, and predicts from the temperatures.
-        sensor : hashable or int, optional
-            Name of a temperature, or its number in an array: what is drawn goes over it instead of in time.
+        sensor : hashable, optional
+            Name of a temperature, "T1", "T2", ... in an array: what is drawn goes over it instead of in time.
         confidence : float, optional
             Probability of the intervals of frequencies in time, for an estimator with ``predict_interval``; None draws
             none.
@@ -146,7 +146,10 @@ class PredictionDisplay(Display):
         if what not in ("frequencies", "parameters"):
             raise ValueError(f"what is {what!r}; expected 'frequencies' or 'parameters'")
         if sensor is not None:
-            options["temperature"] = chosen_sensor(X, sensor)
+            temperatures = as_table(X, "temperatures", "T")
+            if sensor not in temperatures:
+                raise ValueError(f"sensor is {sensor!r}; expected one of {list(temperatures)}")
+            options["temperature"] = temperatures[sensor]
         if what == "parameters":
             tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
             measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
@@ -225,7 +228,7 @@ class PredictionDisplay(Display):
         self,
         ax: Axes | np.ndarray | None = None,
         *,
-        kind: Literal["time", "points", "lines", "scatter", "temperature"] | None = None,
+        kind: Literal["time", "points", "lines", "scatter"] = "time",
         titles: Sequence[str] | None = None,
         marks: Mapping[str, object] | None = None,
         n_columns: int | None = None,
@@ -236,9 +239,9 @@ class PredictionDisplay(Display):
         ----------
         ax : matplotlib's Axes or array of Axes, optional
             One for each column. A new figure by default.
-        kind : {"time", "points", "lines", "scatter", "temperature"}, optional
-            By default "temperature" if there is one, or else "time": measured points and predicted lines in time.
-            "points" or "lines" draw both so; "scatter" draws the first predicted value over the measured one.
+        kind : {"time", "points", "lines", "scatter"}, default="time"
+            "time" draws measured points and predicted lines, "points" or "lines" both so, and all of them in time where
+            no temperature is given; "scatter" draws the first predicted value over the measured one.
         titles : sequence of str, optional
             Names of the panels; by default those of the columns.
         marks : mapping of str to time or number, optional
@@ -256,11 +259,10 @@ class PredictionDisplay(Display):
         ValueError
             If ``kind`` is something else, or a mark is not on the axis.
         """
-        kind = kind or ("time" if self.temperature is None else "temperature")
         if kind not in KINDS:
             raise ValueError(f"kind is {kind!r}; expected one of {KINDS}")
         names = panel_names(titles, list(self.measured.columns))
-        is_square = kind in ("scatter", "temperature")
+        is_square = kind == "scatter" or self.temperature is not None
         n_columns = n_columns or (1 if not is_square else 3 if kind == "scatter" or len(names) == 6 else 4)
         size = (3.3, 3.2) if is_square else size_in_time(len(names), n_columns)
         self._take_axes(ax, names, size, n_columns=n_columns, share_x=not is_square)
@@ -269,7 +271,7 @@ class PredictionDisplay(Display):
         if kind == "scatter":
             self._draw_scatter(names)
             return self
-        if kind == "temperature":
+        if self.temperature is not None:
             self._draw_over_temperature(names, n_columns)
         else:
             self._draw_in_time(names, kind)
@@ -312,8 +314,6 @@ class PredictionDisplay(Display):
             hold_outliers(one, also=[end[:, column] for end in ends])
 
     def _draw_over_temperature(self, names: Sequence[str], n_columns: int) -> None:
-        if self.temperature is None:
-            raise ValueError("kind is 'temperature', and no temperature is given; expected one")
         for number, (label, table) in enumerate(self._tables.items()):
             style = marker_style(number, len(table)) | {"alpha": 0.7 if number else 1.0}
             self._draw_lines(label, self.temperature.to_numpy(), table.to_numpy(), style)
@@ -348,15 +348,3 @@ def one_temperature(temperature: ArrayLike, measured: ArrayLike) -> pd.Series:
         raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
     is_named = getattr(temperature, "name", None) is not None or isinstance(temperature, pd.DataFrame)
     return table.iloc[:, 0].rename(table.columns[0] if is_named else None)
-
-
-def chosen_sensor(X: ArrayLike, sensor: Hashable) -> pd.Series:
-    """One column of the temperatures, by its name or, in an array, by its number."""
-    temperatures = as_table(X, "temperatures", "T")
-    if isinstance(X, pd.DataFrame):
-        if sensor not in X:
-            raise ValueError(f"sensor is {sensor!r}; expected one of {column_names(X, 'T')}")
-        return temperatures[sensor]
-    if not isinstance(sensor, int | np.integer) or not 0 <= sensor < temperatures.shape[1]:
-        raise ValueError(f"sensor is {sensor!r}; expected a column's number from 0 to {temperatures.shape[1] - 1}")
-    return temperatures.iloc[:, sensor]

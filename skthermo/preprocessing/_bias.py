@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import by_mode, is_model
 from skthermo._tables.arrays import as_floats, real_array
-from skthermo._tables.frames import check_columns, frame_like, warn_of_markers
+from skthermo._tables.frames import Table, check_columns, frame_like, warn_of_markers
 from skthermo._validation import HasMethods, StrOptions, check_array, check_is_fitted
 from skthermo.preprocessing._records import RecordTransformer
 
@@ -61,7 +61,7 @@ class BiasAligner(RecordTransformer):
         self.reference = reference
         self.method = method
 
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         check_columns(frame_like(X, values), "frequency")
         warn_of_markers(frame_like(X, values))
         self.mean_ = np.nanmean(values, axis=0)
@@ -72,7 +72,7 @@ class BiasAligner(RecordTransformer):
                     name = self.get_feature_names_out()[factors == 0][0]
                     raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         if self.method == "scale":
             return frame_like(X, values / self.mean_ * self.reference_)
         return frame_like(X, values - self.mean_ + self.reference_)

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
+from skthermo._tables.frames import Table
 from skthermo._tables.text import duration_text
 from skthermo._validation import check_is_fitted
 from skthermo.exceptions import FewRecordsWarning
@@ -108,13 +109,15 @@ class ExponentialMeans(PastFeatures):
         self.time_constants = time_constants
         self.sensors = sensors
 
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         stamps = self._remember(X, values)
         self.time_constants_ = _read_time_constants(self.time_constants, stamps is not None)
         self.sensors_ = self._read_sensors(values.shape[1])
         self.first_row_ = values[0 if stamps is None else stamps.argmin()].copy()
 
-    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(
+        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
+    ) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
             own, records = np.arange(len(values)), values
             times = own
@@ -165,14 +168,14 @@ class ExponentialMeans(PastFeatures):
             raise ValueError(f"sensors is {self.sensors!r}; expected different ones of the columns {columns}")
         return np.array([columns.index(one) for one in known], dtype=np.intp)
 
-    def _names(self, sensors: Sequence[Any]) -> list[Any]:
+    def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         if not len(sensors):
             return []
         chosen = [sensors[position] for position in self.sensors_]
         return [*sensors, *(f"{one}_mean{_as_label(constant)}" for constant in self.time_constants for one in chosen)]
 
     def _warn_of_no_past(
-        self, X: Any, values: NDArray, own: NDArray[np.int64], times: NDArray[np.int64]
+        self, X: Table, values: NDArray, own: NDArray[np.int64], times: NDArray[np.int64]
     ) -> NDArray[np.bool_] | np.bool_:
         """Warn if more than half of the rows have no record a time constant back, unless the first is that of `fit`;
         which rows these are."""

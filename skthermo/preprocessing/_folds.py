@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
+from skthermo._tables.frames import Table
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import _num_samples
 from skthermo.preprocessing._stamps import as_duration
@@ -69,7 +70,7 @@ class BlockedKFold(BaseCrossValidator):
         """
         return self.n_splits
 
-    def fold_of(self, X: Any) -> NDArray[np.intp]:
+    def fold_of(self, X: Table) -> NDArray[np.intp]:
         """The fold of every row, counted from 0.
 
         Parameters
@@ -102,7 +103,7 @@ class BlockedKFold(BaseCrossValidator):
             blocks = ranks * self.n_splits // n_rows
         return blocks % self.n_splits
 
-    def remembering(self, X: Any, n_records: float) -> BlockedKFold:
+    def remembering(self, X: Table, n_records: float) -> BlockedKFold:
         """Folds whose blocks hold so many records or more, as far as each fold keeps two blocks.
 
         Parameters
@@ -134,7 +135,7 @@ class BlockedKFold(BaseCrossValidator):
         wanted = pd.Timedelta(int(least * step), "ns")
         return self if wanted <= length else BlockedKFold(self.n_splits, block=wanted)
 
-    def length(self, X: Any) -> int | pd.Timedelta:
+    def length(self, X: Table) -> int | pd.Timedelta:
         """Length of a block of records.
 
         Parameters

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
-from skthermo._tables.frames import check_positions_are_names, frame_like, positions_of
+from skthermo._tables.frames import Table, check_positions_are_names, frame_like, positions_of
 from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import Interval
 from skthermo.preprocessing._records import RecordTransformer
@@ -101,7 +100,7 @@ class HampelFilter(RecordTransformer):
         self.n_deviations = n_deviations
         self.targets = targets
 
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         self.targets_, self.regression_ = np.arange(values.shape[1]), None
         if self.targets is not None:
             check_positions_are_names(self.targets, getattr(X, "columns", ()))
@@ -114,7 +113,7 @@ class HampelFilter(RecordTransformer):
         self.deviations_[self.targets_] = np.nan_to_num(robust_deviation(distances))
         self.n_removed_[self.targets_] = self._far(distances, local).sum(axis=0)
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         cleaned = values.copy()
         far = np.zeros(values.shape, dtype=bool)
         far[:, self.targets_] = self._far(*self._distances(X, values))
@@ -124,7 +123,7 @@ class HampelFilter(RecordTransformer):
     def _validated(self, X: ArrayLike, *, reset: bool) -> NDArray:
         return super()._validated(X, reset=reset, ensure_min_features=2 if reset and self.targets is not None else 1)
 
-    def _distances(self, X: Any, values: NDArray) -> tuple[Array, Array]:
+    def _distances(self, X: Table, values: NDArray) -> tuple[Array, Array]:
         """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""
         rest = as_floats(values)[:, self.targets_]
         if self.regression_ is not None:
@@ -136,7 +135,7 @@ class HampelFilter(RecordTransformer):
         with np.errstate(invalid="ignore"):
             return np.abs(distances) > self.n_deviations * np.fmax(local, self.deviations_[self.targets_])
 
-    def _rows_or_duration(self, X: Any) -> int | pd.Timedelta:
+    def _rows_or_duration(self, X: Table) -> int | pd.Timedelta:
         if isinstance(self.window, Integral) and not isinstance(self.window, np.timedelta64):
             return int(self.window)
         if not has_stamps(X):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from numbers import Integral
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import as_floats, broken_lines
-from skthermo._tables.frames import frame_like, row_weights
+from skthermo._tables.frames import Table, frame_like, row_weights
 from skthermo._validation import Interval, _check_feature_names_in, _fit_context
 from skthermo.preprocessing._records import RecordTransformer
 
@@ -91,7 +90,7 @@ class HingeFeatures(RecordTransformer):
         self._learn(X, self._validated(X, reset=True), row_weights(sample_weight, X))
         return self
 
-    def _learn(self, X: Any, values: NDArray, weights: NDArray | None = None) -> None:
+    def _learn(self, X: Table, values: NDArray, weights: NDArray | None = None) -> None:
         values = as_floats(values)
         if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
@@ -105,10 +104,10 @@ class HingeFeatures(RecordTransformer):
         else:
             self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         return frame_like(X, broken_lines(as_floats(values), self.knots_), self.get_feature_names_out())
 
-    def _names(self, columns: Sequence[Any]) -> list[Any]:
+    def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         return [*columns, *(f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in columns)]
 
 

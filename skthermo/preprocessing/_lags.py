@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal
@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
+from skthermo._tables.frames import Table
 from skthermo._tables.text import duration_text
 from skthermo._validation import Interval, StrOptions
 from skthermo.exceptions import FewRecordsWarning
@@ -119,7 +120,7 @@ class LagFeatures(PastFeatures):
         self.tolerance = tolerance
         self.padding = padding
 
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         self.lags_ = _read_lags(self.lags, len(values))
         self.freq_ = self.tolerance_ = None
         stamps = self._remember(X, values)
@@ -141,7 +142,9 @@ class LagFeatures(PastFeatures):
                 )
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
 
-    def _features(self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(
+        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
+    ) -> tuple[NDArray, NDArray | np.bool_]:
         if stamps is None:
             return self._by_row(values, self.lags_), self._warn_of_padding(values)
         return self._by_time(stamps, values)
@@ -152,7 +155,7 @@ class LagFeatures(PastFeatures):
         longest = max(self.lags_)
         return longest * self.freq_ + self.tolerance_ if longest and self.freq_ is not None else longest
 
-    def _names(self, sensors: Sequence[Any]) -> list[str]:
+    def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
 
     def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:

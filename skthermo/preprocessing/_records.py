@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from typing import Any, Self, overload
+from collections.abc import Hashable, Sequence
+from typing import Self, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import explain_rows
-from skthermo._tables.frames import frame_like
+from skthermo._tables.frames import Table, frame_like
 from skthermo._validation import (
     Estimator,
     TransformerMixin,
@@ -94,14 +94,14 @@ class RecordTransformer(TransformerMixin, Estimator):
         return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
 
     @abstractmethod
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         """What `fit` learns from X and its checked values."""
 
     @abstractmethod
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         """The result of `transform`, from X and its checked values."""
 
-    def _names(self, columns: Sequence[Any]) -> list[Any]:
+    def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         """Names of the results for columns of these names: by default the same."""
         return list(columns)
 
@@ -113,17 +113,17 @@ class PastFeatures(RecordTransformer):
     stamps_: NDArray | None
     time_zone_: str | None
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         features, told = self._features(X, values, self._stamps_as_in_fit(X))
         return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), told)
 
     @abstractmethod
     def _features(
-        self, X: Any, values: NDArray, stamps: pd.DatetimeIndex | None
+        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
     ) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
         """The features, and the rows of which a warning has said why they lack some."""
 
-    def _remember(self, X: Any, values: NDArray) -> pd.DatetimeIndex | None:
+    def _remember(self, X: Table, values: NDArray) -> pd.DatetimeIndex | None:
         """Store the records of `fit` where they have stamps, and return these."""
         self.history_ = self.stamps_ = self.time_zone_ = None
         stamps = stamps_of(X)
@@ -133,7 +133,7 @@ class PastFeatures(RecordTransformer):
             self.time_zone_ = _time_zone(stamps)
         return stamps
 
-    def _stamps_as_in_fit(self, X: Any) -> pd.DatetimeIndex | None:
+    def _stamps_as_in_fit(self, X: Table) -> pd.DatetimeIndex | None:
         """Stamps of new records, of the same kind as those of `fit`."""
         stamps = stamps_of(X)
         if (stamps is None) != (self.stamps_ is None):
@@ -159,7 +159,7 @@ class PastFeatures(RecordTransformer):
         return np.concatenate([old[only_old], own]), np.concatenate([self.history_[only_old], values])
 
 
-def stamps_of(X: Any) -> pd.DatetimeIndex | None:
+def stamps_of(X: Table) -> pd.DatetimeIndex | None:
     """Stamps of the rows, or None where rows have none and are consecutive."""
     index = as_stamps(X.index) if isinstance(X, pd.DataFrame) else None
     if index is None:

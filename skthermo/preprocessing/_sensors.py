@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import as_floats, means_of_known
-from skthermo._tables.frames import frame_like
+from skthermo._tables.frames import Table, frame_like
 from skthermo.preprocessing._records import RecordTransformer
 
 EVERYWHERE = "ambient"
@@ -70,7 +69,7 @@ class SensorMeans(RecordTransformer):
     def __init__(self, roles: Mapping[Hashable, str | None] | None = None):
         self.roles = roles
 
-    def _learn(self, X: Any, values: NDArray) -> None:
+    def _learn(self, X: Table, values: NDArray) -> None:
         values = as_floats(values)
         role_of = self._read_roles()
         roles = sorted({role for role in role_of if role is not None})
@@ -79,12 +78,12 @@ class SensorMeans(RecordTransformer):
         for columns in self.columns_.values():
             self.offsets_[columns] = offsets_between(values[:, columns])
 
-    def _transformed(self, X: Any, values: NDArray) -> Any:
+    def _transformed(self, X: Table, values: NDArray) -> Table:
         level = as_floats(values) - self.offsets_
         means = [means_of_known(level[:, columns], axis=1) for columns in self.columns_.values()]
         return frame_like(X, np.column_stack(means), self.columns_)
 
-    def _names(self, columns: Sequence[Any]) -> list[Any]:
+    def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         return list(self.columns_)
 
     def _read_roles(self) -> list[str | None]:

@@ -20,17 +20,16 @@ UNITS = {
 
 
 def identified_damage(identified: IdentifiedDamage) -> Section:
-    """What is most probable, what else could be, how severe, and what cannot be told."""
+    """What is most probable, what else could be, how severe, and what the modes do not determine."""
     parts = [
         paragraphs(
-            "Records of the structure as it is now were compared with what the healthy structure would do in the same "
-            "weather. Explanations of how the frequencies have shifted were weighed against each other: each has a "
-            "probability, and these add up to 100 %."
+            "Records of the structure as it is now were compared with predictions of the healthy structure in the same "
+            "weather. Each explanation of the shifts of the frequencies has a probability; these add up to 100 %."
         ),
         bullets(identified.answer()),
         _explanations(identified),
-        element("h3", "What cannot be told"),
-        bullets(identified.limits()) or paragraphs("All groups can be seen and told apart by the measured modes."),
+        element("h3", "What the modes do not determine"),
+        bullets(identified.limits()) or paragraphs("The measured modes show and distinguish all groups."),
         paragraphs(*identified.records.sentences()),
         table(
             "Every group: the probability that it has changed, and by how much on average over all explanations, with "
@@ -83,7 +82,7 @@ def _shifts(identified: IdentifiedDamage) -> Html:
 def _row(cause: str, row: pd.Series, is_unseen: bool) -> list[str]:
     """Cells of one cause."""
     if is_unseen:
-        return [cause, "cannot be seen", UNITS[row["kind"]], "not known", "", ""]
+        return [cause, "unobservable", UNITS[row["kind"]], "not known", "", ""]
     amounts = row[["severity", "ci_low", "ci_high", "highest_if_damaged"]].astype(float)
     lowest, highest = sorted(amounts[["ci_low", "ci_high"]].abs())
     return [

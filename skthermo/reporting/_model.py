@@ -11,7 +11,7 @@ from skthermo._tables.arrays import as_floats, spread_evenly
 from skthermo._tables.frames import column_names
 from skthermo._tables.text import counted, duration_text, period_text, share_text, significant
 from skthermo.fem import Structure
-from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_histories, draw_over_temperature
+from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_modes
 from skthermo.reporting._findings import REFERENCE, SIMULATED
 from skthermo.reporting._html import Html, Section, bullets, element, figure, paragraphs, section, table
 from skthermo.studies import DetectabilityStudy
@@ -48,7 +48,7 @@ def monitored(study: DetectabilityStudy, structure: Structure | None, families: 
             "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
         ),
         table("Natural frequencies.", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, "Hz", 4)),
-        figure("Measured natural frequencies over time.", draw_histories(F)),
+        figure("Measured natural frequencies over time.", draw_modes(F)),
     ]
     if structure is not None:
         drawn = draw_groups(structure, families)
@@ -63,7 +63,7 @@ def quality(study: DetectabilityStudy) -> Section:
     over_temperature = figure(
         f"Frequencies over the temperature {temperature.name}, which goes most closely with them: measured, and "
         "predicted by the model.",
-        draw_over_temperature(temperature, measured, predicted),
+        draw_modes(measured, predicted, temperature),
     )
     report = study.fem.report_
     parts = [*learned(report), over_temperature, *stiffnesses(report), *_agreement(study.results_)]
@@ -75,9 +75,8 @@ def learned(report: FitReport) -> list[Html]:
     error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
     return [
         paragraphs(
-            f"The model predicts the frequencies of these records with a mean error of {error} %. Whoever ignored "
-            f"temperature and always expected the mean frequency would err by {mean} %. Errors are of records that the "
-            "model has learned from; those of new records are usually larger.",
+            f"The model predicts the frequencies of these records with a mean error of {error} %; the mean frequency "
+            f"as prediction has {mean} %. Errors of records that the model has not learned from are usually larger.",
             f"Of {counted(report.n_rows, 'record')}, {report.n_trained:,} were complete enough to learn from.",
         ),
         table(
@@ -93,12 +92,12 @@ def stiffnesses(report: FitReport) -> list[Html]:
     return [
         paragraphs(
             "Temperature changes the stiffness of parts of the model. The next table says how accurately one record "
-            "determines each of these stiffnesses at best, and how many records gave a stiffness outside the range "
-            "that was thought possible."
+            "determines each of these stiffnesses at best, and how many records gave a stiffness outside its "
+            "bounds."
         ),
         table(
             "Stiffnesses that the model adjusts to temperature.",
-            ["Parameter", "Smallest possible standard deviation", "Records outside the range"],
+            ["Parameter", "Smallest possible standard deviation", "Records outside the bounds"],
             _parameters(report),
         ),
         element("h3", "What is doubtful"),
@@ -140,9 +139,8 @@ def _doubts(report: FitReport) -> list[str]:
         if not deviation < LARGE_DEVIATION:
             doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")
         elif report.outside[name] > MANY_OUTSIDE:
-            share = share_text(report.outside[name])
             doubts.append(
-                f"The stiffness {name} is outside the range that was thought possible in {share} of the records."
+                f"The stiffness {name} is outside its bounds in {share_text(report.outside[name])} of the records."
             )
     if report.n_unconverged:
         doubts.append(f"The stiffnesses of {counted(report.n_unconverged, 'record')} could not be found exactly.")
@@ -198,5 +196,7 @@ def _agreement(results: pd.DataFrame) -> list[Html]:
     bands = results[results["source"] == SIMULATED].set_index("scenario").reindex(single.index)
     if len(single):
         inside = int(single.between(bands["pi_low"], bands["pi_high"]).sum())
-        text += f" Of {counted(len(single), 'reference rate')}, {inside:,} lie where single simulated campaigns lie."
+        text += (
+            f" Of {counted(len(single), 'reference rate')}, {inside:,} lie in the prediction interval of one campaign."
+        )
     return [heading, paragraphs(f"{text} The table of all scenarios, further below, has both.")]

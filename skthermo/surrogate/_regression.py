@@ -62,7 +62,7 @@ def default_network() -> MLPRegressor:
 
 
 def default_lines(penalties: Any = PENALTIES, **options: Any) -> Pipeline:
-    """Broken lines whose changes of slope are penalised; they go on straight beyond the data."""
+    """Piecewise-linear regression with penalised changes of slope, which goes on straight beyond the data."""
     hinges = HingeFeatures().set_output(transform="default")  # whatever the global setting is at fit and at predict
     return make_pipeline(hinges, RidgeCV(penalties, **options))
 
@@ -293,9 +293,9 @@ class TemperatureMapper(MultiplierRegressor):
     regressor : regressor, optional
         Any regressor; a regressor of a single output is fitted once for each parameter. It learns the standardised
         logarithms of the parameters from standardised temperatures, so that predictions are positive. If some
-        parameters are not positive, no logarithm is taken. By default broken lines, ``make_pipeline(HingeFeatures(),
-        RidgeCV(numpy.logspace(-3, 5, 33)))``, which go on straight beyond the data. See `paper_network` for the paper's
-        network.
+        parameters are not positive, no logarithm is taken. By default piecewise-linear regression,
+        ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which goes on straight beyond the data.
+        See `paper_network` for the paper's network.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -317,9 +317,10 @@ class TemperatureMapper(MultiplierRegressor):
     Rows with a missing temperature or parameter are left out in `fit`, and only there.
 
     On the last fifth of the healthy records of the bridge Z24, warmer than all others, the errors are 0.60 % with
-    broken lines, about 0.7 % with small networks (different for each seed), 0.67 % with random forests, 0.73 % with
-    boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials (``examples/plot_regressors.py``).
-    Trees stay at their last value beyond the data. Where few records show a sharp knee, networks follow it better.
+    piecewise-linear regression, about 0.7 % with small networks (different for each seed), 0.67 % with random forests,
+    0.73 % with boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials
+    (``examples/plot_regressors.py``). Trees stay at their last value beyond the data. Where few records show a sharp
+    knee, networks follow it better.
 
     Examples
     --------

@@ -23,7 +23,7 @@ from skthermo._estimators.arguments import (
 )
 from skthermo._estimators.warnings import warn_each, warn_user
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, Bounds, as_random_state, real_array
+from skthermo._tables.arrays import Array, Bounds, as_random_state, positive_integer, real_array
 from skthermo._tables.frames import column_names
 from skthermo._validation import (
     Estimator,
@@ -124,11 +124,10 @@ class ModelUpdater(Estimator):
 
     Notes
     -----
-    *Pairing.* With shapes, each measured mode is paired with the mode of the model that has the highest MAC with it,
-    among more modes than ``model.n_modes``; no mode is paired twice. Where several look the same at the sensors, the
-    MAC with the nominal mode of the same number decides. Without shapes, measured mode j is column j of the model,
-    which follows its mode by shape if ``track=True``. Columns that are sorted by frequency allow a false match: modes
-    swap places and fit each other's frequencies. A warning says so.
+    *Pairing.* With shapes, each measured mode is paired one to one with the mode of the model that has the highest MAC
+    with it, among more modes than ``model.n_modes``; where several look the same at the sensors, the MAC with the
+    nominal mode of the same number decides. Without shapes, measured mode j is column j of the model. Columns that are
+    sorted by frequency (``track=False``) allow a false match, of which a warning is given.
 
     *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
     v = sqrt(2 (n - 1)) / s^2; with weights thousands of times smaller a search takes many evaluations. ``covariance_``
@@ -329,16 +328,12 @@ class ModelUpdater(Estimator):
         frequencies and shapes, and noise of the prior's size to its mean. Where residuals are linear in theta, the
         models are independent draws from the posterior distribution; else approximately so.
 
-        *Shapes* count here by their noise, as in ``covariance_``; the objective of `fit` counts large differences of
-        shapes more. With shapes, the models may lie about a standard deviation beside ``theta_``.
-
         *Prior.* Multipliers of parameters and of groups are normally distributed about 1, the nominal model of
         ``model``, and independent. Draws end at the bounds if they would pass them: ``bounds`` for the parameters, and
         four standard deviations, or a tenth of the nominal stiffness, for the groups.
 
-        *Deviations.* ``frequency_std`` should hold what separates the mean measured frequency from that of a perfect
-        model in the same state: with many records, the error of the model (some tenths of a percent) is larger than
-        that of the mean. The mass is taken as known, unless a parameter scales it.
+        *Deviations.* With many records, the error of the model (some tenths of a percent) is larger than that of the
+        mean; ``frequency_std`` should hold both. The mass is taken as known, unless a parameter scales it.
 
         Examples
         --------
@@ -347,10 +342,9 @@ class ModelUpdater(Estimator):
         >>> truss = make_truss()
         >>> F = truss.frequencies([0.9, 1.1, 0.95, 1.05])
         >>> updater = ModelUpdater(truss, bounds=0.6, prior=0.15).fit(F, frequency_std=0.005 * F[0])
-        >>> models = updater.sample_models(20, random_state=0)
-        >>> drawn = [model.frequencies([1.0, 1.0, 1.0, 1.0])[0] / F[0] for model in models]
-        >>> print((100 * np.std(drawn, axis=0)).round(2))
-        [0.35 0.39 0.3  0.32 0.4  0.41]
+        >>> drawn = [m.frequencies([1, 1, 1, 1])[0, 0] for m in updater.sample_models(20, random_state=0)]
+        >>> round(float(np.std(drawn) / F[0, 0]), 4)
+        0.0035
         """
         check_is_fitted(self)
         if not self.has_deviations_:
@@ -358,8 +352,7 @@ class ModelUpdater(Estimator):
                 "fit was called without frequency_std, and how much models may differ is not known; expected "
                 "fit(F, frequency_std=...), standard deviations of the mean frequencies in Hz"
             )
-        if not isinstance(n, Integral) or isinstance(n, bool) or n < 1:
-            raise ValueError(f"n is {n!r:.100}; expected a positive number of models")
+        n = positive_integer(n, "n")
         check_size(spread, "spread", 0, 0.5, "a relative standard deviation above 0 and below 0.5, such as 0.15")
         names = self.model.parameter_names
         prior = check_prior(spread if self.prior is None else self.prior, names)

@@ -39,7 +39,7 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator, Wind
 from skthermo.fem import add_noise
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._promise import EventRule, find_events, promised_rule, release_level
+from skthermo.monitoring._false_alarms import EventRule, estimate_false_alarms, find_events, release_level
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
 
@@ -138,9 +138,9 @@ OTHERS = {"order": order, "bootstrap": bootstrap, "pareto": pareto}
 
 def rules_of(index):
     """Rules by name."""
-    own = promised_rule(index, ASKED).rule
+    own = estimate_false_alarms(index, ASKED).rule
     others = {name: EventRule(max(way(index, own), own.release), own.release, own.hold) for name, way in OTHERS.items()}
-    return {"library": own, "7 quiet days": promised_rule(index, ASKED, hold="7D").rule} | others
+    return {"library": own, "7 quiet days": estimate_false_alarms(index, ASKED, hold="7D").rule} | others
 
 
 def e_alarms(baseline, index, step):
@@ -220,7 +220,7 @@ def measure(years, per_day):
                 row = row_of(name, rule_name, lambda i, r=rule: count(i, r)["start"], h, d, per_day)
                 row["closes"] = days_to_close(rule, d[SEVERITIES[-1]], h, per_day)
                 if rule_name == "library":
-                    promise = promised_rule(index, ASKED)
+                    promise = estimate_false_alarms(index, ASKED)
                     numbers = [len(count(i, rule)) for i in h]
                     row["inside"] = np.mean([promise.lowest <= n <= promise.highest for n in numbers])
                 found.append(row)
@@ -238,7 +238,7 @@ def measure(years, per_day):
             index = softer(index, baseline)
             h = [softer(i, records) for i, records in zip(h, healthy, strict=True)]
             d = {s: [softer(*pair) for pair in zip(d[s], broken[s], strict=True)] for s in SEVERITIES}
-            rule = promised_rule(index, ASKED, release=level).rule
+            rule = estimate_false_alarms(index, ASKED, release=level).rule
             found.append(row_of(name, "one-sided", lambda i, r=rule: count(i, r)["start"], h, d, per_day))
     return pd.DataFrame(found)
 

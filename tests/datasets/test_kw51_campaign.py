@@ -137,16 +137,6 @@ def test_drift_and_damage_multiply():
 
 
 @pytest.mark.nightly
-def test_noise_is_relative(campaign):
-    ratio = make_kw51_campaign(n_hours=3000, noise=[0.0, *[0.01] * 5], gaps=False, random_state=5)
-    error = ratio.frequencies / ratio.clean_frequencies - 1
-    assert_allclose(error.std()[1:], 0.01, rtol=0.05)
-    assert (error["f1"].abs() < 1e-12).all()
-    stated = [0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015]
-    assert_allclose((campaign.frequencies / campaign.clean_frequencies - 1).std(), stated, rtol=0.05)
-
-
-@pytest.mark.nightly
 def test_correlations_before_the_retrofit(campaign):
     before = campaign.state == "before"
     found = campaign.frequencies[before].corrwith(campaign.temperatures["tBD31A"][before])

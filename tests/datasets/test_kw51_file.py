@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-import struct
 
 import numpy as np
 import pandas as pd
@@ -59,28 +58,6 @@ def test_a_file_is_read_as_it_was_written(file, compressed):
     assert data.sensors == SENSORS
 
 
-def test_the_whole_record_is_hourly_and_the_retrofit_lies_where_it_was(file):
-    n_records = 11328
-    write_kw51(
-        file,
-        frequencies=np.full((n_records, 1), 2.0),
-        damping=np.full((n_records, 1), 0.01),
-        shapes=np.ones((n_records, 1, 1)),
-        temperatures=np.full((n_records, 1), 20.0),
-    )
-    data = load_kw51(file)
-    assert data.state.groupby(data.state, sort=False).size().to_dict() == {
-        "before": 5424,
-        "during": 3241,
-        "after": 2663,
-    }
-    time = data.state.index
-    assert (np.diff(time) == HOUR).all()
-    assert time[-1] == pd.Timestamp("2020-01-15 23:00")
-    assert data.state[pd.Timestamp("2019-05-14 23:00") :].iloc[:2].tolist() == ["before", "during"]
-    assert data.state[pd.Timestamp("2019-09-27 00:00") :].iloc[:2].tolist() == ["during", "after"]
-
-
 def test_a_zip_file_says_whether_it_is_the_published_one(tmp_path, monkeypatch):
     file = tmp_path / "trackedmodes.zip"
     fields = write_kw51(file)
@@ -98,16 +75,6 @@ def test_a_zip_file_says_whether_it_is_the_published_one(tmp_path, monkeypatch):
 def test_the_content_tells_a_zip_file_whatever_its_name(tmp_path):
     file = write(tmp_path / "download", kw51_fields(), zipped=True)
     check_equal(load_kw51(file), kw51_fields())
-
-
-def test_rows_stay_in_the_order_of_the_file(file):
-    fields = kw51_fields(n_records=10)
-    order = np.random.default_rng(1).permutation(10)
-    shuffled = fields | {name: fields[name][order] for name in ("sdn", "f", "xi", "m", "env")}
-    write(file, shuffled)
-    data = load_kw51(file)
-    check_equal(data, shuffled)
-    assert (data.state.index == pd.date_range("2018-10-01", periods=10, freq="h")[order]).all()
 
 
 def test_time_stamps_are_rounded_to_seconds(file):
@@ -135,45 +102,6 @@ def test_forms_in_which_matlab_may_have_stored_it(file, form):
     write(file, FORMS[form](fields))
     if form == "single":
         fields["env"] = fields["env"].astype("f4").astype(float)
-    check_equal(load_kw51(file), fields)
-
-
-def test_whole_numbers_and_real_shapes(file):
-    whole = np.random.default_rng(0).integers(1, 20, (6, 3))
-    fields = kw51_fields(
-        frequencies=whole.astype("u1"), damping=whole * 0, shapes=np.ones((6, 3, 2)), temperatures=whole.astype("i2")
-    )
-    write(file, fields)
-    data = load_kw51(file)
-    check_equal(data, fields)
-    assert np.iscomplexobj(data.shapes)
-    assert set(data.frequencies.dtypes) == {np.dtype(float)}
-
-
-def big_endian_element(kind, content):
-    return struct.pack(">II", kind, len(content)) + content + b"\0" * (-len(content) % 8)
-
-
-def big_endian_matrix(kind, shape, *parts, name=b""):
-    head = (struct.pack(">II", kind, 0), struct.pack(f">{len(shape)}i", *shape), name)
-    elements = [big_endian_element(*part) for part in (*zip((6, 5, 1), head, strict=True), *parts)]
-    return big_endian_element(14, b"".join(elements))
-
-
-def test_a_big_endian_file(file):
-    fields = kw51_fields(n_records=5)
-    values = []
-    for field in fields.values():
-        if field.dtype == object:
-            texts = [big_endian_matrix(4, (1, len(text)), (16, text.encode())) for text in field.flat]
-            values.append(big_endian_element(14, big_endian_matrix(1, field.shape)[8:] + b"".join(texts)))
-        else:
-            parts = [field.real, field.imag] if np.iscomplexobj(field) else [field]
-            parts = [(9, part.astype(">f8").tobytes(order="F")) for part in parts]
-            values.append(big_endian_matrix(6 | 0x0800 * (len(parts) - 1), field.shape, *parts))
-    names = b"".join(name.encode().ljust(32, b"\0") for name in fields)
-    head = big_endian_matrix(2, (1, 1), (5, struct.pack(">i", 32)), (1, names), name=b"modes")[8:]
-    file.write_bytes(b"MATLAB 5.0".ljust(124) + b"\1\0MI" + big_endian_element(14, head + b"".join(values)))
     check_equal(load_kw51(file), fields)
 
 
@@ -210,23 +138,17 @@ SHAPE = r"\(12, 14, 12\)"
 BAD = [
     ({"xi": None}, r"no field \['xi'\] in 'modes'; found \['env', 'f', "),
     ({"f": "text"}, "field 'f' is text, a cell array, a struct or sparse; expected a full array"),
-    ({"f": np.empty((0, 14))}, r"field 'f' has shape \(0, 14\); expected records"),
-    ({"f": np.ones((N, 1001))}, "expected records times at most 1000 modes"),
     ({"f": np.ones((N, 13))}, r"field 'xi' has shape \(12, 14\); expected \(12, 13\)"),
     ({"sdn": np.ones((N + 1, 1))}, r"field 'sdn' has shape \(13, 1\); expected \(12, 1\)"),
     ({"m": np.ones((N, 12, 14))}, rf"field 'm' has shape \(12, 12, 14\); expected {SHAPE}"),
     ({"env": np.ones((N, 10))}, r"field 'env' has shape \(12, 10\); expected \(12, 11\)"),
     ({"labels_m": cell(SENSORS[:-1])}, rf"field 'm' has shape {SHAPE}; expected \(12, 14, 11\)"),
     ({"labels_m": np.ones((N, 1))}, "field 'labels_m' holds something else than texts"),
-    ({"labels_m": cell([""] + SENSORS[1:])}, r"field 'labels_m' has \d+ names, .*expected 1 to 1000 that differ"),
     (replaced("sdn", 3, np.nan), "field 'sdn', row 3 is nan; expected a MATLAB date number"),
-    (replaced("sdn", 3, -999), "field 'sdn', row 3 is -999.0"),
     (replaced("sdn", 3, kw51_fields()["sdn"][1]), "field 'sdn', row 3 repeats 2018-10-01 01:00:00"),
     (replaced("f", (2, 5), 0.01), "field 'f', row 2, column 'f6' is 0.01; expected 0.1 to 100, or NaN"),
-    ({"f": np.full((N, 14), 2 + 1j)}, "field 'f' has complex numbers"),
     (replaced("xi", (0, 1), 1.5), "field 'xi', row 0, column 'xi2' is 1.5; expected -1 to 1, or NaN"),
     (replaced("env", (4, 0), 85), "field 'env', row 4, column 'tBD31A' is 85; expected -60 to 80"),
-    (replaced("env", (4, 5), np.inf), "field 'env', row 4, column 'grVL' is inf; expected a measured value"),
     (replaced("m", (4, 3, 1), 1j * np.inf), "field 'm', sensor 'aBD17Ay', row 4, column 'f4' is inf"),
 ]
 

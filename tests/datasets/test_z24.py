@@ -86,13 +86,10 @@ LINES = csv_text().splitlines()
     ("text", "message"),
     [
         ("", r"the header has the fields \[\]; expected \['record'"),
-        (LINES[0], "no rows below the header"),
         ("\n".join(LINES).replace("Tair", "Tsea"), r"expected \['Tair'\] once"),
         ("\n".join(LINES)[:-3], "field 'state', row 11 is 'dama'"),
-        ("\n".join(LINES).replace("undamaged", "fine", 1), "field 'state', row 0 is 'fine'"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "5,2"), "row 3 has 14 fields"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "5.2x"), "field 'f2', row 3 is '5.2x'"),
-        ("\n".join(LINES).replace(str(F["f2"][3]), "-5.2"), "field 'f2', row 3 is -5.2; expected 0.1 to 100"),
         ("\n".join(LINES).replace(str(T["TS"][7]), "999"), "field 'TS', row 7 is 999.0; expected -60 to 80"),
         ("\n".join(LINES).replace("\n5,", "\n2,"), "field 'record', row 3 repeats 2"),
         ("\n".join(LINES).replace("\n5,", "\n5.5,"), "field 'record', row 3 is 5.5"),
@@ -112,7 +109,6 @@ def test_bad_csv_names_file_and_field(tmp_path, text, message):
         ({"Z24_TS": np.ones((N - 1, 1))}, r"field 'Z24_TS' has shape \(11, 1\); expected \(12, 1\)"),
         ({"Z24_TS": "warm"}, "field 'Z24_TS' is not a full matrix of real numbers"),
         ({"idx": np.ones(40)}, "field 'idx' marks 40 of 40 hours"),
-        ({"nc": 13}, r"field 'nc' is \[\[13.0\]\]"),
     ],
 )
 def test_bad_matlab_names_file_and_field(tmp_path, changes, message):

@@ -199,21 +199,6 @@ def every_parameter():
     return Structure(nodes, members, {"a": "xyz rx rz", "c": "y"}, groups).assemble(parameters, n_modes=5)
 
 
-def test_jacobian_of_every_property_equals_central_differences():
-    model = every_parameter()
-    theta = np.random.default_rng(0).uniform(0.8, 1.2, (3, len(model.parameter_names)))
-    step = 1e-5
-    differences = np.stack(
-        [
-            (model.frequencies(theta + step * e) - model.frequencies(theta - step * e)) / (2 * step)
-            for e in np.eye(theta.shape[1])
-        ],
-        axis=2,
-    )
-    scale = model.frequencies(theta)[:, :, np.newaxis]
-    np.testing.assert_allclose(model.jacobian(theta) / scale, differences / scale, atol=1e-6)
-
-
 def test_frequencies_are_homogeneous_in_stiffness_and_in_mass():
     model = every_parameter()
     theta = np.random.default_rng(1).uniform(0.8, 1.2, (3, len(model.parameter_names)))

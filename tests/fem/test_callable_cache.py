@@ -122,13 +122,6 @@ def test_a_damaged_file_is_refused_by_name(file, length):
         CallableModel(Counted(), NAMES, 3, cache=file).frequencies(THETA)
 
 
-def test_an_empty_file_is_filled(file):
-    file.parent.mkdir()
-    file.touch()
-    np.testing.assert_array_equal(CallableModel(three_modes, NAMES, 3, cache=file).frequencies(THETA), PLAIN)
-    assert file.stat().st_size
-
-
 @pytest.mark.parametrize(("names", "n_modes"), [(["k", "E"], 3), (NAMES, 2)])
 def test_a_file_for_other_parameters_is_refused_and_kept(file, names, n_modes):
     CallableModel(lambda row: three_modes(row)[:n_modes], names, n_modes, cache=file).frequencies(THETA)
@@ -175,27 +168,6 @@ def test_a_function_that_fails_everywhere_is_an_error(file):
     counted = Counted()
     CallableModel(counted, NAMES, 3, cache=file).frequencies(THETA)
     np.testing.assert_array_equal(counted.rows, THETA[5:])
-
-
-@pytest.mark.parametrize("vectorized", [False, True])
-def test_the_second_run_gives_what_the_first_gave(file, vectorized):
-    def fails_below_one(theta):
-        rows = np.atleast_2d(theta)
-        if len(rows) == 1 and rows[0, 0] < 1 and not vectorized:
-            raise ArithmeticError("no convergence")
-        result = np.array([three_modes(row) for row in rows])
-        result[rows[:, 0] < 1] = -1.0
-        return result if vectorized else result[0]
-
-    model = CallableModel(fails_below_one, NAMES, 3, vectorized=vectorized, cache=file)
-    count = (THETA[:, 0] < 1).sum()
-    assert count > 1
-    for _ in range(2):
-        with pytest.warns(UserWarning, match=f"{count} of 20 rows are NaN"):
-            frequencies = model.frequencies(THETA)
-        np.testing.assert_array_equal(frequencies, np.where(THETA[:, :1] < 1, np.nan, PLAIN))
-    with pytest.raises(RuntimeError, match="the model's function"):
-        model.frequencies(THETA[THETA[:, 0] < 1])
 
 
 def test_workers_share_one_file(file):

@@ -139,22 +139,6 @@ def reduced(request):
     return frame.with_parameters(["columns", "beams", "soil"]).reduced(0.3, tol=1e-7, random_state=0)
 
 
-def test_derivatives_agree_with_differences_and_rows_are_counted(reduced):
-    theta, step = np.random.default_rng(7).uniform(0.75, 1.25, (20, 3)), 1e-3
-    assert reduced._core.certified(theta).mean() > 0.9
-    jacobian = reduced.jacobian(theta)
-
-    def slopes(step):
-        columns = [
-            (reduced.linearised(theta + step * unit)[0] - reduced.linearised(theta - step * unit)[0]) / (2 * step)
-            for unit in np.eye(3)
-        ]
-        return np.stack(columns, axis=2)
-
-    differences = (4 * slopes(step / 2) - slopes(step)) / 3
-    np.testing.assert_allclose(jacobian, differences, rtol=1e-6, atol=1e-6 * np.abs(jacobian).max())
-
-
 @pytest.mark.parametrize("severity", [0.95, -2.0])
 def test_a_severely_damaged_model_is_solved_around_its_own_nominal_state(reduced, severity):
     damaged = reduced.damaged({"soil": severity})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skthermo.datasets import truss_structure
-from skthermo.fem import AffineModel, Bar, Beam, Structure
+from skthermo.fem import Bar, Beam, Structure
 
 PARAMETERS = "bottom", "top", "diagonal", "vertical"
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
@@ -96,12 +96,10 @@ def test_errors_of_divide(structure, halves):
         structure.divide(model, {"bottom": {"west": west, "east": west}})
     with pytest.raises(ValueError, match="are not in group 'top'"):
         structure.divide(model, {"top": {"west": west}})
-    with pytest.raises(ValueError, match="unknown damage group 'deck'"):
+    with pytest.raises(ValueError, match="'deck'"):
         structure.divide(model, {"deck": {"west": west}})
-    with pytest.raises(ValueError, match="new name"):
+    with pytest.raises(ValueError, match="'top'"):
         structure.divide(model, {"bottom": {"top": west}})
-    with pytest.raises(ValueError, match="does not know its members"):
-        structure.divide(AffineModel({("k",): np.eye(2)}, np.eye(2), n_modes=1), {})
     softer = structure.members | {west[0]: Bar(*structure.members[west[0]].nodes, **STEEL | {"E": 100e9})}
     other = Structure(structure.nodes, softer, structure.supports, structure.groups)
     with pytest.raises(ValueError, match="another stiffness in the model"):
@@ -109,15 +107,3 @@ def test_errors_of_divide(structure, halves):
     held = Structure(structure.nodes, structure.members, structure.supports | {"2": "x"}, structure.groups)
     with pytest.raises(ValueError, match="degrees of freedom"):
         held.divide(model, halves)
-
-
-def test_errors_of_parts(structure):
-    model = structure.assemble(PARAMETERS)
-    with pytest.raises(ValueError, match="expected positions from 0"):
-        model.with_parts({"new": {99: np.eye(model.n_dof)}})
-    with pytest.raises(ValueError, match="expected a new name, and matrices"):
-        model.with_parts({"new": {}})
-    with pytest.raises(ValueError, match="shape"):
-        model.with_parts({"new": {0: np.eye(2)}})
-    with pytest.raises(ValueError, match="contents are of 2 terms"):
-        AffineModel({("k",): np.eye(2)}, np.eye(2), n_modes=1, contents=[[], []])

@@ -61,16 +61,6 @@ def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
     )
 
 
-def test_a_total_that_is_none_is_said_so(tmp_path):
-    constant = spring(0, 0, 100.0)
-    file = write_npz(tmp_path, MATRICES | {"K0": constant})
-    with pytest.raises(ValueError, match=r"'K0' is .*less than the sum of .*total=False if none is the total"):
-        load_affine(file, stiffness=list(TERMS))
-    assert_same(load_affine(file, stiffness=list(TERMS), total=False, n_modes=4), EXPECTED)
-    everything = load_affine(file, total=False, n_modes=4)
-    assert everything.parameter_names == ("K0", *TERMS)
-
-
 def test_a_constant_part_called_k0_is_refused_until_it_is_named(tmp_path):
     constant = spring(0, 0, 100.0)
     file = write_npz(tmp_path, MATRICES | {"K0": constant})
@@ -122,20 +112,15 @@ def test_complex_matrices_are_real_or_refused(tmp_path, form):
     ("text", "message"),
     [
         ("", "Not a Matrix Market file"),
-        ("%%MatrixMarket matrix array real\n", "Invalid MatrixMarket header element"),
         ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "1 x 1, pattern, general; expected numbers"),
         ("%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n", "would take .* MB of memory; exp"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n", "3 numbers; expected 9999"),
         ("%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n1 1 5.0\n", "entries on its diagonal; exp"),
-        ("%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n", "3 numbers; expected 4"),
-        ("%%MatrixMarket matrix array real symmetric\n9999999 9999999\n1\n2\n3\n", "3 numbers; expected"),
         (
             "%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n",
             "2 x 1, real, symmetric; expected numbers, and a square",
         ),
-        ("%%MatrixMarket matrix array real general\n\n", "Premature EOF"),
         ("%%MatrixMarket matrix array real general\n1 1\n1.0x\n", "1.0x"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 3 5.0\n", "Column index out of bounds"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 0 5.0\n", "Column index out of bounds"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "5 numbers; expected 2 times"),
         ("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 5.0\n2 1 5.0\n", "both sides of its diagonal"),

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from skthermo._io import bars_of, run_jobs
-from skthermo._io._progress import bar
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
 
@@ -69,11 +68,6 @@ def test_a_notebook_sees_a_bar_that_names_the_stage_and_the_work_around_it_alone
         assert all(line.startswith("other repeats: ") and " of 3 repeats in " in line for line in lines)
 
 
-def test_the_bar_says_what_is_left():
-    assert bar(1, 4, 10.0).split("|")[2].strip() == "1 of 4 samples in 10 s, 30 s left"
-    assert "left" not in bar(4, 4, 10.0)
-
-
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
 @pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
 def test_every_backend_gives_the_same_bits(backend):
@@ -95,13 +89,6 @@ def test_many_chunks_without_modes_are_one_warning_by_row(n_jobs):
     assert caught[0].filename == __file__
 
 
-def test_rows_in_a_warning_are_the_callers():
-    model = AffineModel({("k",): np.eye(3), ("force",): -0.5 * np.eye(3)}, np.eye(3), n_modes=2)
-    with pytest.warns(UserWarning, match=r"1 of 3 samples are NaN.*\(row 2\)"):
-        frequencies = evaluate(model, [[np.nan, 1.0], [1.0, 1.0], [0.4, 1.0]])
-    assert np.isnan(frequencies).all(axis=1).tolist() == [True, False, True]
-
-
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
     reduced = TRUSS.reduced(0.1, random_state=0)
@@ -109,13 +96,6 @@ def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
         sample(reduced, 0.2, 600, n_jobs=n_jobs, random_state=0)
     assert len(caught) == 1
     assert caught[0].filename == __file__
-
-
-def test_rows_of_a_program_are_shared_among_more_workers_than_chunks_of_a_model():
-    row_by_row = CallableModel(lambda row: TRUSS.frequencies([row])[0], TRUSS.parameter_names, 6)
-    assert row_by_row.rows_per_chunk < 50 < TRUSS.rows_per_chunk
-    drawn = sample(row_by_row, 0.2, 50, random_state=0)
-    np.testing.assert_array_equal(drawn.frequencies, np.vstack([TRUSS.frequencies([row]) for row in drawn.theta]))
 
 
 ENDLESS = """

@@ -57,11 +57,6 @@ def test_sparse_jacobian_equals_central_differences(track):
     np.testing.assert_allclose(model.jacobian(THETA), np.stack(differences, axis=2), atol=1e-5)
 
 
-def test_damage_and_parameters_act_alike_on_sparse_terms():
-    damaged = FRAME.damaged({"columns": 0.3})
-    np.testing.assert_allclose(damaged.frequencies(THETA), FRAME.frequencies(THETA * [0.7, 1, 1, 1]), rtol=1e-10)
-
-
 def test_sparse_and_dense_terms_are_one_sum():
     keys = np.array([[0, 0], [1, 0], [1, 2]])
     random = np.random.default_rng(1)
@@ -93,11 +88,6 @@ def test_repeated_eigenvalues_are_all_found(copies, n_dof):
 def test_the_same_theta_gives_the_same_bits_alone_and_among_others():
     alone = np.concatenate([FRAME.frequencies([row]) for row in THETA])
     np.testing.assert_array_equal(FRAME.frequencies(THETA), alone)
-
-
-def test_no_theta_gives_no_frequencies():
-    assert FRAME.frequencies(np.empty((0, 4))).shape == (0, 6)
-    assert [part.shape for part in FRAME.modes(np.empty((0, 4)))] == [(0, 6), (0, FRAME.n_dof, 6)]
 
 
 def test_sparse_massless_degrees_of_freedom_have_no_modes():

@@ -175,7 +175,7 @@ def test_a_bridge_that_always_kills_its_process_loses_no_other(fleet, monkeypatc
                 yield name, task()
                 del waiting[name]
 
-    monkeypatch.setattr("skthermo.fleet._crew._results", results)
+    monkeypatch.setattr("skthermo.fleet._workers._results", results)
     makers, records = asked(killer=(None, None))
     order = ["a", "killer", "b", "c", "d"]
     other = fit_fleet({n: makers[n] for n in order}, {n: records[n] for n in order}, monitor=watch)
@@ -193,7 +193,7 @@ def test_a_back_end_that_does_not_work_is_an_error(monkeypatch):
         raise ConnectionError("no cluster")
         yield
 
-    monkeypatch.setattr("skthermo.fleet._crew._results", results)
+    monkeypatch.setattr("skthermo.fleet._workers._results", results)
     with pytest.raises(ConnectionError, match="no cluster"):
         fit_fleet(*asked())
 
@@ -264,7 +264,7 @@ def test_functions_of_a_notebook_count_with_their_code():
     assert by_value(source(1)) != by_value(source(2))
 
 
-def test_monitors_judge_new_records_each_alone(fleet):
+def test_monitors_evaluate_new_records_each_alone(fleet):
     made = pickle.loads(pickle.dumps(fleet))  # also a pickled fleet goes on
     new = {"a": year(31, 60, "2026-01-01"), "b": partial(year, 32, 60, "2026-01-01", step=0.05), "c": missing_file}
     answers = made.update(new | {"d": year(33, 60, "2026-01-01")[1]})
@@ -283,9 +283,9 @@ def test_monitors_judge_new_records_each_alone(fleet):
     assert table.loc["b", "alarm_rate"] == alone.days_["n_alarms"].sum() / alone.days_["n_evaluated"].sum()
     assert made.events.loc[made.events["bridge"] == "b", "event"].tolist() == [1]
     found = made.discoveries()
-    assert found.called == ["b"]
+    assert found.bridges == ["b"]
     assert {"c", "d", "odd"} == set(found.not_evaluated)
-    assert found.promised_false_per_year == 5.0
+    assert found.false_alarms_per_year == 5.0
 
 
 def test_wrong_arguments_are_named(fleet, tmp_path):
@@ -309,23 +309,23 @@ def test_wrong_arguments_are_named(fleet, tmp_path):
 def test_a_monitor_that_is_replaced_is_kept_beside_and_told(tmp_path):
     makers, records = asked()
     fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01")})
-    judged = next(tmp_path.glob("a-*.bridge")).read_bytes()
+    evaluated = next(tmp_path.glob("a-*.bridge")).read_bytes()
     makers = dict.fromkeys(makers, LinearRegression(positive=True))
     with pytest.warns(UserWarning, match=r"^1 of 4 bridges were fitted anew.*\(a\): their monitors begin again"):
         again = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
     assert again.table["n_evaluated"].eq(0).all()
-    assert [file.read_bytes() for file in tmp_path.glob("*.replaced")] == [judged]
+    assert [file.read_bytes() for file in tmp_path.glob("*.replaced")] == [evaluated]
     assert len(Fleet(tmp_path)) == 4
 
 
 def test_what_the_owner_found_is_kept(tmp_path):
     fleet = fit_fleet(*asked(), monitor=watch, folder=tmp_path)
     fleet.update({name: year(seed, 30, "2026-01-01", 0.1 * (name == "a")) for seed, name in enumerate("abcd")})
-    assert fleet.discoveries().called == ["a"]
+    assert fleet.discoveries().bridges == ["a"]
     fleet.acknowledge("a", 1, harmless=True, note="a train stood on it")
     for known in (fleet, Fleet(tmp_path)):
         assert known.events["note"].tolist() == ["a train stood on it"]
-        assert known.discoveries().called == []
+        assert known.discoveries().bridges == []
     with pytest.raises(ValueError, match="'x' is no bridge with a monitor"):
         fleet.acknowledge("x", 1, harmless=True)
 

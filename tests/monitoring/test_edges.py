@@ -145,8 +145,9 @@ def test_a_detector_that_drops_large_changes_is_refused_and_a_blind_one_is_repor
     drops = make_pipeline(DropsOutliers(), *(step for _, step in detector(MODES).steps))
     with pytest.raises(ValueError, match="drops or fills large changes"):
         Monitor(drops, sensors=False).fit(truss()[:N_BASELINE])
+    blind = Monitor(detector(MODES, Bounded()), sensors=False, persistence=1, false_alarms_per_year=0.5)
     with pytest.warns(UserWarning, match="does not see damage"):
-        Monitor(detector(MODES, Bounded()), sensors=False, false_alarms_per_year=0.5).fit(truss()[:N_BASELINE])
+        blind.fit(truss()[:N_BASELINE])
 
 
 def with_displacement():
@@ -172,7 +173,7 @@ def test_responses_may_have_any_sign_and_unit():
     assert set(moved.update(new.assign(d=new["d"] - 10.0))["state"][SETTLED:]) == {"alarm"}
     assert moved.faults_.empty
     stuck = pickle.loads(pickle.dumps(monitor))
-    assert set(stuck.update(new.assign(d=0.0))["state"][2 * SETTLED :]) == {"not evaluated"}
+    assert "healthy" not in set(stuck.update(new.assign(d=0.0))["state"][2 * SETTLED :])
     assert "repeats 0 mm" in stuck.faults_["detail"].iloc[0]
     monitor.update(new[:1].assign(d=500.0))
     assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]

@@ -24,7 +24,7 @@ from skthermo.detection import (
 )
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._promise import find_events
+from skthermo.monitoring._false_alarms import find_events
 from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]

@@ -5,13 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.decomposition import PCA
-from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import NotFittedError
-from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import MahalanobisDetector
-from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PODCurveDisplay
+from skthermo.plotting import DetectorsDisplay, PODCurveDisplay
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, pod_curve
 from skthermo.studies.detectability._findings import StudyFindings
 
@@ -237,27 +233,6 @@ def test_labelled_scores_are_of_judged_records_from_the_onset_on():
         study.labelled_scores("other")
     with pytest.raises(ValueError, match="60 healthy and 0 damaged"):
         study.labelled_scores("raw", scenarios=["roof"])
-
-
-def test_damage_indices_of_a_study_have_a_panel_for_each_detector():
-    study, random = made_study(), np.random.default_rng(1)
-    study.indices_ = {key: pd.Series(random.uniform(1, 3, 20)) for key in study.indices_}
-    study.thresholds_ = {"raw": 2.0, "whitened": 2.5}
-    study.detectors_ = {"raw": MahalanobisDetector(), "whitened": make_pipeline(PCA(), MahalanobisDetector())}
-    display = DamageIndexDisplay.from_study(study, ["healthy", "deck"])
-    assert [ax.get_title() for ax in display.axes_] == ["raw", "whitened"]
-    assert [line.get_ydata()[0] for line in display.threshold_lines_] == [2.0, 2.5]
-    for name, points in display.points_.items():
-        for line, state in zip(points, ["healthy", "deck"], strict=True):
-            np.testing.assert_array_equal(line.get_ydata(), study.indices_[name, state, "simulated"])
-    assert "unsquared" in display.axes_[0].get_ylabel()
-    study.detectors_["raw"] = IsolationForest()
-    assert "unsquared" not in DamageIndexDisplay.from_study(study).axes_[0].get_ylabel()
-    with pytest.raises(ValueError, match=r"scenarios are \['other'\]; expected some of \['healthy', 'deck', 'later'\]"):
-        DamageIndexDisplay.from_study(study, ["other"])
-    study.thresholds_["raw"] = None
-    with pytest.raises(ValueError, match="threshold of 'raw' is None"):
-        DamageIndexDisplay.from_study(study)
 
 
 def test_a_curve_of_a_study_is_that_of_the_detector_that_is_named():

@@ -1,15 +1,14 @@
 """A fleet whose bridges are given, with the attributes of a fitted one."""
 
-import numpy as np
 import pandas as pd
 
-from skthermo.fleet._discoveries import Discoveries
+from skthermo.fleet._discoveries import COLUMNS, Discoveries
 
 
 class FakeFleet:
     """Monitors, chains and errors by bridge; a bridge is fitted if it has a chain or a monitor."""
 
-    def __init__(self, monitors=(), chains=(), errors=(), warned=(), kept=()):
+    def __init__(self, monitors=(), chains=(), errors=(), warned=(), significant=()):
         self.monitors, self.chains = dict(monitors), dict(chains)
         names = list(dict.fromkeys([*self.monitors, *self.chains, *dict(errors)]))
         self.errors = pd.DataFrame(
@@ -18,16 +17,17 @@ class FakeFleet:
         is_fitted = [name in self.monitors or name in self.chains for name in names]
         self.table = pd.DataFrame({"is_fitted": is_fitted}, pd.Index(names, name="bridge", dtype=object))
         self.warnings = pd.DataFrame(list(warned), columns=["bridge", "kind", "message"])
-        self.kept = set(kept)
+        self.significant = set(significant)
 
-    def discoveries(self, share=0.1):
+    def discoveries(self, fdr=0.1):
         rows = [
-            (name, number, (name, number) in self.kept)
+            {"bridge": name, "event": number, "p_value": 0.001 if (name, number) in self.significant else 0.5} | event
             for name, monitor in self.monitors.items()
             if monitor is not None
-            for number in monitor.events_.index[monitor.events_["kind"] == "damage"]
+            for number, event in monitor.events_.to_dict("index").items()
+            if event["kind"] == "damage"
         ]
-        table = pd.DataFrame(rows, columns=["bridge", "event", "is_discovery"]).astype({"is_discovery": bool})
-        table["p_value"] = np.linspace(0, 1, len(table))
+        table = pd.DataFrame(rows, columns=[*COLUMNS, "is_discovery"])
+        table["is_discovery"] = table["end"].isna() & (table["p_value"] < 0.01)
         p_values = pd.Series(1.0, list(self.monitors))
-        return Discoveries(share, table, p_values, [], 0.5, float(len(self.monitors)))
+        return Discoveries(fdr, table, p_values, 0.01, [], 0.5, float(len(self.monitors)))

@@ -54,8 +54,8 @@ def fleet():
     errors = {"failed": f"ValueError: {QUOTED}", "not updated": "OSError (new records): no such file"}
     monitors["not updated"] = FakeMonitor()
     warned = [(HOSTILE, "offset", HOSTILE), ("only fitted", "gaps", QUOTED)]
-    kept = {(HOSTILE, 1), ("unexplained", 1), ("explained", 1)}
-    made = FakeFleet(monitors, {"only fitted": chain}, errors, warned, kept)
+    significant = {(HOSTILE, 1), ("unexplained", 1), ("explained", 1)}
+    made = FakeFleet(monitors, {"only fitted": chain}, errors, warned, significant)
     made.monitors = Unreadable(made.monitors)
     return made
 
@@ -119,10 +119,10 @@ def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
 
 def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert not [tag for tag, _ in page.tags if tag in ("script", "link", "iframe", "object", "form")]
-    assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "promise", "warnings", "settings"]
+    assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "false-alarms", "warnings", "settings"]
     assert f"ValueError: {QUOTED}" in page.text
     assert "OSError: checksum <wrong>" in page.text
-    assert "raise about 11 false alarms a year" in page.text
+    assert "expect 11 false alarms a year" in page.text
     assert all(line in page.text for line in fleet.discoveries(0.1).summary().splitlines())
     fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
     assert "with a mean error of" in fitted.text
@@ -133,8 +133,8 @@ def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
     well = FakeFleet({0: FakeMonitor(), 1: FakeMonitor()})
     text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
     assert "No alarm: all 2 bridges are healthy" in text
-    assert "There has been no damage event in the last year" in text
-    events = FakeFleet({0: FakeMonitor(), 1: FakeMonitor(events=[ENDED])}, kept={(1, 1)})
+    assert "None of the 2 evaluated bridges is in alarm" in text
+    events = FakeFleet({0: FakeMonitor(), 1: FakeMonitor(events=[ENDED])}, significant={(1, 1)})
     past = Page(owner_report(events, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
     assert "No alarm now, but 1 of 2 bridges had one that nobody has explained" in past
     late = Page(owner_report(well, tmp_path / "a.html", now="2025-09-01").read_text(encoding="utf-8")).text
@@ -153,12 +153,12 @@ def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
 
 def test_by_the_size_of_alarm_drift_and_silence():
     monitors = [FakeMonitor(events=[{**event_row("2025-06-01", None), "peak": peak}]) for peak in (4.0, 30.0)]
-    alarms = [Bridge.watched(0, Standing.of(monitor, NOW), set()) for monitor in monitors]
+    alarms = [Bridge.watched(0, Standing.of(monitor, NOW)) for monitor in monitors]
     assert alarms[1].order < alarms[0].order
     assert "highest 10.00" in alarms[1].index
-    worn = [Bridge.watched(0, Standing.of(FakeMonitor(drift=drift_of(-c)), NOW), set()) for c in (0.1, 0.3)]
+    worn = [Bridge.watched(0, Standing.of(FakeMonitor(drift=drift_of(-c)), NOW)) for c in (0.1, 0.3)]
     assert worn[1].order < worn[0].order
-    silent = [Bridge.watched(0, Standing.of(FakeMonitor(n_days=n), NOW), set()) for n in (150, 20)]
+    silent = [Bridge.watched(0, Standing.of(FakeMonitor(n_days=n), NOW)) for n in (150, 20)]
     assert silent[1].order < silent[0].order
     assert silent[1].since == FakeMonitor(n_days=20).last_
     assert [bridge.days for bridge in silent] == ["1 of 31\xa0days", "0 of 31\xa0days"]

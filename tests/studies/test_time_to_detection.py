@@ -200,7 +200,7 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
             warnings.simplefilter("ignore")  # of thresholds learned from too few windows
             study.run(WEATHER)
         words.append(study.time_to_detection().set_index("scenario").loc["bottom 0.1 %", "text"])
-    assert words[0].endswith("so that such an alarm tells little")
+    assert words[0].endswith("so that such an alarm says little")
     assert words[1] == "is not found in 95 of 100 cases within the 365 days of the records"
 
 

@@ -139,7 +139,7 @@ def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of
 def test_the_report_says_what_weather_is_the_fleets():
     report = fitted()[0].report_
     assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
-    assert re.search("predictions stand on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
+    assert re.search("predictions are based on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
     assert not list(chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings())
     T, F = bridge(0, 15)
     alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_

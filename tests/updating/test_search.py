@@ -81,18 +81,6 @@ def test_differences_are_one_sided_beside_theta_without_modes():
     np.testing.assert_allclose(found.iloc[:, 1:], exact.iloc[:, 1:], atol=1e-5)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_too_few_iterations_warn_and_small_weights_of_shapes_are_named(method):
-    frequencies, shapes = TRUSS.modes([OUTSIDE])
-    updater = ModelUpdater(TRUSS, method=method, max_iter=2)
-    with pytest.warns(UserWarning, match=r"not converged in \d evaluations.* expected a higher max_iter, or"):
-        updater.fit(frequencies)
-    assert not updater.starts_["success"].any()
-    updater.set_params(shape_weight=1.0)
-    with pytest.warns(UserWarning, match="a higher max_iter, shape weights of 100 or more, or"):
-        updater.fit(frequencies, shapes=shapes[0], dofs=range(TRUSS.n_dof))
-
-
 @pytest.mark.parametrize("missing", [[], [1, 4]], ids=["all modes", "some modes"])
 @pytest.mark.parametrize("with_shapes", [False, True], ids=["frequencies", "and shapes"])
 def test_a_reduced_model_warns_once_of_an_optimum_outside_its_box(with_shapes, missing):

@@ -44,12 +44,6 @@ def test_a_power_law_has_its_exponents_as_sensitivities():
     assert known.condition_number == pytest.approx(values[0] / values[1], rel=1e-4)
 
 
-def test_at_the_smallest_step_rounding_takes_half_of_the_digits():
-    model = CallableModel(lambda row: row**0.5, ["k", "m"], 2)
-    S = sensitivity(model, [0.7, 1.3], method="central", step=1.5e-8)
-    np.testing.assert_allclose(S, np.diag([0.5, 0.5]), atol=5e-8)
-
-
 def test_a_model_without_frequencies_has_no_sensitivities():
     with pytest.warns(UserWarning, match="NaN"), pytest.raises(ValueError, match="expected numbers"):
         sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1), method="central")
@@ -69,21 +63,6 @@ def test_parameters_that_act_alike_are_collinear_and_have_no_deviation():
     assert known.condition_number == np.inf
     assert len(known.recommended) == 2
     assert not {"a", "twin"} <= set(known.recommended)
-
-
-def test_the_summary_counts_parameters_and_modes():
-    springs = identifiability(series_of_springs(), noise=0.001)
-    first, second, third, *_ = springs.summary().split("\n")
-    assert first == "4 parameters, 2 modes."
-    assert second.startswith("At most 2 of the 4 parameters can be found together.")
-    assert third == "Cannot be told apart: a and twin."
-    assert repr(springs).startswith(springs.summary())
-    truss = identifiability(make_truss(), noise=0.001)
-    assert truss.rank == 4
-    assert truss.summary().split("\n") == [
-        "4 parameters, 6 modes.",
-        "Can be found together within 10 % with this noise, the others being known: diagonal, bottom and top.",
-    ]
 
 
 @pytest.mark.parametrize("n_modes", [1, 2, 3])

@@ -196,18 +196,6 @@ def test_models_without_derivatives_are_differenced():
     np.testing.assert_allclose(revived.model_.frequencies([np.ones(4)]), TRUSS.frequencies([TRUTH]), rtol=1e-5)
 
 
-def test_the_updater_follows_scikit_learn():
-    updater = ModelUpdater(TRUSS, bounds=0.2, prior=0.5, n_starts=2, random_state=0)
-    twin = clone(updater)
-    assert twin.model is TRUSS
-    assert repr(twin.get_params()) == repr(updater.get_params())
-    F = TRUSS.frequencies([TRUTH])
-    assert updater.fit(F) is updater
-    revived = pickle.loads(pickle.dumps(updater))
-    np.testing.assert_array_equal(revived.theta_, updater.theta_)
-    np.testing.assert_array_equal(revived.model_.frequencies([np.ones(4)]), updater.model_.frequencies([np.ones(4)]))
-
-
 def test_the_updated_model_composes_with_the_chain():
     year = make_truss_campaign(random_state=0)
     updater = ModelUpdater(TRUSS).fit(year.frequencies)
@@ -277,11 +265,3 @@ def test_where_a_reduced_model_searches_the_optimum_is_the_full_models(dofs):
     assert reduced.starts_["objective"].min() <= full.starts_["objective"].min() * (1 + 1e-6)
     assert len(reduced.starts_) == 4
     assert FRAME.reduction_pays(10_000)
-
-
-def test_a_reduced_search_needs_a_model_that_can_be_reduced():
-    program = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, TRUSS.n_modes, vectorized=True)
-    F = TRUSS.frequencies(TRUTH)
-    np.testing.assert_allclose(ModelUpdater(program, reduce="auto").fit(F).theta_, TRUTH, rtol=1e-4)
-    with pytest.raises(ValueError, match="has no method 'reduced'"):
-        ModelUpdater(program, reduce=True).fit(F)

@@ -36,15 +36,6 @@ def test_shapes_need_a_model_with_local_modes():
         ModelUpdater(model).fit(F, shapes=SHAPES, dofs=range(5))
 
 
-def test_a_shape_counts_one_residual_less_than_degrees_of_freedom():
-    only_first = np.where(np.arange(6) == 0, F, np.nan)
-    shape = np.where(np.arange(6) == 0, SHAPES[:3], np.nan)
-    with pytest.warns(UserWarning, match="4 parameters are to be found from 3 residuals"):
-        ModelUpdater(TRUSS, shape_weight=1.0).fit(only_first, shapes=shape, dofs=range(3))
-    with pytest.warns(UserWarning, match="4 parameters are to be found from 1 residuals"):
-        ModelUpdater(TRUSS).fit(only_first, shapes=shape, dofs=range(3))
-
-
 def test_a_prior_goes_by_name():
     measured = TRUSS.frequencies([[0.9, 1.0, 1.0, 1.0]])
     by_name = {"top": 1e-6, "bottom": 1.0, "diagonal": 1e-6, "vertical": 1e-6}

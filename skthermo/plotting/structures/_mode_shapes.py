@@ -7,9 +7,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import check_theta
 from skthermo._tables.arrays import Array
 from skthermo.fem import ModalModel, Structure
 from skthermo.plotting._display import Display
@@ -84,7 +82,6 @@ class ModeShapesDisplay(Display):
         structure: Structure,
         model: ModalModel | None = None,
         modes: Sequence[int] | None = None,
-        theta: ArrayLike | None = None,
         *,
         groups: Sequence[str] | None = None,
         **options: object,
@@ -96,11 +93,10 @@ class ModeShapesDisplay(Display):
         structure : Structure
             Nodes, members and supports.
         model : FE model, optional
-            Assembled from the structure, with the method ``modes``; by default with its groups as parameters.
+            Assembled from the structure, with the method ``modes``, and drawn with all parameters 1; by default with
+            the structure's groups as parameters.
         modes : sequence of int, optional
             Columns of the model, from 0; by default all, or the first six of the structure.
-        theta : array-like of shape (n_parameters,), optional
-            Multipliers of the model's parameters; by default all 1.
         groups : sequence of str, optional
             Groups whose members are drawn; by default all members.
         **options : dict
@@ -124,9 +120,7 @@ class ModeShapesDisplay(Display):
             model = structure.assemble(sorted(structure.groups), n_modes=n_modes)
         if not hasattr(model, "modes"):
             raise ValueError(f"{model!r:.200} has no method 'modes'; expected a model assembled from the structure")
-        names = model.parameter_names
-        row = np.ones((1, len(names))) if theta is None else np.atleast_2d(check_theta(theta, names, one_row=True))
-        frequencies, shapes = model.modes(row)
+        frequencies, shapes = model.modes(np.ones((1, len(model.parameter_names))))
         if shapes.shape[1] != len(structure.dofs):
             raise ValueError(
                 f"the model's shapes have {shapes.shape[1]} degrees of freedom; expected the structure's "

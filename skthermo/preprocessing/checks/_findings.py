@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import MARKERS, check_same_rows, column_names, columns_by_sensor
+from skthermo._tables.frames import MARKERS, Table, check_same_rows, column_names, columns_by_sensor
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.times import row_times
 from skthermo.exceptions import RecordsWarning
@@ -205,14 +204,14 @@ class _Records:
     sensors: dict[Hashable, list[int]]
     modes: list[Hashable]
     order: NDArray[np.intp]
-    index: Any
+    index: pd.Index
     unit: str
     outliers: NDArray[np.bool_]
     has_stuck_sensors: bool = False
     memory: MemoryFindings | None = None
 
     @classmethod
-    def of(cls, temperatures: Any, frequencies: Any, unit: str) -> _Records:
+    def of(cls, temperatures: Table, frequencies: Table, unit: str) -> _Records:
         order = np.argsort(row_times(temperatures), kind="stable")
         index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
         T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
@@ -248,12 +247,12 @@ class _Records:
         """First and last of some rows."""
         return f"{self.label(rows[0])} to {self.label(rows[-1])}" if len(rows) > 1 else self.label(rows[0])
 
-    def finding(self, what: str, column: Any, rows: NDArray[np.intp], detail: str) -> list[Any]:
+    def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> list[object]:
         """A row of the table."""
         return [what, column, len(rows), self.index[rows[0]], self.index[rows[-1]], detail]
 
 
-def _stuck(records: _Records) -> Iterator[list[Any]]:
+def _stuck(records: _Records) -> Iterator[list[object]]:
     first = [(name, columns[0]) for name, columns in records.sensors.items()]  # lags repeat what a sensor shows
     modes = [(name, column) for column, name in enumerate(records.modes)]
     for what, table, columns in (("stuck sensor", records.T, first), ("stuck mode", records.F, modes)):
@@ -268,7 +267,7 @@ def _stuck(records: _Records) -> Iterator[list[Any]]:
                 records.has_stuck_sensors |= table is records.T
 
 
-def _against_weather(records: _Records) -> Iterator[list[Any]]:
+def _against_weather(records: _Records) -> Iterator[list[object]]:
     first = [columns[0] for columns in records.sensors.values()]  # with lags, rows know the weather of others
     now = records.T[:, first]
     basis = WeatherBasis.of(now)
@@ -297,11 +296,11 @@ def _against_weather(records: _Records) -> Iterator[list[Any]]:
     yield from changes
 
 
-def _with_stamps(records: _Records) -> Any:
+def _with_stamps(records: _Records) -> Table:
     return pd.DataFrame(index=records.index) if isinstance(records.index, pd.DatetimeIndex) else records.T
 
 
-def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[Any], Array]]:
+def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[object], Array]]:
     """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
     if records.has_stuck_sensors:
         return
@@ -324,7 +323,7 @@ def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[Any], Arra
             yield records.finding("memory", sensor, usable, detail), inputs
 
 
-def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[Any]]:
+def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[object]]:
     for (first, second), rows in swapped_modes(lines, records.F, folds):
         names = f"{records.modes[first]!r} and {records.modes[second]!r}"
         n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
@@ -333,7 +332,7 @@ def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iter
         records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
 
 
-def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[Any]]:
+def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[object]]:
     F = records.F
     rest = F - np.where(np.isnan(lines).any(axis=1)[:, np.newaxis], median(F), out_of_fold(lines, F, folds))
     distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
@@ -345,7 +344,7 @@ def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Itera
     yield from _outliers_found(records, far & (deviation > 0))
 
 
-def _absurd(records: _Records) -> Iterator[list[Any]]:
+def _absurd(records: _Records) -> Iterator[list[object]]:
     """Values of twice or half the median of their mode, which need no weather to be doubtful."""
     middle, deviation = median(records.F), robust_deviation(records.F)
     with np.errstate(invalid="ignore"):
@@ -354,7 +353,7 @@ def _absurd(records: _Records) -> Iterator[list[Any]]:
     yield from _outliers_found(records, far)
 
 
-def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[Any]]:
+def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[object]]:
     F = records.F
     for name, column, is_far in zip(records.modes, F.T, far.T, strict=True):
         rows = np.flatnonzero(is_far)
@@ -382,10 +381,10 @@ def _shifted(records: _Records, shift: TimeShift) -> tuple[NDArray[np.intp], str
     return rows, detail
 
 
-def _changes(records: _Records, inputs: Array) -> tuple[list[list[Any]], Array]:
+def _changes(records: _Records, inputs: Array) -> tuple[list[list[object]], Array]:
     """Steps and trends that are found beside the weather, and what they add to each frequency."""
     level = np.zeros(records.F.shape)
-    found: list[list[Any]] = []
+    found: list[list[object]] = []
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)

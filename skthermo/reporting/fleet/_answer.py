@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._tables.text import counted, counted_number, significant
-from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
-from skthermo.reporting.fleet._bridge import CALLED, FAILED, OPEN, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo._tables.text import counted
+from skthermo.reporting._html import Html, Section, element, joined, paragraphs, section, table
+from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, banner, first_section
 
 MOST_NAMED = 5  # largest number of bridges in a sentence
@@ -26,33 +26,32 @@ COUNTED = {
 
 
 def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any, written: str) -> Section:
-    """How many bridges are in which state, which ones need somebody, and what to do."""
+    """How many bridges are in which state, which ones are in alarm and for how long, and what to do."""
     numbers = pd.Series([bridge.state for bridge in bridges]).value_counts()
     counts = [f"{numbers[state]:,} {text}" for state, text in COUNTED.items() if numbers.get(state, 0)]
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
-    unexplained = sum(bridge.place == UNEXPLAINED for bridge in bridges)
+    unexplained = [bridge for bridge in bridges if bridge.place == UNEXPLAINED]
     state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
     state = NOT_EVALUATED if unknown and state == HEALTHY else state
-    headline = _headline(numbers, len(bridges), unknown, unexplained)
+    headline = _headline(numbers, len(bridges), unknown, len(unexplained))
     standing = banner(state, written, headline, f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}.")
+    alarms = [bridge for bridge in bridges if bridge.state == ALARM]
     known = [
-        _named(bridges, links, CALLED, "In alarm, and standing out among all bridges"),
-        _named(bridges, links, OPEN, "In alarm, but no more than chance may give among so many bridges"),
-        _named(bridges, links, UNEXPLAINED, "An event has ended, and nobody has said what it was"),
-        *_false_alarms(found),
+        _named(alarms, links, "In alarm"),
+        _named(unexplained, links, "An event that would be significant has ended, and is not yet explained"),
+        *([] if found is None else found.summary().splitlines()),
     ]
     if unknown:
         known.append(
-            f"Nothing is known of {counted(unknown, 'bridge')}: without a judged record there is no alarm, and no "
+            f"Nothing is known of {counted(unknown, 'bridge')}: without an evaluated record there is no alarm, and no "
             "alarm there does not mean healthy."
         )
     words = (
         "A monitor compares the natural frequencies of a bridge with those of its healthy time in the same weather. "
-        "An event begins when its damage index exceeds a threshold. An alarm does not prove damage, and healthy means "
-        "that no change is seen, not that there is none."
+        "An event begins when its damage index exceeds a threshold for several records in a row. An alarm does not "
+        "prove damage, and healthy means that no change is seen, not that there is none."
     )
-    known = [text for text in known if text]
-    return first_section("The bridges today", standing, known, _steps(bridges), words)
+    return first_section("The bridges today", standing, [text for text in known if text], _steps(bridges), words)
 
 
 def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) -> str:
@@ -72,26 +71,21 @@ def _is(number: int) -> str:
     return "is" if number == 1 else "are"
 
 
-def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], place: int, text: str) -> Html:
-    """A sentence that names the bridges of one place, the worst first; nothing without any."""
-    names = [bridge.name for bridge in bridges if bridge.place == place]
-    if not names:
+def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) -> Html:
+    """A sentence that names bridges, the worst first, with how long they are in alarm and their small print."""
+    if not bridges:
         return Html()
-    shown = [element("a", name, href=links[name]) for name in names[:MOST_NAMED]]
-    rest = f" and {len(names) - MOST_NAMED:,} more, in the table" if len(names) > MOST_NAMED else ""
+    shown = [
+        joined([element("a", one.name, href=links[one.name]), Html(one.duration), _small(one.note)])
+        for one in bridges[:MOST_NAMED]
+    ]
+    rest = f" and {len(bridges) - MOST_NAMED:,} more, in the table" if len(bridges) > MOST_NAMED else ""
     listed = [part for one in shown for part in (", ", one)][1:]
     return element("span", element("strong", f"{text}: "), *listed, f"{rest}.")
 
 
-def _false_alarms(found: Any) -> list[str]:
-    """How many false alarms all monitors raise, which bridges stand out, and how many of these are false."""
-    if found is None:
-        return []
-    n_false = counted_number(float(significant(found.promised_false_per_year, 2)), "false alarm")
-    told = f"Even if all bridges stay healthy, their monitors together raise about {n_false} a year."
-    if not len(found.table):
-        return [told, "There has been no damage event in the last year that was not said to be harmless."]
-    return [told, f"{counted(len(found.table), 'damage event')} in the last year.", *found.summary().splitlines()]
+def _small(note: str) -> Html:
+    return element("small", f"({note})") if note else Html()
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:
@@ -99,8 +93,8 @@ def _steps(bridges: Sequence[Bridge]) -> list[str]:
     steps = []
     if ALARM in states:
         steps.append(
-            "Have the bridges in alarm looked at, from the top of the table down. Those further down may be false "
-            "alarms; look at their records first."
+            "Inspect the bridges in alarm, from the top of the table down. Of those that are not significant, look at "
+            "the records first."
         )
     if UNEXPLAINED in places:
         steps.append("Find out what the events were that have ended, and acknowledge them.")

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.text import counted, listed, percent
+from skthermo._tables.text import counted, duration_text, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
 from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, Standing, moment
 
 FAILED, UNWATCHED = "not fitted", "no monitor"
 UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
-STANDS_OUT, MAY_BE_CHANCE = "Stands out among all bridges.", "Chance among so many bridges may explain it."
-MONTH = 31  # days whose share that was judged is told
+NOT_SIGNIFICANT = "not significant after correction for many bridges; inspect"
+MONTH = 31  # days of which the table says how many were evaluated
 
-CALLED, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
-"""Places of a bridge, the worst first: an open event that stands out among all bridges; an open event; an event that
-stood out, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a monitor; a drift
-beyond its error; healthy."""
+SIGNIFICANT, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
+"""Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
+that would be significant, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a
+monitor; a drift beyond its error; healthy."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class Bridge:
     drift: str = ""
     days: str = ""
     n_warnings: int = 0
-    n_events: int = 0
+    duration: str = ""  # of the alarm
+    note: str = ""  # in small print
 
     @property
     def order(self) -> tuple[int, float]:
@@ -53,7 +54,7 @@ class Bridge:
 
     @classmethod
     def unwatched(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose model was fitted, and whose new records nobody judges."""
+        """A bridge whose model was fitted, and whose new records are not evaluated."""
         return cls(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings)
 
     @classmethod
@@ -62,19 +63,27 @@ class Bridge:
         return cls(name, NOT_EVALUATED, SILENT, np.inf, why=error, n_warnings=n_warnings)
 
     @classmethod
-    def watched(cls, name: Hashable, standing: Standing, called: set[int], n_warnings: int = 0) -> Bridge:
-        """A bridge as its monitor sees it; ``called`` are the numbers of its events that stand out among all."""
+    def watched(
+        cls,
+        name: Hashable,
+        standing: Standing,
+        *,
+        is_significant: bool = False,
+        unexplained: Sequence[int] = (),
+        n_warnings: int = 0,
+    ) -> Bridge:
+        """A bridge as its monitor sees it; ``unexplained`` are the numbers of its events that have ended so."""
         opened = standing.opened("damage")
-        ended = standing.events[standing.events["end"].notna() & ~standing.events["acknowledged"].astype(bool)]
-        unexplained = [number for number in ended.index if number in called]
         threshold = float(standing.monitor.threshold_)
         highest = float(opened["peak"].max()) / threshold if len(opened) else np.nan
         change, drift = _drift(standing)
-        place, size = WELL, change
+        place, size, duration, note = WELL, change, "", ""
         if standing.state == ALARM:
-            place, size = CALLED if called & set(opened.index) else OPEN, highest
+            place, size = (SIGNIFICANT if is_significant else OPEN), highest
+            duration = f" for {duration_text(max(standing.now - opened['start'].min(), standing.step))}"
+            note = "" if is_significant else NOT_SIGNIFICANT
         elif unexplained:
-            place, size = UNEXPLAINED, float(ended.loc[unexplained, "peak"].max()) / threshold
+            place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
         elif standing.state == ATTENTION:
             place = WORN
         elif standing.state == NOT_EVALUATED:
@@ -90,13 +99,14 @@ class Bridge:
             place,
             size,
             _since(standing, opened),
-            _why(standing, place, opened, unexplained),
+            _why(standing, opened, unexplained),
             _index(standing, threshold, highest),
             line(days["index_max"], threshold),
             drift,
             f"{n_evaluated} of {counted(len(month), 'day')}" if standing.has_records else "none",
             n_warnings,
-            len(standing.events),
+            duration,
+            note,
         )
 
 
@@ -110,12 +120,11 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     return ends.max() if len(ends) else standing.monitor.days_.index[0]
 
 
-def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list[int]) -> str:
+def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -> str:
     """What an owner should know beside the state."""
     texts = []
     if standing.state == ALARM:
         modes = listed(sorted({mode for text in opened["modes"] if text for mode in str(text).split(", ")}))
-        texts.append(STANDS_OUT if place == CALLED else MAY_BE_CHANCE)
         texts.append(f"Modes that drive it: {modes}." if modes else "")
         if standing.is_silent:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
@@ -126,9 +135,8 @@ def _why(standing: Standing, place: int, opened: pd.DataFrame, unexplained: list
     if standing.error and standing.state == ALARM:
         texts.append(f"New records could not be used: {standing.error}.")
     if unexplained:
-        number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(unexplained)}"
-        verb = "stood out among all bridges, has" if len(unexplained) == 1 else "stood out among all bridges, have"
-        texts.append(f"{number} {verb} ended, and nobody has said yet what it was.")
+        number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
+        texts.append(f"{number} would be significant, but ended before anybody explained what it was.")
     if len(standing.failed):
         texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
     return " ".join(text for text in texts if text)
@@ -139,7 +147,7 @@ def _more(failed: pd.DataFrame) -> str:
 
 
 def _drift(standing: Standing) -> tuple[float, str]:
-    """Largest loss of stiffness beyond its error, and how the table tells of it."""
+    """Largest loss of stiffness beyond its error, and its text in the table."""
     found = standing.monitor.drift_
     if found is None:
         return 0.0, "not followed"
@@ -152,9 +160,9 @@ def _drift(standing: Standing) -> tuple[float, str]:
 
 
 def _index(standing: Standing, threshold: float, highest: float) -> str:
-    """Newest judged damage index over the threshold, and the highest of an event that is open."""
+    """Newest evaluated damage index over the threshold, and the highest of an event that is open."""
     known = standing.evaluations["index"].dropna()
     if not len(known):
-        return "none judged"
+        return "none evaluated"
     text = f"{known.iloc[-1] / threshold:.2f}"
     return f"{text}, highest {highest:.2f}" if highest == highest else text

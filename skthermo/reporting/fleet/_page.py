@@ -39,7 +39,7 @@ COLUMNS = [
     "Since",
     "Damage index over threshold",
     "Slow change",
-    "Days judged in the last month",
+    "Days evaluated in the last month",
     "Warnings",
 ]
 HEADLINES = {
@@ -51,14 +51,12 @@ HEADLINES = {
         "Not evaluated: its monitor cannot be used",
         "An engineer should look at the monitor of this bridge; the others are not affected.",
     ),
-    UNWATCHED: ("Not evaluated: no monitor", "Records that come are judged once the bridge has a monitor."),
+    UNWATCHED: ("Not evaluated: no monitor", "New records are evaluated once the bridge has a monitor."),
 }
 """What heads the page of a bridge without a monitor that can be asked, and what to do."""
 
 
-def fleet_page(
-    fleet: Fleet, file: Path, title: str, now: Time, limit: float, share: float
-) -> tuple[Html, list[Section]]:
+def fleet_page(fleet: Fleet, file: Path, title: str, now: Time, limit: float, fdr: float) -> tuple[Html, list[Section]]:
     """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
     written = moment(_as_written(now))
     folder = folder_of(file)
@@ -66,15 +64,15 @@ def fleet_page(
     names = list(fleet.table.index)
     files = page_names(names)
     links = {name: link(folder.name, files[name]) for name in names}
-    found = fleet.discoveries(share) if len(fleet.monitors) else None
+    found = fleet.discoveries(fdr) if len(fleet.monitors) else None
     writer = PageWriter(fleet, found, folder, files, element("a", title, href=link("..", file.name)), now, limit)
     bridges = sorted((writer.write(name) for name in names), key=lambda bridge: bridge.order)
     sections = [
         answer(bridges, links, found, written),
         _all_bridges(bridges, links),
-        _promise(found),
+        _false_alarms(found),
         warnings_of_all(fleet.warnings, fleet.errors),
-        _settings(fleet, limit, share),
+        _settings(fleet, limit, fdr),
     ]
     introduction = paragraphs(f"One row for each of {counted(len(bridges), 'bridge')}, the worst first.")
     return introduction, sections
@@ -93,14 +91,6 @@ class PageWriter:
     limit: float
 
     @cached_property
-    def called(self) -> dict[Hashable, set[int]]:
-        """Numbers of the events that stand out among all, by bridge."""
-        if self.found is None:
-            return {}
-        called = self.found.table[self.found.table["is_discovery"].astype(bool)]
-        return {name: set(rows["event"]) for name, rows in called.groupby("bridge")}
-
-    @cached_property
     def errors(self) -> dict[Hashable, str]:
         """Errors by bridge."""
         return {name: "; ".join(rows["error"].astype(str)) for name, rows in self.fleet.errors.groupby("bridge")}
@@ -112,10 +102,17 @@ class PageWriter:
         monitor, unread = _opened(self.fleet.monitors, name)
         error = self.errors.get(name, "")
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
-        told = bullets(messages) or paragraphs("There was no warning.")
-        listed = section("warnings", "Warnings of its fit", told, link="Warnings")
+        texts = bullets(messages) or paragraphs("There was no warning.")
+        listed = section("warnings", "Warnings of its fit", texts, link="Warnings")
         if standing is not None:
-            bridge = Bridge.watched(name, standing, self.called.get(name, set()), len(messages))
+            ended = self.found.unexplained
+            bridge = Bridge.watched(
+                name,
+                standing,
+                is_significant=name in self.found.bridges,
+                unexplained=ended.loc[ended["bridge"] == name, "event"].tolist(),
+                n_warnings=len(messages),
+            )
             introduction, sections = monitor_page(standing, is_one_of_many=True)
             sections[-1:-1] = [listed]
         else:
@@ -186,8 +183,9 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
         for bridge in bridges
     ]
     text = (
-        "The number behind the small line is the newest damage index over its threshold: an event opens above 1. The "
-        "line shows the highest index of each week of the last year, and the dashed line the threshold."
+        "The number behind the small line is the newest damage index over its threshold: an event opens when it is "
+        "above 1 for several records in a row. The line shows the highest index of each week of the last year, and the "
+        "dashed line the threshold."
     )
     caption = "All bridges, the worst first: alarms, lost stiffness, bridges of which nothing is known, healthy ones."
     return section("bridges", "All bridges", paragraphs(text), table(caption, COLUMNS, rows, is_cards=True))
@@ -200,39 +198,36 @@ def _state(bridge: Bridge) -> Html:
     word = "healthy again" if bridge.state == HEALTHY and bridge.place == UNEXPLAINED else word
     name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_EVALUATED
     badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
-    return element("span", badge, element("span", bridge.why, class_="text soft") if bridge.why else Html())
+    note = element("small", f"{bridge.duration.strip()} ({bridge.note})" if bridge.note else bridge.duration.strip())
+    return element("span", badge, note, element("span", bridge.why, class_="text soft") if bridge.why else Html())
 
 
-def _promise(found: Any) -> Section:
+def _false_alarms(found: Any) -> Section:
     """What few false alarms mean where there are many bridges."""
-    title = "What false alarms mean for many bridges"
     if found is None:
-        return section(
-            "promise", title, paragraphs("No bridge has a monitor, so that there are no alarms."), link="False alarms"
+        meaning = ("No bridge has a monitor, so that there are no alarms.",)
+    else:
+        meaning = (
+            "A monitor with one false alarm a year is a good one for one bridge. Two hundred such monitors raise one "
+            "on more than every second day. So the open events of all bridges are compared: an event is significant if "
+            "its damage index is so high that few healthy bridges reach it, of as many as there are.",
+            "Significant bridges are those of the procedure of Benjamini and Hochberg: over the years, "
+            f"{percent(found.fdr)} of them are expected to be healthy, and more in weather unlike that of the "
+            "baselines. An alarm that is not significant is not proved to be false: inspect its records, and wait for "
+            "the next weeks. Damage that no monitor detects is not counted here.",
         )
-    meaning = (
-        "A monitor that raises one false alarm a year is a good one for one bridge. Two hundred such monitors raise "
-        "one on more than every second day, and who follows each of them soon follows none. So the events of all "
-        "bridges are compared with what chance gives: an event whose index is so high that a healthy bridge reaches it "
-        "once in a hundred years stands out, one that comes once a year does not."
-    )
-    rule = (
-        "Bridges are singled out by the rule of Benjamini and Hochberg: of all that it singles out over the years, at "
-        f"most {percent(found.share)} are expected to be healthy, and more where single records are wrong or the "
-        "weather is unlike that of the baseline. An event of another bridge is not proved to be false: it only cannot "
-        "be told from the false ones that so many bridges give. Of damage that is missed, the rule says nothing."
-    )
-    return section("promise", title, paragraphs(meaning, rule), link="False alarms")
+    title = "What false alarms mean for many bridges"
+    return section("false-alarms", title, paragraphs(*meaning), link="False alarms")
 
 
-def _settings(fleet: Fleet, limit: float, share: float) -> Section:
+def _settings(fleet: Fleet, limit: float, fdr: float) -> Section:
     """What this page was made with."""
     monitors, chains = (f"{len(mapping):,}" for mapping in (fleet.monitors, fleet.chains))
     rows = [
         ["bridges", f"{len(fleet.table):,}"],
         ["of these fitted", chains],
         ["of these with a monitor", monitors],
-        ["loss of stiffness that is told", percent(limit)],
-        ["share of false ones among the bridges that are singled out", percent(share)],
+        ["loss of stiffness that is reported", percent(limit)],
+        ["false discovery rate of significant bridges", percent(fdr)],
     ]
     return settings("For the engineer who looks after the monitors.", "Settings of this page.", rows)

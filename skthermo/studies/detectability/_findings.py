@@ -14,7 +14,8 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
-from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, check_probability, families_of
+from skthermo.studies.detectability._intervals import check_probability
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
 from skthermo.studies.detectability._simulation import SIMULATED, EvaluatedRecords, Evaluation, ask_each

@@ -15,10 +15,10 @@ from scipy.stats import norm
 
 from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, is_real, real_array
+from skthermo._tables.arrays import Array, real_array
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._intervals import clopper_pearson
+from skthermo.studies.detectability._intervals import check_probability, clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
 MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
@@ -292,13 +292,6 @@ def pod_curve(
             "curve beside its points",
         )
     return curve
-
-
-def check_probability(value: ArrayLike, what: str) -> float:
-    """A probability strictly between 0 and 1, or an error."""
-    if not is_real(value) or not 0 < float(value) < 1:
-        raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
-    return float(value)
 
 
 def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike) -> tuple[Array, Array, Array]:

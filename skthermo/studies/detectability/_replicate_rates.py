@@ -34,7 +34,7 @@ from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario
 from skthermo.surrogate import FittedChain
 
-N_DRAWS = 3  # draws of the noise in each replicate, which tell its share from that of what else varies
+N_DRAWS = 3  # draws of the noise in each replicate, to separate its share from that of what else varies
 MOST_FAILURES = 0.5  # share of replicates that may fail
 SMALL = 0.1  # share of a variance that is not worth a word
 NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}
@@ -44,7 +44,7 @@ NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 class ReplicateRates:
     """Rates of alarms in replicates, (n_replicates, n_parts, n_draws), by detector and scenario, as parts are added
     one after the other, and ``own`` rates of the study's repeats; ``n_records`` are evaluated in each draw, and
-    ``with_noise`` tells whether bands hold the noise, too."""
+    ``with_noise`` says whether bands hold the noise, too."""
 
     rates: Mapping[Key, Array]
     own: Mapping[Key, Array]

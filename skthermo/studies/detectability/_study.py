@@ -22,7 +22,7 @@ from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
@@ -100,7 +100,7 @@ class DetectabilityStudy(BaseEstimator):
         `~skthermo.updating.ModelUpdater.sample_models` draws ``n_replicates`` from the mean of the training records,
         as it was measured, to which a perfect model would come within 0.5 %; stiffnesses are known to 15 % before.
     n_replicates : int, default=20
-        How many replicates the bands stand on.
+        How many replicates the bands are computed from.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None

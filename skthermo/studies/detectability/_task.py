@@ -23,8 +23,7 @@ from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
-from skthermo.studies.detectability._intervals import Rate, rate_of
-from skthermo.studies.detectability._pod_curve import check_probability
+from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
@@ -211,7 +210,7 @@ class DetectionTask(Bunch):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
 
-    def refit(self, detector: BaseEstimator) -> Any:
+    def refit(self, detector: BaseEstimator) -> BaseEstimator:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
         Parameters

@@ -18,7 +18,7 @@ from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
 FEW = 10  # number of cases found, or not found, below which their dependence is not estimated
-TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time tells little
+TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time says little
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ def waits_told(waits: Waits, false: Waits | None, level: float) -> str:
         return f"{text}; how often a healthy structure alarms by then is not known"
     by_chance = false.found(min(int(number), clock.n_steps), level)[0]
     text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
-    return f"{text}, so that such an alarm tells little" if by_chance > TELLS_LITTLE else text
+    return f"{text}, so that such an alarm says little" if by_chance > TELLS_LITTLE else text
 
 
 def soonest(table: pd.DataFrame, within: Sequence[str | int] | None) -> pd.DataFrame:

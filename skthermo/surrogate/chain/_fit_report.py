@@ -31,7 +31,7 @@ from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
-MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is told
+MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
@@ -112,7 +112,7 @@ class FitReport(SavesFrames):
         With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
     follows : mapping or None
-        Probability that the structure behaves as the fleet does, by family, where the mapper tells it.
+        Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
 
@@ -171,8 +171,8 @@ class FitReport(SavesFrames):
         n_modes, n_parameters = len(self.offsets), len(self.deviations)
         if n_parameters > n_modes:
             lines.append(
-                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot tell all of them "
-                "apart."
+                f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot distinguish all "
+                "of them."
             )
         if self.n_outside is not None:
             lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
@@ -185,7 +185,8 @@ class FitReport(SavesFrames):
             )
         if self.fleet is not None:
             lines.append(
-                f"In weather that these records have not seen, predictions stand on a fleet: {self._listed_weather()}."
+                "In weather that these records have not seen, predictions are based on a fleet: "
+                f"{self._listed_weather()}."
             )
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
@@ -391,7 +392,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
 
 
 def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records and, with those of a fleet, in what its mapper stands on."""
+    """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]

@@ -56,7 +56,7 @@ class TrainingRecords(SavesFrames):
     """
 
     temperatures: Table
-    frequencies: Any
+    frequencies: Table
     inputs: Array
     targets: Array
     learned: Array
@@ -121,10 +121,9 @@ class TrainingRecords(SavesFrames):
     ) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        Given are the fitted mapper, the function from parameters to frequencies in the measured domain, the discrepancy
-        and, for a mapper that states its errors, the function from parameters and their covariances to covariances of
-        ln f. By default, a fold holds every fifth of blocks of a week, or longer if
-        the residuals remember for longer.
+        ``frequencies_of`` gives frequencies in the measured domain, and ``propagated`` covariances of ln f for a mapper
+        that states its errors. By default, a fold holds every fifth of blocks of a week, or longer where residuals are
+        correlated for longer.
         """
         order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
@@ -189,7 +188,7 @@ def check_frequencies(F: Table, model: FEModel) -> None:
     check_columns(F, "frequency")
 
 
-def without_outliers(findings: RecordFindings, F: Table) -> Any:
+def without_outliers(findings: RecordFindings, F: Table) -> Table:
     """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
     far = findings.outliers
     if isinstance(F, pd.DataFrame) and far.index.is_unique:
@@ -223,7 +222,7 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
 
 
 def as_frame(table: Table) -> pd.DataFrame:
-    """A frame of records, of which the index tells the times."""
+    """A frame of records, whose index holds the times."""
     return table if isinstance(table, pd.DataFrame) else pd.DataFrame(as_floats(table), copy=False)
 
 
@@ -238,14 +237,8 @@ LARGEST_SEED = np.iinfo(np.int32).max
 class ServiceRecords:
     """Gaps and outliers of training records in order of time, as `RecordSimulator.service_of` gives them.
 
-    Parameters
-    ----------
-    missing : ndarray of bool of shape (n_records, n_sensors + n_modes)
-        Which temperatures and frequencies are not there.
-    outliers : ndarray of shape (n_records, n_modes)
-        Relative residuals of outliers, NaN where a value is none.
-    places : ndarray of shape (n_records, n_coordinates)
-        Weather of the records, in coordinates in which similar weather is near.
+    ``missing`` temperatures and frequencies, (n_records, n_sensors + n_modes); relative residuals of ``outliers``,
+    (n_records, n_modes), NaN where a value is none; ``places``, (n_records, n_coordinates), near for similar weather.
     """
 
     missing: NDArray[np.bool_]
@@ -263,10 +256,7 @@ class ServiceRecords:
     def of_raw(
         cls, records: TrainingRecords, residuals: BaselineResiduals, raw: ArrayLike, predicted: Array
     ) -> ServiceRecords:
-        """Learn from the training records before they were cleaned: what cleaning has changed or removed is an outlier.
-
-        Given are these frequencies, and those that are predicted for the rows.
-        """
+        """Learn from raw frequencies of the training records: what cleaning has changed or removed is an outlier."""
         measured = as_floats(raw)
         if measured.shape != np.shape(records.frequencies):
             raise ValueError(
@@ -312,11 +302,8 @@ class ServiceRecords:
         return taken
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
-        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none.
-
-        Their sizes are smoothed run by run, with the bandwidth of Silverman's rule on logarithms: the largest of a few
-        is not the largest of all that come.
-        """
+        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
+        run by run, with the bandwidth of Silverman's rule on logarithms."""
         drawn, logs = self.outliers[taken], np.log(np.abs(self.outliers))
         n_runs = _begins(self.outliers).sum()
         if n_runs < 2:
@@ -481,10 +468,7 @@ class RecordSimulator(SavesFrames):
 
 
 def fault_streams(random_state: np.random.RandomState) -> list[np.random.RandomState]:
-    """Random states of the records drawn from, of gaps and of outliers, beside the one of the noise.
-
-    They are the same whatever noise is drawn, and noise is the same without any faults.
-    """
+    """Random states of the records drawn from, of gaps and of outliers, the same whatever noise is drawn."""
     return [np.random.RandomState(seed) for seed in deepcopy(random_state).randint(LARGEST_SEED, size=3)]
 
 

@@ -53,10 +53,9 @@ MOST = 20_000  # records, spread evenly, that a discrepancy is learned from
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    ``learned`` holds the fitted regressors of the ratios; modes of which too little is known have none, so that the FE
-    model counts alone. They learn from the inputs of the temperature ``mapper``; missing temperatures are filled by
-    ``sensors``. ``levels`` and ``shares``, (n_modes,): a share of what a regressor adds to the mean level counts, the
-    slope of a regression of the ratios on what it predicts out of fold. ``regressor`` is the unfitted one.
+    ``learned`` holds the fitted regressors of the ratios, from inputs of the ``mapper``; modes with few records have
+    none. The changes that they add to the ``levels`` of the modes count by ``shares``, the slopes of the ratios over
+    what is predicted out of fold.
     """
 
     regressor: BaseEstimator
@@ -166,7 +165,7 @@ def ratio_regressor() -> TemperatureMapper:
 
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
-ALIGNED = 0.01  # relative change of frequencies by which the slope of an aligner is told; exact for shifts and scales
+ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 
 
@@ -186,7 +185,7 @@ class Weather:
         return len(self.filled)
 
     @cached_property
-    def columns(self) -> Any:
+    def columns(self) -> Table:
         """Inputs of the last step of M2, a frame as a frame."""
         return inputs_of_last_step(self.mapper, self.filled)
 
@@ -200,8 +199,7 @@ class Weather:
 class ThermalModel(SavesFrames):
     """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
 
-    ``parameter_names`` and ``mode_names`` are the columns of theta and of the frequencies. ``sensors`` and
-    ``training_range`` tell unusual weather.
+    ``sensors`` and ``training_range`` detect unusual weather.
     """
 
     mapper: BaseEstimator

@@ -60,8 +60,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         Number of simulations.
     narrow_bounds : bool, default=False
         Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
-        records that `fit` sees have their parameters, as far as the first regressor can tell. An inverse that is not
-        refined becomes more accurate there.
+        records that `fit` sees have their parameters, by the first regressor. An inverse that is not refined becomes
+        more accurate there.
     noise : "auto", float or array-like of shape (n_modes,), default="auto"
         Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
         measurement, the regressor learns the posterior mean of the parameters, and refining finds the posterior mode.

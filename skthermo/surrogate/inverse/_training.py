@@ -89,11 +89,7 @@ class InverseColumns:
 
 
 class ShapeScores:
-    """A few positive scores in place of many components: linear estimates of the parameters.
-
-    Ridge regression of ln theta on ln f and the components learns them from noisy simulations. A regressor then has
-    n_modes + n_parameters inputs, however many sensors there are.
-    """
+    """A few positive scores in place of many components: linear estimates of the parameters from noisy simulations."""
 
     def __init__(self, n_modes: int, inputs: Array, theta: Array):
         self._n_modes = n_modes
@@ -134,14 +130,11 @@ class SimulatedTraining:
 
     @classmethod
     def of(cls, inverse: Any, random: np.random.RandomState, n_refined: int) -> SimulatedTraining:
-        """Samples within the bounds of an `InverseSurrogate`, with warnings about modes that cannot be told apart.
-
-        ``n_refined`` records are expected to be refined afterwards.
-        """
+        """Samples within the bounds of an `InverseSurrogate`; ``n_refined`` records are to be refined afterwards."""
         model, names = inverse.model, tuple(inverse.model.parameter_names)
         if len(names) > model.n_modes:
             warn_user(
-                f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot tell the parameters apart; "
+                f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot distinguish all parameters; "
                 "expected more modes: the prior decides between them",
                 FewRecordsWarning,
                 "few modes",
@@ -163,7 +156,7 @@ class SimulatedTraining:
         return cls(box, samples, Simulator(model, reduced, box.bounds, tol))
 
     def narrower(self, inverse: Any, random: np.random.RandomState, estimates: Array) -> SimulatedTraining:
-        """As many samples from the part of the box where records have their parameters, as far as estimates tell."""
+        """As many samples from the part of the box where records have their parameters, by estimates."""
         n_known = np.count_nonzero(~np.isnan(estimates).any(axis=1))
         if n_known < 2:
             raise ValueError(
@@ -220,10 +213,8 @@ def simulations(
     *,
     n_jobs: int | None,
 ) -> tuple[Bunch, float, Any]:
-    """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None.
-
-    If making the reduced model ``may_fail``, it is None too where no basis is accurate.
-    """
+    """Random samples, the share with modes in another order, and the reduced model if ``tol`` is given, else None; it
+    is None, too, where no basis is accurate and that ``may_fail``."""
     reduced = None
     if tol is not None:
         try:
@@ -241,8 +232,7 @@ def simulations(
 class Inversions:
     """Inversions by a refinement; those of the records of `InverseSurrogate.fit` are read from its memory.
 
-    ``content`` tells refinement, inputs and guess of `fit` from others, and ``seen`` the inputs; both are empty without
-    a memory.
+    ``content`` and ``seen`` identify what `fit` saw with and without refinement and guess; empty without a memory.
     """
 
     refinement: Refinement

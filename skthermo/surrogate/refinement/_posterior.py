@@ -188,10 +188,7 @@ CLOSE = 0.1  # difference of ln f up to which two neighbouring modes may have cr
 
 @dataclass
 class Refined:
-    """Where the steps of each row have ended, and whether it has converged or stalled.
-
-    ``full_solves`` tells how often the full model was solved beside a reduced one.
-    """
+    """Where the steps of each row have ended, whether it has converged or stalled, and how often models were solved."""
 
     local: Local
     converged: NDArray[np.bool_]
@@ -222,9 +219,8 @@ class Refined:
 def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
 
-    The frequencies of a model that sorts its modes have kinks where modes cross; rows that stall there start again
-    beyond the kink. Where two modes exchange their shapes, rows with a large misfit start again at what frequencies
-    alone say.
+    Rows that stall where a model that sorts its modes has kinks start again beyond; rows with a large misfit, where two
+    modes exchange their shapes, start again at the estimate from frequencies alone.
     """
     found = minimise(objective, start, n_steps)
 

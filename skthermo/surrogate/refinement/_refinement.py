@@ -22,7 +22,7 @@ from skthermo.surrogate.refinement._shapes import MeasuredShapes, ShapeInputs
 
 SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
 ROWS_PER_CHUNK = 1024
-KEPT = 0.01  # weight of what samples of the box tell, beside solutions near the records
+KEPT = 0.01  # weight of the samples of the box, beside solutions near the records
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ ASSUMED_SCATTER = 1e-3  # noise on which standard deviations are based where it 
 ROWS_FOR_SCATTER = 365
 STEPS_ON_SURFACE = 100
 ROWS_FOR_SURFACE = 50  # number of records near which a response surface is made accurate
-ROWS_FOR_BOX = 200  # number of records that tell where a reduced model has to be accurate
+ROWS_FOR_BOX = 200  # number of records near which a reduced model has to be accurate
 CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
 
 
@@ -128,10 +128,9 @@ def unconverged(found: Bunch) -> NDArray[np.bool_]:
 class Refinement:
     """Posterior modes of the parameters of measured frequencies and, perhaps, shapes.
 
-    ``noise`` holds relative standard deviations of the frequencies, (n_modes,); ``n_steps`` is the most for each row.
-    Rows start where the response ``surface`` has its posterior mode, or at the regressor's guess without one. Steps are
-    taken on the reduced model, if there is one; rows that end outside its box go on with the full model.
-    ``recent`` holds the rows that the scatter was estimated from until they are asked for, mostly at once.
+    ``noise`` holds relative standard deviations, (n_modes,); ``n_steps`` is the most for each row. Rows start where the
+    response ``surface`` has its posterior mode, or at the regressor's guess. Rows that end outside the box of a reduced
+    model go on with the full one. ``recent`` holds the rows that the scatter was estimated from until they are needed.
     """
 
     simulator: Simulator
@@ -237,7 +236,7 @@ class Refinement:
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
-        """Refine rows, in blocks that tell how far the work is."""
+        """Refine rows in blocks, which show the progress."""
         size = CHUNKS_PER_BLOCK * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
         blocks = np.split(np.arange(len(start)), range(size, len(start), size))
         refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
@@ -278,10 +277,8 @@ class Refinement:
         return np.abs(x - self.prior.mean) > FAR_OUTSIDE * expected
 
     def estimated_scatter(self, inputs: Array, guess: Array) -> Array:
-        """The noise of each mode; where it is 0, estimated from what exact parameters leave of complete records.
-
-        Records can tell only if there are more modes than parameters, and are not exact themselves.
-        """
+        """The noise of each mode; where it is 0, what exact parameters leave of complete records, with more modes than
+        parameters."""
         n_modes, n_parameters = len(self.noise), guess.shape[1]
         if self.noise.all():
             return self.noise

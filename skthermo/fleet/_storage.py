@@ -20,7 +20,7 @@ SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
 
 
 @dataclass
-class Kept:
+class Storage:
     """Outcomes by name, at hand; fitted objects as bytes, in memory or in a folder."""
 
     folder: Path | None = None
@@ -77,6 +77,6 @@ class Kept:
 
 
 def _content(file: Path) -> tuple[BridgeOutcome, bytes]:
-    """What `Kept.put` wrote, with a checksum."""
+    """What `Storage.put` wrote, with a checksum."""
     outcome, fitted = pickle.loads(zlib.decompress(file.read_bytes()))
     return outcome, fitted

@@ -17,7 +17,7 @@ KILLED = ("TerminatedWorkerError", "BrokenProcessPool", "KilledWorker", "WorkerC
 WAVE = 4  # tasks for each worker of a back end that gives all results at the end
 
 
-def work_off(tasks: Mapping[Hashable, Any], n_jobs: int | None) -> Iterator[tuple[Hashable, Any]]:
+def run_tasks(tasks: Mapping[Hashable, Any], n_jobs: int | None) -> Iterator[tuple[Hashable, Any]]:
     """Names and results of tasks, as they come; each task is a function without arguments.
 
     If a process is killed, most back ends end all others. Tasks that may have run in it are begun again together with

@@ -1,0 +1,373 @@
+"""Events of a damage index, and the threshold by which a healthy structure has so many of them in a year."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import gamma, nbinom
+
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import counted_number
+from skthermo._tables.times import DAY, YEAR, correlation_time
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
+
+N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
+N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
+COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
+NEAR = 15  # days of the year, up to which a record stands for the season around it
+SEASON = 30  # days of the year, before and after each, whose records give its scale
+LEAST_INDEX = 0.1  # share of the median index, as which smaller ones count for the scale of a season
+FEWEST_PEAKS = 3
+DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
+HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
+FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
+N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
+
+
+@dataclass(frozen=True)
+class EventState:
+    """Whether an event is open, since when all levels have stayed within the clear threshold, and the last indices.
+
+    ``quiet_since`` is in nanoseconds, None if the last level was above it, or there was none.
+    """
+
+    is_open: bool = False
+    quiet_since: int | None = None
+    recent: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class EventRule(SavesFrames):
+    """An event opens when ``persistence`` evaluated records in a row exceed ``threshold``.
+
+    That is when their level, the lowest index of the last ``persistence`` evaluated records, exceeds it; before there
+    are so many, it is 0. An event closes when the levels of ``hold`` have stayed within ``release``. Records that are
+    not evaluated (NaN) neither open nor close it: the time of quiet counts only between evaluated records.
+    """
+
+    threshold: float
+    release: float
+    hold: pd.Timedelta
+    persistence: int = 1
+
+    def follow(
+        self, state: EventState, index: Array, times: NDArray[np.int64]
+    ) -> tuple[NDArray[np.bool_], Array, EventState]:
+        """Whether an event is open after each record, in order of time (nanoseconds), levels, and the last state."""
+        after, level, recent = np.full(len(index), state.is_open), *levels(index, self.persistence, state.recent)
+        places = np.flatnonzero(~np.isnan(index))
+        if not len(places):
+            return after, level, state
+        values, at, order = level[places], times[places], np.arange(len(places))
+        quiet = values <= self.release
+        begins = quiet & ~np.append(state.quiet_since is not None, quiet[:-1])
+        last_begin = np.maximum.accumulate(np.where(begins, order, -1))
+        since = np.where(last_begin >= 0, at[last_begin], 0 if state.quiet_since is None else state.quiet_since)
+        closes = quiet & (at - since >= self.hold.value)
+        opens = values > self.threshold
+        last_change = np.maximum.accumulate(np.where(opens | closes, order, -1))
+        is_open = np.where(last_change >= 0, opens[last_change], state.is_open)
+        last_evaluated = np.searchsorted(places, np.arange(len(index)), side="right") - 1
+        after = np.where(last_evaluated >= 0, is_open[last_evaluated], state.is_open)
+        return after, level, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None, recent)
+
+
+def levels(index: Array, persistence: int, recent: tuple[float, ...] = ()) -> tuple[Array, tuple[float, ...]]:
+    """The lowest index of the last evaluated records at each of them, and the indices that the next ones need."""
+    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), persistence - 1
+    values = np.append([*np.zeros(n), *recent][len(recent) :], index[known])
+    if known.any():
+        level[known] = sliding_window_view(values, persistence).min(axis=1)
+    return level, tuple(values[len(values) - n :].tolist())
+
+
+def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.DataFrame:
+    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` (level), ``peak_time``."""
+    is_open, values, _ = rule.follow(EventState(), np.asarray(index, dtype=float), times.as_unit("ns").asi8)
+    change = np.diff(is_open.astype(np.int8), prepend=0)
+    starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    bounds = np.append(stops, len(values))[: len(starts)]
+    peaks = np.array(
+        [start + np.nanargmax(values[start:stop]) for start, stop in zip(starts, bounds, strict=True)], int
+    )
+    ends = times[stops].append(pd.DatetimeIndex([pd.NaT] * (len(starts) - len(stops))).tz_localize(times.tz))
+    table = {"start": times[starts], "end": ends, "peak": values[peaks], "peak_time": times[peaks]}
+    return pd.DataFrame(table, index=pd.RangeIndex(1, len(starts) + 1, name="event"))
+
+
+@dataclass(frozen=True)
+class Tail:
+    """The highest excursions of a baseline: k squared peaks above a ``base``, the (k + 1)-th, and their ``excesses``.
+
+    A time as long as the baseline has k + 1 peaks above the base, on average. Taken as exponential, n of them exceed
+    the square
+
+        base + sum of excesses (((k + 1) / n)^(1 / k) - 1),
+
+    on average over baselines: exact for an exponential tail, however few peaks there are. Squares are over their scale
+    in the season, and those of all seasons are exceeded as often as the mean over ``scales`` says.
+    """
+
+    base: float
+    excesses: tuple[float, ...]
+    scales: tuple[float, ...] = (1.0,)
+
+    @classmethod
+    def of(cls, squares: Array, asked: float, scales: tuple[float, ...] = (1.0,)) -> Tail:
+        """That of squared peaks, highest first, from which as many as are asked for are to be exceeded."""
+        k = int(min(max(N_PEAKS, np.ceil(asked)), len(squares) - 1))
+        return cls(float(squares[k]), tuple((squares[:k] - squares[k]).tolist()), scales)
+
+    @property
+    def k(self) -> int:
+        """Number of peaks above the base."""
+        return len(self.excesses)
+
+    @cached_property
+    def excess(self) -> float:
+        """Sum of the excesses."""
+        return sum(self.excesses)
+
+    def has_outlier(self, probability: float) -> bool:
+        """Whether the highest excess is as large beside the others as that of so few healthy baselines."""
+        return max(self.excesses) > _largest_share(self.k, probability) * self.excess
+
+    def factor(self, asked: float) -> float:
+        """The excess that so many peaks exceed, in sums of all excesses."""
+        return ((self.k + 1) / asked) ** (1 / self.k) - 1
+
+    def height(self, square: float) -> float:
+        """The excess over its scale that is exceeded as often as a square, in sums of all excesses; 0 below all."""
+        excess = np.maximum(square / np.array(self.scales) - self.base, 0.0) / self.excess
+        return float(((1 + excess) ** -self.k).mean() ** (-1 / self.k) - 1)
+
+    def threshold(self, asked: float) -> float:
+        """The index that so many peaks exceed."""
+        height = self.factor(asked)
+        square = self.base + height * self.excess
+        if len(self.scales) > 1:
+            ends = square * min(self.scales) * (1 - 1e-9), square * max(self.scales) * (1 + 1e-9)
+            square = brentq(lambda one: self.height(one) - height, *ends)
+        return float(np.sqrt(square))
+
+    def p_value(self, square: float, ratio: float, shape: float | None = None) -> float:
+        """Probability that a time so many times as long as the baseline has a squared peak as high.
+
+        The number of peaks above the base in that time is negative binomial, as is that of the baseline's own; each
+        exceeds the square with the probability exp(-x g), where x is its height above the base in sums of excesses, and
+        g what these leave open of the tail, gamma distributed: so that p values of a healthy structure are uniformly
+        distributed. Integrated at the quantiles of g where exp(-x g) counts.
+
+        Outliers make tails that are not exponential. A ``shape`` is that of a generalised Pareto tail, 0 that of an
+        exponential one. Without it, where the highest excess of the baseline is as far beyond the others as in one
+        healthy baseline of five, the logarithms of the squares over the base are taken in place of the excesses: a
+        Pareto tail, by which probabilities are larger.
+        """
+        x = self.height(square)
+        if x <= 0:
+            return 1.0
+        if shape:
+            x = np.log1p(shape / (1 - shape) * self.k * x) / (shape * self.k)
+        elif shape is None and self.has_outlier(HEAVY):
+            logs = np.log1p(np.array(self.excesses) / self.base).sum()
+            x = min(x, np.log1p(x * self.excess / self.base) / logs)
+        g = _quantiles(self.k) / (1 + x)
+        some = -np.expm1(-(self.k + 1) * np.log1p(ratio * np.exp(-x * g)))
+        return float((some * np.exp(x * g)).mean() * (1 + x) ** -self.k)
+
+    def numbers(self, asked: float, n_years: float) -> tuple[int, int]:
+        """Between which numbers events in one year lie, given what the excesses tell of the tail and of its rate."""
+        share = np.exp(-self.factor(asked) * _quantiles(self.k)) / n_years
+
+        def at_most(number: int) -> float:
+            return float(nbinom.cdf(number, self.k + 1, 1 / (1 + share)).mean())
+
+        tail, numbers = (1 - COVERAGE) / 2, range(1_000_000)
+        lowest, highest = (next(n for n in numbers if at_most(n) >= level) for level in (tail, 1 - tail))
+        return lowest, highest
+
+
+@dataclass(frozen=True)
+class FalseAlarmEstimate:
+    """A rule for events, and how many of them a healthy structure is expected to have in a year.
+
+    ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
+    ``highest`` of them with a probability of 90 %, by chance and because one baseline leaves the rate uncertain.
+    ``n_years`` is the time that the baseline's evaluated records cover, ``n_peaks`` the number of its highest
+    excursions that the threshold comes from, ``unseen`` the seasons without baseline records, for which there is no
+    estimate ("" if there is none), ``method`` how the threshold was found, in words.
+    """
+
+    rule: EventRule
+    expected: float
+    lowest: int
+    highest: int
+    n_years: float
+    n_peaks: int
+    unseen: str
+    method: str
+    tail: Tail
+
+    def __str__(self) -> str:
+        expected = counted_number(self.expected, "false alarm")
+        return (
+            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
+            + (f"; no estimate for {self.unseen}" if self.unseen else "")
+        )
+
+    def p_value(self, peak: float, n_years: float, shape: float | None = None) -> float:
+        """Probability that a healthy structure has an event as high in so many years."""
+        return self.tail.p_value(peak**2, n_years / self.n_years, shape)
+
+
+@cache
+def _quantiles(k: int) -> Array:
+    """Values of a gamma distribution at which what depends on it is averaged."""
+    return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
+
+
+def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1) -> float:
+    """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
+    hold, known = pd.Timedelta(hold), index.dropna()
+    stamps = known.index.as_unit("ns").asi8
+    whole = stamps - stamps[:1] >= hold.value
+    level = pd.Series(levels(known.to_numpy(), persistence)[0], known.index)
+    highest = level.rolling(hold, closed="both").max().to_numpy()
+    return float(np.median(highest[whole] if whole.any() else highest))
+
+
+def seasonal_scale(index: pd.Series) -> pd.Series:
+    """Scale of the squared indices in the season of each record, from the mean of their logarithms around it.
+
+    It is drawn to 1, the scale of the whole baseline, by as much of its variance as independent seasons would have by
+    chance, which the correlation time of what it leaves tells.
+    """
+    logs = 2 * np.log(index.clip(lower=LEAST_INDEX * index.median()))
+    logs -= logs.mean()
+    day = np.minimum(index.index.day_of_year, 365) - 1
+    around = (np.arange(365)[:, np.newaxis] + np.arange(-SEASON, SEASON + 1)) % 365
+    sums, numbers = (np.bincount(day, weights, 365)[around].sum(axis=1) for weights in (logs, None))
+    season = (sums / np.maximum(numbers, 1))[day]
+    rest = logs - season
+    noise = rest.var() * correlation_time(rest.to_numpy()) / numbers[day].mean()
+    share = max(1 - noise / season.var(), 0.0) if season.var() > 0 else 0.0
+    return pd.Series(np.exp(share * season), index.index)
+
+
+def estimate_false_alarms(
+    index: pd.Series,
+    per_year: float = 1.0,
+    *,
+    hold: str | pd.Timedelta = "1D",
+    persistence: int = 1,
+    release: float | None = None,
+) -> FalseAlarmEstimate:
+    """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
+
+    An excursion lasts from the first level above the release level until all levels of ``hold`` have stayed within
+    it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
+    it, and the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only
+    departures of one kind count, ``release`` should be the `release_level` of all.
+    """
+    hold, known = pd.Timedelta(hold), index.dropna()
+    n_years = _years(known.index, hold)
+    if len(known) < 2 or np.isinf(known).any():
+        raise ValueError(
+            f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
+            "expected at least 2, all of them finite"
+        )
+    scale = seasonal_scale(known)
+    standard = known / np.sqrt(scale)
+    quiet = release_level(standard, hold, persistence)
+    excursions = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
+    excursions["index"] = excursions["peak"] * np.sqrt(scale[excursions["peak_time"]].to_numpy())
+    excursions = excursions.sort_values("peak", ascending=False)
+    squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
+    years = counted_number(n_years, "year", 2)
+    if len(squares) < FEWEST_PEAKS or asked > len(squares):
+        raise ValueError(
+            f"false_alarms_per_year is {per_year:g}, but the {years} of the baseline have only "
+            f"{counted_number(len(squares), 'excursion')} that end with "
+            f"{counted_number(hold / DAY, 'day')} of quiet; expected at "
+            f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
+        )
+    scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
+    tail = Tail.of(squares, asked, tuple(scales.tolist()))
+    release = release_level(known, hold, persistence) if release is None else release
+    rule, unseen = (
+        EventRule(max(tail.threshold(asked), release), release, hold, persistence),
+        _unseen_season(known.index),
+    )
+    lowest, highest = tail.numbers(asked, n_years)
+    method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
+        ", extrapolated" if asked < FAR else ""
+    )
+    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen)
+    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
+
+
+def _warn_of_baseline(
+    excursions: pd.DataFrame, tail: Tail, rule: EventRule, asked: float, per_year: float, years: str, unseen: str
+) -> None:
+    """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
+    highest, second = excursions["index"].iloc[:2]
+    if unseen:
+        warn_user(
+            f"the baseline has no record of {unseen}: the number of false alarms a year is that of the other seasons, "
+            "and there is no estimate for these; expected a whole year",
+            WeatherWarning,
+            "seasons without baseline",
+        )
+    if asked < FAR:
+        warn_user(
+            f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
+            f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
+            f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
+            FewRecordsWarning,
+            "threshold beyond the baseline",
+        )
+    if tail.has_outlier(DOUBTFUL):
+        others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
+        warn_user(
+            f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
+            f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
+            f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
+            "without records of a fault or of another state",
+            RecordsWarning,
+            "excursion of the baseline",
+        )
+
+
+def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:
+    """Time that records cover; of a gap, only the time that ends an event, or the usual step."""
+    steps = np.diff(stamps.as_unit("ns").asi8).astype(float)
+    return float(np.minimum(steps, max(hold.value, np.median(steps))).sum() / YEAR.value) if len(steps) else 0.0
+
+
+def _largest_share(k: int, probability: float) -> float:
+    """Share that the largest of k exponential excesses has of their sum with a probability (Fisher, Cochran)."""
+    return 1.0 - (probability / k) ** (1 / (k - 1)) if k > 1 else 1.0
+
+
+def _unseen_season(stamps: pd.DatetimeIndex) -> str:
+    """Days of the year that no record is near, as their number and the longest stretch of them; "" if there is none."""
+    seen = np.zeros(365, dtype=bool)
+    days = np.unique(np.minimum(stamps.day_of_year, 365) - 1)
+    seen[(days[:, np.newaxis] + np.arange(-NEAR, NEAR + 1)) % 365] = True
+    if seen.all():
+        return ""
+    turned = np.roll(np.arange(365), -int(seen.argmax()))  # begins with a day that is seen
+    run = np.zeros(365, dtype=int)
+    for place in range(1, 365):
+        run[place] = 0 if seen[turned[place]] else run[place - 1] + 1
+    last = int(run.argmax())
+    ends = [pd.Timestamp("2001-01-01") + pd.Timedelta(days=int(turned[i])) for i in (last - run[last] + 1, last)]
+    return f"{(~seen).sum()} days of the year ({' to '.join(f'{day.day} {day.month_name()}' for day in ends)})"
