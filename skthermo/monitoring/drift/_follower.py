@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from skthermo._effects.frequencies import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
@@ -29,7 +30,6 @@ from skthermo.monitoring.drift._observations import (
     observation,
     with_time,
 )
-from skthermo.studies.identification import ALL_GROUPS
 
 DELAY = 30
 """Days that a day waits before drift is learned from it: a sudden change is seen by then."""

@@ -13,7 +13,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects, healthy_frequencies, read_groups
+from skthermo._effects.frequencies import ALL_GROUPS, FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, spread_evenly
 from skthermo._tables.frames import check_same_rows, frame_like
@@ -23,7 +23,6 @@ from skthermo.monitoring.drift._daily import DailyMeans, WeatherFunctions
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.preprocessing import ExponentialMeans
-from skthermo.studies.identification import ALL_GROUPS
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
 MIRRORED = 1e-6  # difference of the cosine of two effects from 1, below which they are the same

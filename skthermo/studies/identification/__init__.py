@@ -1,6 +1,6 @@
 """Which causes explain a shift of frequencies, and how probably."""
 
-from skthermo.studies.identification._causes import ALL_GROUPS, SOMETHING_ELSE, Cause, DamagePrior
+from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior
 from skthermo.studies.identification._curves import Effects, ShiftComparison, cubic
 from skthermo.studies.identification._evidence import Observed
 from skthermo.studies.identification._explanations import Scale, screen
@@ -11,7 +11,6 @@ from skthermo.studies.identification._posterior import Posterior
 from skthermo.studies.identification._shift import FrequencyShift
 
 __all__ = [
-    "ALL_GROUPS",
     "SOMETHING_ELSE",
     "Cause",
     "ShiftComparison",

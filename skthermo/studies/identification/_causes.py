@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._effects.changes import HIGHEST_SEVERITY, StructuralChanges
-from skthermo._effects.frequencies import read_groups
+from skthermo._effects.frequencies import ALL_GROUPS, read_groups
 from skthermo._estimators.arguments import check_names
 from skthermo._tables.arrays import MatrixLike, is_real, real_array
 
@@ -20,7 +20,7 @@ MOST_STIFFER = 1.0  # largest share of stiffness that a group may gain
 MOST_HIGHER = 1.0  # largest relative increase of a parameter
 MOST_TIMES = 3.0  # how many times a mass pattern may be added
 LIKELY_TIMES = 5.0  # scale of the number of times, relative to that of severities
-SOMETHING_ELSE, NO_DAMAGE, ALL_GROUPS = "something else", "no damage", "all groups"
+SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
 
 
 @dataclass(frozen=True)
