@@ -14,11 +14,17 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
-from skthermo.reporting.service._changes import drift, drift_sentences, sensors
-from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import introduction, not_evaluated
+from skthermo.reporting.service._sections import (
+    drift,
+    drift_sentences,
+    events,
+    false_alarms,
+    introduction,
+    not_evaluated,
+    sensors,
+    today,
+)
 from skthermo.reporting.service._standing import Standing
-from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page
 
@@ -185,28 +191,30 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
             "per_year": [-0.01, 0.0],
             "per_year_error": [0.001, 0.002],
             "significant": [True, False],
+            "p_value": 0.001,
         },
         ["deck", "piers"],
     )
     monitor = FakeMonitor(drift=found)
     standing = standing_of(monitor)
-    (said,) = drift_sentences(standing)
+    whether, said = drift_sentences(standing)
+    assert whether == "The structure drifts (probability by chance 0.001)."
     loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert said.startswith(loss)
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
     assert said.endswith(f"{reached} {years[0.008]}).")
-    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[0]
+    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[1]
     page = Page(drift(standing))
     assert said in page.text
     assert len(page.drawings()) == 1
     assert page.cells[2::3] == ["yes", "no"]
 
     def sentence(**changed):
-        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[0]
+        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[-1]
 
     assert sentence(per_year_error=0.01).endswith("at the earliest).")
-    assert sentence(significant=False) == "No drift beyond its error."
+    assert sentence(significant=False).startswith("No drift of stiffness is seen")
     assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
     assert "reached" not in sentence(per_year=0.01)
     assert "more than 100 years" in sentence(per_year=-1e-4)
@@ -215,7 +223,7 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
 @pytest.mark.parametrize("significant", [True, False])
 def test_no_structure_is_healthy_that_has_lost_much_stiffness_slowly(significant):
     columns = {"change": [-0.12], "standard_error": [0.01], "per_year": [-0.01], "per_year_error": [0.001]}
-    drift = pd.DataFrame(columns, ["deck"]).assign(significant=significant)
+    drift = pd.DataFrame(columns, ["deck"]).assign(significant=significant, p_value=0.001 if significant else 0.2)
     page = today_of(FakeMonitor(drift=drift))
     assert state_of(page) == ("attention" if significant else "healthy")
     assert (f"deck has lost 10{SPACE}% or more of the stiffness" in page.text) == significant
@@ -232,7 +240,7 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
     )
     n_kept = len(monitor.evaluations_)
     text = Page(not_evaluated(standing_of(monitor))).text
-    assert f"Why {500 - n_kept} of them, which are older, were not evaluated is no longer kept." in text
+    assert f"Why {500 - n_kept} older ones of them were not evaluated is no longer kept." in text
 
 
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
@@ -260,7 +268,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
 def test_the_promise_counts_damage_events_beside_false_alarms_that_were_to_be_expected():
     seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="stiffening")]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
-    text = Page(promise(standing_of(monitor))).text
+    text = Page(false_alarms(standing_of(monitor))).text
     assert "gives 2 false alarms a year on average" in text
     assert f"there was 1{SPACE}damage event, 0 of them said to be harmless." in text
     years = (monitor.last_ - monitor.days_.index[0]) / pd.Timedelta(days=365.25)
