@@ -21,6 +21,8 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
+Bytes = bytes | memoryview
+
 HEADER = 128  # bytes of a MATLAB file
 MATRIX, COMPRESSED = 14, 15  # types of its elements
 CELL, STRUCT, CHARACTERS, SPARSE, NUMERIC, OPAQUE = 1, 2, 4, 5, range(6, 16), 17  # classes of its variables
@@ -63,7 +65,7 @@ def read_matlab(content: bytes) -> dict[str, Any]:
     return variables
 
 
-def _elements(content: Any, order: str) -> Iterator[tuple[int, Any]]:
+def _elements(content: Bytes, order: str) -> Iterator[tuple[int, Bytes]]:
     """Type and bytes of each element of a MATLAB file or variable; lengths beyond the end are an error."""
     position = 0
     while position < len(content):
@@ -77,13 +79,13 @@ def _elements(content: Any, order: str) -> Iterator[tuple[int, Any]]:
         position = start + length + (0 if kind == COMPRESSED else -(start + length - position) % 8)
 
 
-def _class_of(body: Any, order: str) -> tuple[int, bool]:
+def _class_of(body: Bytes, order: str) -> tuple[int, bool]:
     """Class of a variable, and whether it is complex."""
     (flags,) = struct.unpack_from(order + "I", body, 8)
     return flags & 0xFF, bool(flags & COMPLEX_FLAG)
 
 
-def _name(body: Any, order: str) -> str:
+def _name(body: Bytes, order: str) -> str:
     """Name of a variable: the third part, or the second of an opaque one, which has no dimensions."""
     parts = [part for _, (_, part) in zip(range(3), _elements(body, order), strict=False)]
     name = bytes(parts[1 if _class_of(body, order)[0] == OPAQUE else 2]).decode("ascii")
@@ -92,7 +94,7 @@ def _name(body: Any, order: str) -> str:
     return name
 
 
-def _variable(body: Any, order: str) -> Any:
+def _variable(body: Bytes, order: str) -> Any:
     """One variable, read by SciPy, which does not notice parts that are too many or a lost flag."""
     kind, is_complex = _class_of(body, order)
     n_parts, expected = sum(1 for _ in _elements(body, order)), (6 if kind == SPARSE else 4) + is_complex
@@ -197,7 +199,7 @@ def read_matrix_market(content: bytes) -> Any:
     return _numbers(scipy.io.mmread(io.BytesIO(content[:start] + body)))
 
 
-def _numbers_of_text(text: bytes) -> Any:
+def _numbers_of_text(text: bytes) -> np.ndarray:
     """All numbers of a text in a row."""
     try:
         return np.fromstring(text, sep=" ") if text.strip() else np.empty(0)

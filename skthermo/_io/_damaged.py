@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from skthermo._io._child import read
 
@@ -60,7 +60,7 @@ def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
     return results
 
 
-def _run(job: str, output: Any, seconds: float) -> str:
+def _run(job: str, output: IO[bytes], seconds: float) -> str:
     """Run the child; how it ended."""
     name = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not name.startswith(("python", "pypy")):  # a program that embeds Python

@@ -31,7 +31,7 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str,
     return {name: value if _is_matrix(value) else None for name, value in values.items()}
 
 
-def _is_matrix(value: Any) -> bool:
+def _is_matrix(value: object) -> bool:
     return scipy.sparse.issparse(value) or (isinstance(value, np.ndarray) and value.ndim == 2)
 
 

@@ -101,8 +101,8 @@ def _update(options: argparse.Namespace) -> int:
             evaluated = monitor.update(records, confirm=options.confirm) if len(records) else None
         if evaluated is not None:
             monitor.save(options.monitor)
-    print("\n".join([_read(options.records, records), *_taken_in(before, monitor.counts_, evaluated)]))
-    print("\n".join(_standing(monitor)))
+    taken_in = _taken_in(before, monitor.counts_, evaluated)
+    print("\n".join([_read(options.records, records), *taken_in, monitor.summary()]))
     return _reported(monitor, options, _code(monitor, evaluated))
 
 
@@ -120,7 +120,7 @@ def _acknowledge(options: argparse.Namespace) -> int:
         monitor.acknowledge(options.event, harmless=options.harmless, note=options.note)
         monitor.save(options.monitor)
     print(f"event {options.event} is acknowledged as {'harmless' if options.harmless else 'damage'}")
-    print("\n".join(_standing(monitor)))
+    print(monitor.summary())
     return 0
 
 
@@ -171,21 +171,3 @@ def _taken_in(before: dict[str, int], after: dict[str, int], evaluated: pd.DataF
     lines += [f"set aside, stamped too far ahead: {after['n_ahead']}"] if after["n_ahead"] else []
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts()
     return lines + [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
-
-
-def _standing(monitor: Monitor) -> list[str]:
-    """State of the monitor, its open events and its faulty sensors."""
-    events, faults = monitor.events_, monitor.faults_
-    lines = [f"state: {monitor.state()} (newest record {monitor.last_})"]
-    opened = events[events["end"].isna()]
-    lines += [
-        f"open event {number}: {event['kind']} since {event['start']}, {event['modes'] or 'no mode named'}, "
-        f"index up to {event['peak']:.4g} on {event['peak_time']}{', acknowledged' if event['acknowledged'] else ''}"
-        for number, event in opened.iterrows()
-    ] or ["open events: none"]
-    waiting = events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
-    lines += [f"ended, not acknowledged: event {', '.join(map(str, waiting))}"] if waiting else []
-    lasting = faults[faults["until"].isna()] if faults is not None else []
-    return lines + [
-        f"sensor: {fault.column} {fault.kind} since {fault.since}" for fault in pd.DataFrame(lasting).itertuples()
-    ]

@@ -1,12 +1,14 @@
 """Stiffness that a structure loses: slowly, at once, or both."""
 
 from collections.abc import Collection, Mapping
-from typing import Any
+from datetime import datetime
 
 import numpy as np
 import pandas as pd
 
 from skthermo._tables.arrays import is_real
+
+Stamp = str | datetime | None
 
 
 def stiffness_factors(
@@ -15,7 +17,7 @@ def stiffness_factors(
     groups: Collection[str],
     drift: Mapping[str, float] | None,
     damage: Mapping[str, float] | None,
-    damage_from: Any,
+    damage_from: Stamp,
     strengthened: Mapping[str, pd.Series] | None = None,
 ) -> pd.DataFrame:
     """Factor of the stiffness of each changed group in every record."""
@@ -45,7 +47,7 @@ def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[
     return values
 
 
-def _onset(index: pd.DatetimeIndex, damage_from: Any) -> pd.Timestamp:
+def _onset(index: pd.DatetimeIndex, damage_from: Stamp) -> pd.Timestamp:
     """When the damage begins."""
     if damage_from is None:
         return index[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,7 +11,7 @@ from scipy.special import ndtri
 
 from skthermo._estimators.arguments import check_flag, check_noise
 from skthermo._tables.arrays import Array, as_random_state, positive_integer
-from skthermo.datasets._ageing import stiffness_factors
+from skthermo.datasets._ageing import Stamp, stiffness_factors
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import kw51_sensors
 from skthermo.datasets._kw51_truth import (
@@ -82,7 +81,7 @@ def make_kw51_campaign(
     retrofit: bool = True,
     drift: Mapping[str, float] | None = None,
     damage: Mapping[str, float] | None = None,
-    damage_from: Any = None,
+    damage_from: Stamp = None,
     shapes: bool = False,
     random_state: int | np.random.RandomState | None = None,
 ) -> KW51Campaign:

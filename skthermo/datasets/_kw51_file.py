@@ -125,7 +125,7 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
 
 
-def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
+def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
     """Tables and shapes from the struct `modes`, whose fields must agree."""
     modes = content.get("modes")
     if not isinstance(modes, dict):
@@ -168,7 +168,7 @@ def _data(content: dict[str, Any], file: Path) -> dict[str, Any]:
     return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}
 
 
-def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:
+def _numbers_of(value: object, what: str, *, complex_too: bool = False) -> NDArray:
     """An array of numbers."""
     if not isinstance(value, np.ndarray):
         raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
@@ -177,7 +177,7 @@ def _numbers_of(value: Any, what: str, *, complex_too: bool = False) -> NDArray:
     return value
 
 
-def _labels_of(value: Any, what: str) -> list[str]:
+def _labels_of(value: object, what: str) -> list[str]:
     """Texts of a cell array, nested or not, or of the rows of a matrix of characters."""
     labels = [text.strip() for text in _texts(value, what)]
     are_names = all(label and label.isprintable() for label in labels)
@@ -187,7 +187,7 @@ def _labels_of(value: Any, what: str) -> list[str]:
     return labels
 
 
-def _texts(value: Any, what: str) -> Iterator[str]:
+def _texts(value: object, what: str) -> Iterator[str]:
     if isinstance(value, str):
         yield value
     elif isinstance(value, list):

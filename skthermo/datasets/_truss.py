@@ -6,14 +6,13 @@ import json
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import as_random_state, positive_integer, real_array
-from skthermo.datasets._ageing import stiffness_factors
+from skthermo.datasets._ageing import Stamp, stiffness_factors
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
 
@@ -144,7 +143,7 @@ def make_truss_campaign(
     correlation: float = 0.0,
     drift: Mapping[str, float] | None = None,
     damage: Mapping[str, float] | None = None,
-    damage_from: Any = None,
+    damage_from: Stamp = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> TrussCampaign:
     """Synthetic monitoring of the 28-bar truss: temperatures, and frequencies by its thermo-mechanical law.

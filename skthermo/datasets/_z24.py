@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -61,10 +60,9 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
 
     Notes
     -----
-    Records are numbered by hours; hours without an identified record are missing. The time stamp is this number of
-    hours added to 1997-11-11 00:00, the day on which monitoring began; the hour of the first record is not documented,
-    so that times of day are nominal. The meaning of the letters in a sensor's name is not documented either.
-    Without ``idx``, rows of a MATLAB file are taken as consecutive hours.
+    The time stamp is ``record``, in hours, added to 1997-11-11 00:00, the day on which monitoring began; the
+    hour of the first record is not documented, so that times of day are nominal. Without ``idx``, rows of a MATLAB file
+    are taken as consecutive hours.
 
     References
     ----------
@@ -159,7 +157,7 @@ def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(columns), [STATES[0]] * count + [STATES[1]] * (len(data) - count)
 
 
-def _matlab_hours(content: dict[str, Any], n_records: int, file: Path) -> NDArray[np.float64]:
+def _matlab_hours(content: dict[str, object], n_records: int, file: Path) -> NDArray[np.float64]:
     if "idx" not in content:
         return np.arange(float(n_records))
     mask = _matlab_field(content, "idx", file).ravel()
@@ -171,7 +169,7 @@ def _matlab_hours(content: dict[str, Any], n_records: int, file: Path) -> NDArra
     return np.flatnonzero(mask).astype(float)
 
 
-def _matlab_field(content: dict[str, Any], name: str, file: Path) -> NDArray[np.float64]:
+def _matlab_field(content: dict[str, object], name: str, file: Path) -> NDArray[np.float64]:
     if name not in content:
         raise ValueError(f"{file}: no field {name!r}; found {sorted(content)}")
     matrix = content[name]

@@ -112,7 +112,7 @@ class RslabElimination:
         self._analysis: Any = None
         _rslab()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"_analysis": None}  # it cannot be sent to a worker, which makes its own
 
     def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:

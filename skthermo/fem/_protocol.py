@@ -133,7 +133,7 @@ class DamageableModel(FEModel, Protocol):
     """
 
     @property
-    def groups(self) -> Mapping[str, Any]:
+    def groups(self) -> Mapping[str, object]:
         """The damage groups by name."""
 
     def damaged(self, damage: Mapping[str, float]) -> DamageableModel:

@@ -21,12 +21,8 @@ SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of the
 class AffineTerms(ABC):
     """The sum over t of ``factor_t * prod_p(theta_p ** exponent_tp) * matrix_t``.
 
-    Parameters
-    ----------
-    exponents : ndarray of shape (n_terms, n_parameters)
-        How often each parameter multiplies each term; a row of zeros is the constant part.
-    factors : ndarray of shape (n_terms,), optional
-        Fixed multipliers, such as 1 - severity of damage. One by default.
+    ``exponents`` (n_terms, n_parameters) say how often each parameter multiplies each term, and ``factors`` (n_terms,)
+    are fixed multipliers, such as 1 - severity of damage.
     """
 
     n_dof: int

@@ -17,6 +17,7 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.frames import positions_of
 from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import counted
 from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
@@ -35,13 +36,13 @@ from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, Acknowledgement, event_table
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
-from skthermo.monitoring._in_words import in_words
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._records import RecordStore, read_records
 from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 MOST_CAUSES = 3  # in a warning
+MOST_EVENTS = 5  # in a summary, the latest ones
 
 
 class Monitor(SavesFrames, Estimator):
@@ -604,7 +605,28 @@ class Monitor(SavesFrames, Estimator):
             State, records, events, sensors and drift.
         """
         check_is_fitted(self)
-        return in_words(self)
+        counts, drift = self.counts_, self.drift_
+        lines = [
+            f"state: {self.state()} ({f'newest record {self.last_}' if len(self.records_) else 'no record came yet'})",
+            f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
+            f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
+            f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
+            f"damage events: open with {counted(self.persistence, 'record')} in a row above {self.threshold_:.4g}, "
+            f"close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            *_events_in_words(self.events_),
+        ]
+        faults = self.faults_
+        for _, fault in faults[faults["until"].isna()].iterrows():
+            lines.append(f"sensor: {fault['column']} {fault['kind']} since {fault['since']}")
+        if drift is not None:
+            lines += [
+                f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
+                f"{'; beyond the limit' if one['beyond_limit'] else ''}"
+                for group, one in drift[drift["significant"]].iterrows()
+            ]
+            n_days = self._state.corrections.drift.n_left_out
+            lines += [f"drift: not followed for {counted(n_days, 'day')}, as responses changed at once"] * (n_days > 0)
+        return "\n".join(lines)
 
     @property
     def detector_(self) -> Any:
@@ -734,6 +756,22 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     if any(name not in columns for name in wanted) or len(set(wanted)) < len(wanted):
         raise ValueError(f"{what} is {wanted}; expected different names among the columns {columns}")
     return wanted
+
+
+def _events_in_words(events: pd.DataFrame) -> list[str]:
+    """A line for each of the latest events, and one for those that nobody has acknowledged."""
+    if not len(events):
+        return ["events: none"]
+    lines, n_earlier = [], max(len(events) - MOST_EVENTS, 0)
+    for number, event in events.iloc[n_earlier:].iterrows():
+        until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
+        said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
+        note = f" ({event['note']})" if event["note"] else ""
+        peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
+        lines.append(f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}")
+    lines += [f"events: {n_earlier} earlier ones are in events_"] if n_earlier else []
+    waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
+    return lines + ([f"ended, not acknowledged: event {', '.join(map(str, waiting))}"] if len(waiting) else [])
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
+from skthermo._tables.arrays import is_real
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._axes import date_axis, figure_legend, on_axis
@@ -231,10 +232,7 @@ def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:
 
 def as_threshold(value: object, title: str) -> float:
     """A threshold as a number."""
-    try:
-        threshold = float(value)
-    except (TypeError, ValueError):
-        threshold = float("nan")
-    if not abs(threshold) < float("inf"):
+    threshold = float(value) if is_real(value) else np.nan
+    if not np.isfinite(threshold):
         raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
     return threshold

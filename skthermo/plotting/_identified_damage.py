@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 
     from skthermo.studies import IdentifiedDamage
 
-NEEDED = {
-    "told": {"probability"},
-    "table": {"probability", "severity", "ci_low", "ci_high"},
-    "shifts": {"measured", "explained", "standard_error"},
-}
 N_ERRORS = 2  # standard errors on either side of a measured shift
 LINE = 120  # number of letters of a line of the heading
 LABEL = 46  # number of letters of a line above a bar
@@ -101,16 +96,13 @@ class IdentifiedDamageDisplay(Display):
         Raises
         ------
         ValueError
-            If a frame or a column is missing.
+            If a frame is missing.
         """
-        for name, columns in NEEDED.items():
-            frame = getattr(identified, name, None)
-            missing = columns - set(getattr(frame, "columns", ()))
-            if frame is None or missing:
-                raise ValueError(
-                    f"identified is a {type(identified).__name__} whose {name!r} is missing or lacks "
-                    f"{sorted(missing)}; expected an IdentifiedDamage"
-                )
+        missing = [name for name in ("told", "table", "shifts") if not hasattr(identified, name)]
+        if missing:
+            raise ValueError(
+                f"identified is a {type(identified).__name__} without {missing}; expected an IdentifiedDamage"
+            )
         return cls(identified).plot(**options)
 
     def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:
@@ -208,14 +200,8 @@ class IdentifiedDamageDisplay(Display):
         style = {"linestyle": "", "marker": "D", "color": ORANGE, "label": "explained"}
         self.explained_ = ax.plot(places + 0.1, shifts["explained"].to_numpy(), **style)[0]
         ax.axhline(0, color=BLACK, linewidth=0.8)
-        ax.set_xticks(places, [label_of(name) for name in shifts.index])
-        if max(len(str(name)) for name in shifts.index) > SHORT_NAME:
-            lean(ax)
+        is_long = max(len(str(name)) for name in shifts.index) > SHORT_NAME
+        leaning = {"rotation": 45, "ha": "right", "rotation_mode": "anchor"} if is_long else {}
+        ax.set_xticks(places, [label_of(name) for name in shifts.index], **leaning)
         ax.set(title="shift of frequencies", ylabel="shift (%)", xlim=(-0.5, len(shifts) - 0.5))
         ax.legend(frameon=False, fontsize="small")
-
-
-def lean(ax: Axes) -> None:
-    """Turn the labels of the horizontal axis so that long ones end below their ticks."""
-    for label in ax.get_xticklabels():
-        label.set(rotation=45, ha="right", rotation_mode="anchor")

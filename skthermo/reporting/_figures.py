@@ -93,27 +93,19 @@ def _svg(figure: Figure) -> bytes:
     return drawn
 
 
-def draw_histories(F: pd.DataFrame) -> list[Html]:
-    """Measured frequencies over time, one drawing for each mode."""
+def draw_modes(
+    measured: pd.DataFrame, predicted: pd.DataFrame | None = None, temperature: pd.Series | None = None
+) -> list[Html]:
+    """Frequencies over time, or measured and predicted ones over a temperature, one drawing for each mode."""
     drawn = []
-    for mode in range(F.shape[1]):
-        table = F.iloc[:, [mode]]
+    for number, name in enumerate(measured):
+        table = measured.iloc[:, [number]]
         low, high = (significant(value, 4) for value in (table.iloc[:, 0].min(), table.iloc[:, 0].max()))
-        alt = f"Measured frequency {F.columns[mode]} over time: between {low} and {high} Hz."
-        drawn.append(draw(partial(PredictionDisplay.from_predictions, table), alt, height=2.2))
-    return drawn
-
-
-def draw_over_temperature(temperature: pd.Series, measured: pd.DataFrame, predicted: pd.DataFrame) -> list[Html]:
-    """Measured and predicted frequencies over one temperature, one drawing for each mode."""
-    drawn = []
-    for mode in range(measured.shape[1]):
-        tables = measured.iloc[:, [mode]], predicted.iloc[:, [mode]]
-        alt = (
-            f"Frequency {measured.columns[mode]} over the temperature {temperature.name}, measured and predicted by "
-            "the model."
-        )
-        drawn.append(draw(partial(PredictionDisplay.from_predictions, *tables, temperature=temperature), alt))
+        over = "time" if temperature is None else f"the temperature {temperature.name}, beside the model's prediction"
+        alt = f"Measured frequency {name} over {over}: between {low} and {high} Hz."
+        other = None if predicted is None else predicted.iloc[:, [number]]
+        make = partial(PredictionDisplay.from_predictions, table, other, temperature=temperature)
+        drawn.append(draw(make, alt, height=2.2 if temperature is None else HEIGHT))
     return drawn
 
 

@@ -11,7 +11,7 @@ from skthermo._tables.arrays import as_floats, spread_evenly
 from skthermo._tables.frames import column_names
 from skthermo._tables.text import counted, duration_text, period_text, share_text, significant
 from skthermo.fem import Structure
-from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_histories, draw_over_temperature
+from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_modes
 from skthermo.reporting._findings import REFERENCE, SIMULATED
 from skthermo.reporting._html import Html, Section, bullets, element, figure, paragraphs, section, table
 from skthermo.studies import DetectabilityStudy
@@ -48,7 +48,7 @@ def monitored(study: DetectabilityStudy, structure: Structure | None, families: 
             "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
         ),
         table("Natural frequencies.", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, "Hz", 4)),
-        figure("Measured natural frequencies over time.", draw_histories(F)),
+        figure("Measured natural frequencies over time.", draw_modes(F)),
     ]
     if structure is not None:
         drawn = draw_groups(structure, families)
@@ -63,7 +63,7 @@ def quality(study: DetectabilityStudy) -> Section:
     over_temperature = figure(
         f"Frequencies over the temperature {temperature.name}, which goes most closely with them: measured, and "
         "predicted by the model.",
-        draw_over_temperature(temperature, measured, predicted),
+        draw_modes(measured, predicted, temperature),
     )
     report = study.fem.report_
     parts = [*learned(report), over_temperature, *stiffnesses(report), *_agreement(study.results_)]

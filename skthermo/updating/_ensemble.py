@@ -17,7 +17,7 @@ from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._measured import Measured
 from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._residuals import Point, Residuals
 
 WIDEST = 4.0
 """Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays
@@ -65,7 +65,7 @@ class RandomisedResiduals:
 class RandomisedPoint:
     """Randomised residuals at one theta."""
 
-    point: Any
+    point: Point
     weights: Array
     values: Array
 
@@ -83,20 +83,8 @@ class RandomisedPoint:
 class Ensemble:
     """Draws of a model's parameters, and of the stiffness of its damage groups, given measured modes.
 
-    Parameters
-    ----------
-    model : FE model
-        As it was before calibration.
-    measured : Measured
-        Modes with their noise.
-    bounds : ndarray of shape (n_parameters, 2)
-        Box of the parameters.
-    prior : ndarray of shape (n_parameters,)
-        Standard deviation of each parameter about 1.
-    groups : list of str
-        Damage groups whose stiffness is not known either.
-    spread : float
-        Standard deviation of their stiffness about 1.
+    ``bounds`` and ``prior`` are those of the parameters, ``groups`` the damage groups whose stiffness is not known
+    either, and ``spread`` is the standard deviation of that about 1.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
 """The command of nightly jobs: what it says, its exit codes, and what a crash leaves."""
 
 import contextlib
+import errno
 import io
 import multiprocessing
 import os
@@ -69,11 +70,11 @@ def test_healthy_records(bridge, records):
     lines = done.out.splitlines()
     assert lines[0].startswith("read from ")
     assert lines[0].endswith(f"new.csv: 4, {records.index[FIRST + 10]} to {records.index[FIRST + 13]}")
-    assert lines[1:] == [
+    assert lines[1:3] == [
         "new: 4 (4 healthy, 0 alarm, 0 not evaluated); 0 repeated, 0 late, 0 too late",
         f"state: healthy (newest record {records.index[FIRST + 13]})",
-        "open events: none",
     ]
+    assert lines[-1] == "events: none"
 
 
 @pytest.mark.nightly
@@ -90,7 +91,8 @@ def test_an_alarm(bridge, records):
     assert done.code == ALARM
     assert "new: 2 (0 healthy, 2 alarm, 0 not evaluated)" in done.out
     event = load_monitor(done.file).events_.loc[1]
-    assert f"open event 1: damage since {event['start']}, {event['modes']}, index up to" in done.out
+    assert f"event 1: damage from {event['start']} still open" in done.out
+    assert f"by {event['modes']}" in done.out
 
 
 def test_an_alarm_that_has_ended_within_the_new_records_is_one(bridge, records, saved):
@@ -230,6 +232,30 @@ def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
     assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was evaluated is kept
     alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
     assert (alarm.code, alarm.err) == (ALARM, "error: a.html was not written: the disk is full\n")
+
+
+@pytest.mark.parametrize("state", ["healthy", "alarm"])
+def test_no_state_is_printed_that_was_not_saved(bridge, records, monkeypatch, state):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    first = FIRST + 10 if state == "healthy" else DAMAGED + 10
+    done = bridge("update", new=records[first : first + 2], state=state)
+    assert (done.code, done.out) == (FAILED, "")
+    assert str(done.file) in done.err
+    assert load_monitor(done.file).last_ == records.index[first - 1]
+
+
+def test_records_that_are_set_aside_are_not_healthy(bridge, records):
+    new = records[FIRST + 10 : FIRST + 14].assign(f2=lambda table: 2 * table["f2"])
+    done = bridge("update", new=new)
+    assert done.code == NOT_EVALUATED
+    ahead = bridge("update", new=new[:1].set_axis(new.index[:1] + pd.Timedelta("3653D")))
+    assert (ahead.code, "set aside, stamped too far ahead: 1" in ahead.out) == (NOT_EVALUATED, True)
+    assert bridge("status").code == NOT_EVALUATED
+    confirmed = bridge("update", "--confirm", new=records[FIRST + 14 : FIRST + 15])
+    assert load_monitor(confirmed.file).last_ == new.index[0] + pd.Timedelta("3653D")
 
 
 def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeypatch):

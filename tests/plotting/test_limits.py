@@ -76,15 +76,13 @@ def test_one_legend_names_the_labels_of_all_panels_which_keep_their_colours(inde
     assert first.get_color() == healthy.get_color() != damaged.get_color()
 
 
-def test_sensor_failures_do_not_stretch_the_temperatures(later):
+def test_failed_sensors_do_not_stretch_the_temperatures(later):
     T, F = later.temperatures["T1"].copy(), later.frequencies.copy()
     T.iloc[7], F.iloc[9, 0] = -999.0, 0.0
-    display = PredictionDisplay.from_predictions(F, temperature=T)
-    for ax in display.axes_:
-        assert ax.get_xlim()[0] > T.drop(T.index[7]).min() - 5
-        assert "1 beyond, down to -999" in texts(ax)
-    assert display.axes_[0].get_ylim()[0] > F["f1"].drop(F.index[9]).min() - 0.5
-    assert "1 beyond, down to 0" in texts(display.axes_[0])
+    ax = PredictionDisplay.from_predictions(F, temperature=T).axes_[0]
+    assert ax.get_xlim()[0] > T.drop(T.index[7]).min() - 5
+    assert ax.get_ylim()[0] > F["f1"].drop(F.index[9]).min() - 0.5
+    assert {"1 beyond, down to -999", "1 beyond, down to 0"} <= set(texts(ax))
 
 
 def test_intervals_stay_in_view_and_outliers_of_measurements_do_not_stretch_them(later):

@@ -65,6 +65,7 @@ class FakeMonitor:
         self.evaluations_ = evaluated[evaluated.index > stamps[-1] - pd.Timedelta("400D")]
         self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
         self.targets_, self.threshold_, self.clear_threshold_ = ["f1", "f2"], 3.0, 2.0
+        self.units_ = {"T1": "°C", "f1": "Hz", "f2": "Hz"}
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
         self.trained_, self.since_ = self.baseline_, None
         self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}

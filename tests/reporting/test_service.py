@@ -14,11 +14,17 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
-from skthermo.reporting.service._changes import drift, drift_sentences, sensors
-from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._sections import introduction, not_evaluated
+from skthermo.reporting.service._sections import (
+    drift,
+    drift_sentences,
+    events,
+    false_alarms,
+    introduction,
+    not_evaluated,
+    sensors,
+    today,
+)
 from skthermo.reporting.service._standing import Standing
-from skthermo.reporting.service._today import today
 from tests.reporting.monitors import FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page
 
@@ -232,7 +238,7 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
     )
     n_kept = len(monitor.evaluations_)
     text = Page(not_evaluated(standing_of(monitor))).text
-    assert f"Why {500 - n_kept} of them, which are older, were not evaluated is no longer kept." in text
+    assert f"Why {500 - n_kept} older ones of them were not evaluated is no longer kept." in text
 
 
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
@@ -260,7 +266,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
 def test_the_promise_counts_damage_events_beside_false_alarms_that_were_to_be_expected():
     seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="stiffening")]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
-    text = Page(promise(standing_of(monitor))).text
+    text = Page(false_alarms(standing_of(monitor))).text
     assert "gives 2 false alarms a year on average" in text
     assert f"there was 1{SPACE}damage event, 0 of them said to be harmless." in text
     years = (monitor.last_ - monitor.days_.index[0]) / pd.Timedelta(days=365.25)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -75,7 +75,7 @@ class FleetBridge:
         return self.alien is not None
 
     @cached_property
-    def covariates(self) -> dict[str, Any]:
+    def covariates(self) -> dict[str, str | float]:
         """What its owner knows: "kind", "material", "span" in m, "latitude" in degrees."""
         random, kind = self._random("who"), KINDS[self.kind]
         return {
@@ -138,7 +138,7 @@ class FleetBridge:
     def records(
         self,
         days: int,
-        start: Any = "2025-01-01",
+        start: str | datetime = "2025-01-01",
         *,
         samples_per_day: int = 1,
         damage: Mapping[str, float] | None = None,
@@ -263,7 +263,7 @@ def relative_error(name: str, of_stiffness: float) -> float:
     return MASS_ERROR if name.startswith("mass") else 0.0
 
 
-def record_times(start: Any, days: int, samples_per_day: int) -> pd.DatetimeIndex:
+def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:
     """Times of the records."""
     days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
     if HOURS_A_DAY % samples_per_day:
@@ -278,7 +278,7 @@ def record_times(start: Any, days: int, samples_per_day: int) -> pd.DatetimeInde
     return pd.date_range(first, periods=days * samples_per_day, freq=step, name="time")
 
 
-def check_share(value: Any, what: str) -> float:
+def check_share(value: float, what: str) -> float:
     """A share of records."""
     if not is_real(value) or not 0 <= value <= MOST:
         raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")

@@ -1,14 +1,13 @@
 """Trusses, girders and tied arches of any span: design, members, groups."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from skthermo.datasets._truss import truss_structure
-from skthermo.fem import Bar, Beam, PointMass, Spring, Structure
+from skthermo.fem import Bar, Beam, Element, PointMass, Spring, Structure
 
 Design = dict[str, float]
 YOUNG = {"steel": 210e9, "composite": 210e9, "concrete": 35e9}
@@ -23,7 +22,7 @@ class Kind:
 
     design: Callable[[float, str, np.random.RandomState], Design]  # draws stiffnesses and masses, in SI units
     build: Callable[[Design, bool], Structure]  # the mesh of the truth is fine
-    parameters: Mapping[str, Any]  # what theta multiplies in the user's model
+    parameters: Mapping[str, str | tuple[str, str]]  # what theta multiplies in the user's model
     zones: Mapping[str, str]  # thermal zone -> material ("own": the bridge's); they cut across the parameters
     groups: tuple[str, ...]  # what can be damaged
     spans: tuple[float, float]  # shortest and longest span in m
@@ -56,7 +55,7 @@ def truss(design: Design, fine: bool) -> Structure:
     scale = design["span"] / 26.0
     nodes = {node: tuple(place * scale * np.array([1, design["height"]])) for node, place in sheet.nodes.items()}
     of = {name: group for group in ("bottom", "top", "diagonal") for name in sheet.groups[group]}
-    members: dict[Any, Any] = {}
+    members: dict[Hashable, Element] = {}
     for name, bar in sheet.members.items():
         stiffness = design[f"EA_{of.get(name, 'diagonal')}"]
         steel = {"E": YOUNG["steel"], "A": stiffness / YOUNG["steel"], "density": 7850.0}
@@ -109,8 +108,8 @@ def girder_design(span: float, material: str, random: np.random.RandomState) -> 
 
 
 def line_of_beams(
-    line: list[Any], part: str, design: Design, bending: float, torsion: float, mass: float, area: float = 1.0
-) -> dict[Any, Beam]:
+    line: Sequence[Hashable], part: str, design: Design, bending: float, torsion: float, mass: float, area: float = 1.0
+) -> dict[Hashable, Beam]:
     """Beams from node to node, with the given E I, G J and mass by length."""
     young = design["E"]
     section = {"E": young, "G": POISSON_SHEAR * young, "A": area, "I_yy": bending / young, "I_zz": SLENDER}

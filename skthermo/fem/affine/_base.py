@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.arguments import check_dofs, check_flag, check_theta
 from skthermo._estimators.threads import map_on_blas_threads
-from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, real_array, shape_array
+from skthermo._tables.arrays import Array, Bounds, Matrix, MatrixLike, RandomState, real_array, shape_array
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._theta import warn_of_failures
 from skthermo.fem.affine._core import AffineCore
@@ -393,7 +393,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         """
         n_terms = len(self._full_core.stiffness.factors)
         groups = dict(self._groups)
-        divided: list[tuple[int, Any]] = []
+        divided: list[tuple[int, Matrix]] = []
         for name, of_terms in parts.items():
             if name in self._groups or not isinstance(of_terms, Mapping) or not of_terms:
                 raise ValueError(f"part {name!r} is {of_terms!r:.200}; expected a new name, and matrices by position")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from skthermo._tables.arrays import Array, real_array
+from skthermo._tables.arrays import Array, Matrix, MatrixLike, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly._term_assembler import MASS, STIFFNESS, TermAssembler
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, Dof, Element, check_element, check_matrices
@@ -175,7 +174,7 @@ class Structure:
 
     def divide(
         self, model: AffineModel | ReducedModel, groups: Mapping[str, Mapping[str, Collection[Hashable]]]
-    ) -> Any:
+    ) -> AffineModel | ReducedModel:
         """A model of this structure with further damage groups, which hold some members of its groups.
 
         Parameters
@@ -219,7 +218,7 @@ class Structure:
                 f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {len(self.dofs)}; expected a "
                 "model that this structure has assembled"
             )
-        parts: dict[str, dict[int, Any]] = {}
+        parts: dict[str, dict[int, MatrixLike]] = {}
         for group, named in groups.items():
             if group not in model.groups:
                 raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(model.groups)}")
@@ -236,8 +235,8 @@ class Structure:
         return model.with_parts(parts)
 
     def _sum_by_part(
-        self, contents: Sequence[tuple[Hashable, tuple[str, ...]]], part_of: Mapping[Hashable, str], term: Any
-    ) -> dict[str, Any]:
+        self, contents: Sequence[tuple[Hashable, tuple[str, ...]]], part_of: Mapping[Hashable, str], term: Matrix
+    ) -> dict[str, Matrix]:
         """Summed stiffness of the members of every part of a term, after a check that all members make up the term."""
         assembler = TermAssembler(self.dofs)
         for member, properties in contents:
@@ -298,7 +297,7 @@ class Structure:
             raise ValueError(f"{what}: unknown group {group!r}; expected one of {sorted(self._groups)}")
         return group
 
-    def _read_group(self, group: str, names: Any) -> frozenset:
+    def _read_group(self, group: str, names: object) -> frozenset:
         if not isinstance(names, Collection):
             raise ValueError(f"group {group!r} is {names!r}; expected names of members")
         members = frozenset([names] if isinstance(names, str) else names)
@@ -342,7 +341,7 @@ class Structure:
         )
 
 
-def _read_directions(along: Any, node: Hashable) -> list[str]:
+def _read_directions(along: object, node: Hashable) -> list[str]:
     """List of directions from a collection such as ("x", "ry"), or from text: "xyz rx ry" names five."""
     if not isinstance(along, Collection | None):
         raise ValueError(f"support of node {node!r} is {along!r}; expected directions such as 'xy' or ('x', 'ry')")

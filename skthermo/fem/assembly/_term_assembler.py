@@ -14,13 +14,7 @@ Key = tuple[str, ...]
 
 
 class TermAssembler:
-    """Sums members' matrices into one term for each combination of parameters and damage groups.
-
-    Parameters
-    ----------
-    dofs : sequence of (node, direction)
-        Free degrees of freedom; rows and columns of the others are left out.
-    """
+    """Sums members' matrices, at the free ``dofs``, into one term for each combination of parameters and groups."""
 
     def __init__(self, dofs: Sequence[Dof]):
         self._index = {dof: i for i, dof in enumerate(dofs)}

@@ -5,7 +5,7 @@ a parameter.
 """
 
 from collections.abc import Hashable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -129,7 +129,7 @@ class PhysicalElement(Element, Protocol):
         return coordinates
 
 
-def check_matrices(name: Hashable, element: Element, matrices: Any, n_dofs: int, what: str) -> ByProperties:
+def check_matrices(name: Hashable, element: Element, matrices: ByProperties, n_dofs: int, what: str) -> ByProperties:
     """Refuse matrices of another size than the element's degrees of freedom, or of properties that it has not."""
     known = {symbol for symbol, _, _ in element.properties()}
     for properties, matrix in matrices.items():

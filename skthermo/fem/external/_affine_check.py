@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from functools import reduce
 from operator import add
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, MatrixLike
 from skthermo.fem._theta import by_name, failures_named
 from skthermo.fem.affine import read_terms
 
@@ -21,7 +21,7 @@ SAME = 1e-6
 class Program:
     """A user's function that returns stiffness and mass; its results are checked, and errors name theta."""
 
-    def __init__(self, function: Callable[[Array], tuple[Any, Any]], parameter_names: tuple[str, ...]):
+    def __init__(self, function: Callable[[Array], tuple[MatrixLike, MatrixLike]], parameter_names: tuple[str, ...]):
         self.function = function
         self.parameter_names = parameter_names
         self.n_dof: int | None = None

@@ -49,8 +49,7 @@ class CallableModel:
     Raises
     ------
     ValueError
-        If a name repeats, ``n_modes`` is not a positive integer, or the cache is a folder or belongs to
-        other parameters or another number of modes.
+        If the cache is a folder or belongs to other parameters or another number of modes.
 
     See Also
     --------
@@ -59,9 +58,8 @@ class CallableModel:
     Notes
     -----
     A row is recognised by the exact bits of its theta and is written as soon as it is solved; with
-    ``vectorized=True``, all rows of a call are written together. Several processes may share a cache, but a row that
-    one process is still solving may be solved by another too. A cache cannot know whether the function is still the
-    same: delete the file when the function changes.
+    ``vectorized=True``, all rows of a call are written together. Several processes may share a cache. It cannot know
+    whether the function is still the same: delete the file when the function changes.
 
     Examples
     --------

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import reduce
 from numbers import Integral
 from operator import add
-from typing import Any
 
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, RandomState, as_random_state
+from skthermo._tables.arrays import Array, MatrixLike, RandomState, as_random_state
 from skthermo.fem.affine import AffineModel, check_different
 from skthermo.fem.external._affine_check import Program, Terms, check_affine, relative
 
@@ -19,7 +18,7 @@ ROUNDING = 16 * np.finfo(float).eps
 
 
 def probe(
-    assemble: Callable[[Array], tuple[Any, Any]],
+    assemble: Callable[[Array], tuple[MatrixLike, MatrixLike]],
     parameter_names: Sequence[str],
     *,
     n_modes: int = 6,

@@ -1,7 +1,6 @@
 """Sparse generalised eigenproblems K phi = lambda M phi, one theta after the other."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg
@@ -33,7 +32,7 @@ class ShiftInvertSolver:
         self._factorise = stiffness.pattern.elimination.factorise
         self._references: dict[int, Array] = {}
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"_references": {}}  # what was solved before is no part of a model
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:

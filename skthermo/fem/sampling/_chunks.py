@@ -13,12 +13,13 @@ from skthermo._estimators.arguments import check_jobs, check_model, check_theta
 from skthermo._estimators.threads import map_on_blas_threads, single_blas_thread
 from skthermo._io import as_they_come, with_progress
 from skthermo._tables.arrays import Array
+from skthermo.fem._protocol import FEModel
 from skthermo.fem._theta import ROWS_PER_CHUNK, warn_of_failures
 
 Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
 
 
-def checked_rows(model: Any, theta: ArrayLike, n_jobs: int | None) -> Array:
+def checked_rows(model: FEModel, theta: ArrayLike, n_jobs: int | None) -> Array:
     """Rows of theta, in which NaN is allowed, after checks of the model and the number of jobs."""
     check_model(model)
     check_jobs(n_jobs)
@@ -26,7 +27,7 @@ def checked_rows(model: Any, theta: ArrayLike, n_jobs: int | None) -> Array:
 
 
 def solve_rows(
-    model: Any,
+    model: FEModel,
     solve: Solve,
     rows: Array,
     shapes: Mapping[str, tuple[int, ...]],
@@ -75,13 +76,13 @@ def _solved(
 class _Job:
     """What is done with every chunk; Dask sends it to a worker once, because it says that it is large."""
 
-    def __init__(self, task: Callable[[Array], Any]):
+    def __init__(self, task: Callable[[Array], tuple[Array, ...]]):
         self.task = task
 
     def __sizeof__(self) -> int:
         return 2**20
 
 
-def _on_one_thread(job: _Job, chunk: Array) -> Any:
+def _on_one_thread(job: _Job, chunk: Array) -> tuple[Array, ...]:
     with single_blas_thread():
         return job.task(chunk)

@@ -1,18 +1,16 @@
-"""Faults that were detected, with their beginning and end."""
+"""Faults of sensors, with their beginning and end."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
 from skthermo._tables.times import DAY_NS
 
-LASTS = np.iinfo(np.int64).min  # end of a fault that lasts
 SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
 COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
 LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
@@ -21,103 +19,88 @@ MONTH = 30.4  # days
 
 
 @dataclass(frozen=True)
-class SensorFaults:
-    """Column of each fault by its position, the other one where two are concerned (else -1), times in nanoseconds.
+class Fault:
+    """Position of its column, the other one where two are concerned (else -1), times in nanoseconds, None as it lasts.
 
     ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
     """
 
-    column: NDArray[np.int64]
-    other: NDArray[np.int64]
-    kind: NDArray[np.str_]
-    since: NDArray[np.int64]
-    detected: NDArray[np.int64]
-    until: NDArray[np.int64]
-    size: Array
-    rate: Array
+    kind: str
+    column: int
+    since: int
+    detected: int
+    other: int = -1
+    size: float = 0.0
+    rate: float = 0.0
+    until: int | None = None
 
-    @classmethod
-    def none(cls) -> SensorFaults:
-        """No fault."""
-        whole, real = np.empty(0, dtype=np.int64), np.empty(0)
-        return cls(whole, whole, np.empty(0, dtype="<U11"), whole, whole, whole, real, real)
+    def detail(self, other: Hashable, unit: str) -> str:
+        """What was seen, and what is done about it."""
+        value = f"{self.size:.6g} {unit}".rstrip()
+        return {
+            "dead": "has had no value for longer than gaps of the baseline",
+            "stuck": f"repeats {value}; left out",
+            "implausible": f"shows implausible values, such as {value}; left out",
+            "offset": f"{self.size:+.1f} degrees beside what the other thermometers predict; left out",
+            "drift": f"{self.rate * MONTH:+.2f} degrees a month, {self.size:+.1f} so far, beside what the other "
+            "thermometers predict; left out",
+            "disagree": f"{abs(self.size):.1f} degrees between what it, {other!r} and any others predict: which is "
+            "wrong is not known, none is left out",
+            "swapped": f"its values are in the column of {other!r}; put back in place",
+        }[self.kind]
 
-    def lasting(self, *kinds: str) -> list[int]:
-        """Positions of the faults that last, of these kinds."""
-        return [int(fault) for fault in np.flatnonzero(self.until == LASTS) if self.kind[fault] in kinds]
 
-    def left_out(self, n_columns: int) -> NDArray[np.int64]:
-        """Position of the fault for which each column is left out; -1 where it is not."""
-        found = np.full(n_columns, -1)
-        for fault in self.lasting(*LEFT_OUT):
-            found[self.column[fault]] = fault
-        return found
+@dataclass(frozen=True)
+class SensorFaults:
+    """All faults in the order in which they were detected."""
 
-    def opened(
-        self,
-        kind: str,
-        column: int,
-        since: int,
-        detected: int,
-        *,
-        other: int = -1,
-        size: float = 0.0,
-        rate: float = 0.0,
-    ) -> SensorFaults:
+    faults: tuple[Fault, ...] = ()
+
+    def lasting(self, *kinds: str) -> list[Fault]:
+        """Faults that last, of these kinds."""
+        return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
+
+    def left_out(self) -> dict[int, Fault]:
+        """By position of each column that is left out, the fault for which it is."""
+        return {fault.column: fault for fault in self.lasting(*LEFT_OUT)}
+
+    def opened(self, fault: Fault) -> SensorFaults:
         """With one more fault, or with that one again which has just ended."""
-        same = (self.column == column) & (self.other == other) & (self.kind == kind)
-        again = np.flatnonzero(same & (self.until > since - SOON))
-        if again.size:
-            return self.with_values(int(again[-1]), until=LASTS)
-        values = (column, other, kind, since, detected, LASTS, size, rate)
-        whole = (np.append(getattr(self, part.name), value) for part, value in zip(fields(self), values, strict=True))
-        return SensorFaults(*whole)
+        same = (fault.column, fault.other, fault.kind)
+        for known in reversed(self.faults):
+            lasts = known.until is None or known.until > fault.since - SOON
+            if (known.column, known.other, known.kind) == same and lasts:
+                return self.changed(known, until=None)
+        return SensorFaults((*self.faults, fault))
 
-    def with_values(self, fault: int, **values: str | float) -> SensorFaults:
+    def changed(self, fault: Fault, **values: Any) -> SensorFaults:
         """With other values of one fault."""
-        changed = {name: getattr(self, name).copy() for name in values}
-        for name, value in values.items():
-            changed[name][fault] = value
-        return replace(self, **changed)
+        return SensorFaults(tuple(replace(one, **values) if one is fault else one for one in self.faults))
 
-    def notes(self, names: Sequence[Hashable]) -> list[str]:
+    def notes(self, names: Sequence[Hashable], zone: str) -> list[str]:
         """What is left out or put back in place for the faults that last."""
-        texts = []
-        for fault in self.lasting(*LEFT_OUT, "swapped"):
-            name, kind, since = names[self.column[fault]], self.kind[fault], pd.Timestamp(int(self.since[fault]))
-            if kind == "swapped":
-                texts.append(f"{name} and {names[self.other[fault]]} are exchanged and were put back in place")
-            else:
-                texts.append(f"{name} is left out ({kind} since {since:%Y-%m-%d})")
-        return texts
+        return [
+            f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
+            if fault.kind == "swapped"
+            else f"{names[fault.column]} is left out ({fault.kind} since {_stamps([fault.since], zone)[0]:%Y-%m-%d})"
+            for fault in self.lasting(*LEFT_OUT, "swapped")
+        ]
 
     def table(self, names: Sequence[Hashable], zone: str, units: Sequence[str]) -> pd.DataFrame:
         """One row a fault, two where two columns are concerned."""
-        rows = []
-        for fault in range(len(self.column)):
-            ours, other = int(self.column[fault]), int(self.other[fault])
-            for column, partner in [(ours, other), (other, ours)][: 1 if other < 0 else 2]:
-                times = (int(part[fault]) for part in (self.since, self.detected, self.until))
-                rows.append(
-                    [names[column], str(self.kind[fault]), *times, self._detail(fault, names, partner, units[column])]
-                )
-        table = pd.DataFrame(rows, columns=COLUMNS)
-        for name in ("since", "detected", "until"):
-            stamps = pd.DatetimeIndex(np.array(table[name].tolist(), dtype="datetime64[ns]"))
-            table[name] = stamps if not zone else stamps.tz_localize("UTC").tz_convert(zone)
-        return table
+        rows = [
+            [names[own], fault.kind, fault.since, fault.detected, fault.until, fault.detail(names[other], units[own])]
+            for fault in self.faults
+            for own, other in [(fault.column, fault.other), (fault.other, fault.column)][: 1 if fault.other < 0 else 2]
+        ]
+        columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
+        table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
+        return pd.DataFrame(table | {name: _stamps(columns[name], zone) for name in ("since", "detected", "until")})
 
-    def _detail(self, fault: int, names: Sequence[Hashable], partner: int, unit: str) -> str:
-        """What was seen, and what is done about it."""
-        size, rate = self.size[fault], self.rate[fault]
-        return {
-            "dead": "has had no value for longer than gaps of the baseline",
-            "stuck": f"repeats {f'{size:.6g} {unit}'.rstrip()}; left out",
-            "implausible": f"shows implausible values, such as {f'{size:.6g} {unit}'.rstrip()}; left out",
-            "offset": f"{size:+.1f} degrees beside what the other thermometers predict; left out",
-            "drift": f"{rate * MONTH:+.2f} degrees a month, {size:+.1f} so far, beside what the other thermometers "
-            "predict; left out",
-            "disagree": f"{abs(size):.1f} degrees between what it, {names[partner]!r} and any others predict: which "
-            "is wrong is not known, none is left out",
-            "swapped": f"its values are in the column of {names[partner]!r}; put back in place",
-        }[str(self.kind[fault])]
+
+def _stamps(times: Sequence[int | None], zone: str) -> pd.DatetimeIndex:
+    """Nanoseconds as stamps in a time zone; none for None."""
+    missing = np.iinfo(np.int64).min
+    numbers = np.array([missing if time is None else time for time in times], dtype=np.int64)
+    stamps = pd.DatetimeIndex(numbers.view("M8[ns]"))
+    return stamps.tz_localize("UTC").tz_convert(zone) if zone else stamps

@@ -14,7 +14,7 @@ from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import columns_by_sensor, frame_like
 from skthermo._tables.times import DAY_NS
 from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
-from skthermo.monitoring.sensors._faults import DEPARTURES, SensorFaults
+from skthermo.monitoring.sensors._faults import DEPARTURES, Fault, SensorFaults
 from skthermo.monitoring.sensors._responses import CERTAIN, Responses
 from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
 from skthermo.preprocessing.checks import Plausible, equal_runs
@@ -206,7 +206,7 @@ class SensorWatch:
             np.empty((4, 0, n_sensors)),
             np.zeros(n_pairs),
             np.zeros(n_pairs, dtype=np.int64),
-            SensorFaults.none(),
+            SensorFaults(),
         )
 
     def faults(self, state: WatchState) -> pd.DataFrame:
@@ -247,8 +247,12 @@ class SensorWatch:
     ) -> tuple[NDArray[np.bool_], Array]:
         """Responses set aside that the structure may have moved, and how many of them are so for long."""
         n_sensors, faults = len(self.sensors), state.faults
-        of_mode = faults.left_out(n_sensors + len(self.modes))[n_sensors:]
-        is_fault = np.array([fault >= 0 and faults.kind[fault] in HELD for fault in of_mode], dtype=bool)
+        of_mode = {
+            column - n_sensors: fault
+            for column, fault in faults.left_out().items()
+            if column >= n_sensors and fault.kind in HELD
+        }
+        is_fault = np.isin(np.arange(len(self.modes)), list(of_mode))
         runs = replace(state.runs, counts=state.runs.counts[:, n_sensors:])
         lengths = np.zeros(far.shape, dtype=np.int64)
         if far.any() or runs.counts[IMPLAUSIBLE].any():
@@ -256,8 +260,8 @@ class SensorWatch:
                 lengths[row] = runs.implausible(seen[row], far[row])
                 runs = replace(runs, counts=np.array([*runs.counts[:IMPLAUSIBLE], lengths[row]]))
         held, certain = (lengths > 0) | is_fault, (lengths >= FEWEST[IMPLAUSIBLE]) | is_fault
-        for mode in np.flatnonzero(is_fault):
-            said = [time for time in acknowledged if time >= faults.since[of_mode[mode]]]
+        for mode, fault in of_mode.items():
+            said = [time for time in acknowledged if time >= fault.since]
             if said:
                 held[moments > min(said), mode] = False
         opens = (held & certain).sum(axis=1).astype(float)
@@ -274,7 +278,7 @@ class SensorWatch:
         """What was left out of each record, and why."""
         names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
         out = self._left_out(faults)
-        lasting = faults.notes(names)
+        lasting = faults.notes(names, self.zone)
         notes = ["; ".join(lasting)] * len(given)
         unseen = np.isnan(given[:, n_sensors:]) & held & ~out[n_sensors:]
         for row in np.flatnonzero((far & ~out).any(axis=1) | unseen.any(axis=1)):
@@ -343,7 +347,7 @@ class SensorWatch:
         """Responses with exchanged ones back in their columns."""
         responses = responses.copy()
         for fault in faults.lasting("swapped"):
-            pair = np.array([faults.column[fault], faults.other[fault]]) - len(self.sensors)
+            pair = np.array([fault.column, fault.other]) - len(self.sensors)
             responses[:, pair] = responses[:, pair[::-1]]
         return responses
 
@@ -355,15 +359,11 @@ class SensorWatch:
         faults = state.faults
         for pair in np.flatnonzero(evidence > CERTAIN):
             first, second = (len(self.sensors) + mode for mode in self.expected.pairs[pair])
-            known = [
-                fault
-                for fault in faults.lasting("swapped")
-                if {first, second} == {faults.column[fault], faults.other[fault]}
-            ]
+            known = [one for one in faults.lasting("swapped") if {first, second} == {one.column, one.other}]
             if known:
-                faults = faults.with_values(int(known[0]), until=since[pair])
+                faults = faults.changed(known[0], until=int(since[pair]))
             else:
-                faults = faults.opened("swapped", first, since[pair], midnight, other=second)
+                faults = faults.opened(Fault("swapped", first, int(since[pair]), midnight, second))
             evidence[pair] = 0.0
         return replace(state, exchanged=evidence, exchanged_since=since, faults=faults)
 
@@ -371,22 +371,22 @@ class SensorWatch:
         """Columns that are dead, stuck or implausible, or no longer."""
         faults, runs = state.faults, state.runs
         is_run = runs.counts >= self.run_limits.limits
-        out = faults.left_out(is_run.shape[1])
-        for column in np.flatnonzero(is_run.any(axis=0) | (out >= 0)):
-            fault = int(out[column])
+        out = faults.left_out()
+        for column in sorted({*np.flatnonzero(is_run.any(axis=0)).tolist(), *out}):
+            fault = out.get(column)
             kind = next((name for name, row in KINDS_OF_RUNS.items() if is_run[row, column]), None)
-            known = str(faults.kind[fault]) if fault >= 0 else None
+            known = None if fault is None else fault.kind
             if known == kind:
                 continue
             if known in KINDS_OF_RUNS:
-                faults = faults.with_values(fault, until=midnight)
+                faults = faults.changed(fault, until=midnight)
                 state = self._forgotten(state, column, int(state.days[-1]) + 1 if len(state.days) else 0)
                 known = None
             if kind is not None:
                 if known is not None:  # an offset turns out to be something else
-                    faults = faults.with_values(fault, until=midnight)
+                    faults = faults.changed(fault, until=midnight)
                 since = int(runs.since[KINDS_OF_RUNS[kind], column])
-                faults = faults.opened(kind, column, since, midnight, size=float(runs.last[column]))
+                faults = faults.opened(Fault(kind, column, since, midnight, size=float(runs.last[column])))
         return replace(state, faults=faults)
 
     def _forgotten(self, state: WatchState, column: int, before: int) -> WatchState:
@@ -407,7 +407,7 @@ class SensorWatch:
 
     def _left_out(self, faults: SensorFaults) -> NDArray[np.bool_]:
         """Thermometers and modes that are left out."""
-        return faults.left_out(len(self.sensors) + len(self.modes)) >= 0
+        return np.isin(np.arange(len(self.sensors) + len(self.modes)), list(faults.left_out()))
 
     def _change(self, state: WatchState, sensor: int) -> Change | None:
         """The most likely offset or drift of a thermometer, whatever it amounts to; None with too few days."""
@@ -424,25 +424,25 @@ class SensorWatch:
         """Offsets and drifts that have ended are closed; those that last are estimated again."""
         for fault in state.faults.lasting(*DEPARTURES):
             faults = state.faults
-            sensor, detected = int(faults.column[fault]), int(faults.detected[fault])
+            sensor, detected = fault.column, fault.detected
             after = state.days * DAY_NS > detected
             departures = Departures(state.days, *state.departures[:, :, sensor])
             before = departures.rows(after & (state.days <= state.days[-1] - RECENT)).known()
-            level = faults.size[fault] if len(before.days) < RECENT else np.median(before.values * before.deviations)
+            level = fault.size if len(before.days) < RECENT else np.median(before.values * before.deviations)
             noise = self.thermometers.noises[sensor]
             odds, end = noise.for_no_change(departures.rows(after), float(level))
             if odds > ENDED and state.days[-1] - end >= LEAST_DAYS - 1:
                 until = int(self._midnight(end))
-                state = replace(state, faults=faults.with_values(fault, until=until))
+                state = replace(state, faults=faults.changed(fault, until=until))
                 state = self._departing(self._forgotten(state, sensor, end))
-            elif midnight - detected < LONGEST * DAY_NS / 2 and faults.kind[fault] != "disagree":
+            elif midnight - detected < LONGEST * DAY_NS / 2 and fault.kind != "disagree":
                 found = self._change(state, sensor)
                 if found is not None and self._is_fault(sensor, found):
-                    state = replace(state, faults=faults.with_values(fault, **self._described(found)))
+                    state = replace(state, faults=faults.changed(fault, **self._described(found)))
         return state
 
     def _described(self, change: Change) -> dict[str, Any]:
-        """A change in the words of `SensorFaults`."""
+        """A change in the words of `Fault`."""
         kind = "drift" if change.rate else "offset"
         return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
 
@@ -454,7 +454,9 @@ class SensorWatch:
             return state
         worst = max(detected, key=lambda sensor: self._blame(sensor, detected[sensor]))
         found = self._described(detected[worst])
-        without = self._departing(replace(state, faults=state.faults.opened(column=worst, detected=midnight, **found)))
+        without = self._departing(
+            replace(state, faults=state.faults.opened(Fault(column=worst, detected=midnight, **found)))
+        )
         left = self._changes(without)
         also = [sensor for sensor in left if self._is_fault(sensor, left[sensor])]
         blame = self._blame(worst, detected[worst])
@@ -466,13 +468,13 @@ class SensorWatch:
         if is_clear and not rivals:
             faults = without.faults
             for fault in faults.lasting("disagree"):  # the one at fault has been found
-                faults = faults.with_values(fault, until=midnight)
+                faults = faults.changed(fault, until=midnight)
             return replace(without, faults=faults)
         if state.faults.lasting("disagree") or (is_clear and detected[worst].n_days < RECENT):
             return state
         other = max(set(changes) - {worst}, key=lambda sensor: changes[sensor].weight)
         found |= {"kind": "disagree", "rate": 0.0}
-        return replace(state, faults=state.faults.opened(column=worst, other=other, detected=midnight, **found))
+        return replace(state, faults=state.faults.opened(Fault(column=worst, other=other, detected=midnight, **found)))
 
     def _blame(self, sensor: int, change: Change) -> float:
         """Twice the logarithm of the odds of a change; a reference is less likely at fault than a thermometer."""

@@ -1,6 +1,6 @@
 """Pages on detectors in service."""
 
-from skthermo.reporting.service._sections import monitor_page
+from skthermo.reporting.service._sections import banner, first_section, monitor_page, symbol
 from skthermo.reporting.service._standing import (
     ALARM,
     ATTENTION,
@@ -11,7 +11,6 @@ from skthermo.reporting.service._standing import (
     moment,
     time_of,
 )
-from skthermo.reporting.service._today import banner, first_section, symbol
 
 __all__ = [
     "ALARM",

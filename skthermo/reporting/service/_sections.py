@@ -1,20 +1,58 @@
-"""The page on a monitor: its sections in their order, and those on records."""
+"""The page on a monitor: its sections in their order."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 import pandas as pd
 
-from skthermo._tables.text import counted, share_text
+from skthermo._tables.text import (
+    SPACE,
+    counted,
+    counted_number,
+    duration_text,
+    listed,
+    percent,
+    share_text,
+    significant,
+)
 from skthermo.monitoring import Monitor
-from skthermo.reporting._html import Html, Section, element, figure, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, bullets, element, figure, joined, paragraphs, section, table
 from skthermo.reporting._settings import parameters, settings
-from skthermo.reporting.service._changes import drift, sensors
-from skthermo.reporting.service._events import events, promise
-from skthermo.reporting.service._figures import chart_year, draw_days, draw_month
-from skthermo.reporting.service._standing import NOT_EVALUATED, Standing, moment
-from skthermo.reporting.service._today import today
+from skthermo.reporting.service._figures import chart_year, draw_days, draw_drift, draw_month
+from skthermo.reporting.service._standing import (
+    ALARM,
+    ATTENTION,
+    HEALTHY,
+    NOT_EVALUATED,
+    ONE_DAY,
+    YEAR,
+    Standing,
+    moment,
+)
 
 MOST_REASONS = 12  # largest number of reasons in a table
+MOST_LISTED = 30  # largest number of events in the table
+MOST_NAMED = 5  # largest number of events in a sentence
+N_ERRORS = 2  # standard errors on either side of an estimate
+FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
+EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
+SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATION, NOT_EVALUATED: "M6 12h12"}
+"""Lines within a circle: a tick, an exclamation mark, a dash."""
+FAULTS = {
+    "dead": "gives no value",
+    "stuck": "repeats one value",
+    "implausible": "shows implausible values",
+    "offset": "has jumped",
+    "drift": "drifts",
+    "disagree": "contradicts another sensor",
+    "swapped": "is swapped with another",
+}
+KINDS = {
+    "stiffening": "in which the structure was stiffer, which is reported but no damage",
+    "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
+}
 
 
 def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[Html, list[Section]]:
@@ -26,7 +64,7 @@ def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[H
         drift(standing, is_drawn=not is_one_of_many),
         sensors(standing),
         not_evaluated(standing),
-        promise(standing),
+        false_alarms(standing),
         _settings(standing.monitor),
     ]
 
@@ -42,9 +80,149 @@ def introduction(monitor: Monitor) -> list[str]:
     if monitor.since_ is not None:
         sentences.append(
             f"The structure was changed: as it is since {moment(monitor.since_)}, it counts as healthy. Older records, "
-            "moved to its new frequencies, stand for weather that has not come since."
+            "moved to its new level, stand for weather that has not come since."
         )
     return sentences
+
+
+def today(standing: Standing) -> Section:
+    """State, and what an owner should know, in a few sentences."""
+    sentences = [*_newest(standing), *_open_events(standing), *sensor_sentences(standing), *drift_sentences(standing)]
+    words = (
+        "A record is one measurement of temperatures and responses, such as natural frequencies. Its damage index says "
+        "how far the responses are from those of the healthy structure in the same weather. An event begins when the "
+        "index exceeds its threshold, and ends when it has stayed low for a while. An alarm does not prove damage, and "
+        "healthy means that no change is seen, not that there is none."
+    )
+    state = banner(standing.state, moment(standing.now), standing.headline(), standing.explanation())
+    return first_section("Today", state, sentences, _what_to_do(standing), words)
+
+
+def first_section(title: str, state: Html, sentences: Iterable[str], steps: Sequence[str], words: str) -> Section:
+    """What an owner reads first: the state, what is known, what to do, and what the words mean."""
+    parts = [state, bullets(sentences)]
+    parts += [element("h3", "What to do"), bullets(steps)] if steps else []
+    return section("today", title, *parts, element("h3", "What the words mean"), paragraphs(words))
+
+
+def banner(state: str, written: str, headline: str, *sentences: str) -> Html:
+    """A state as a symbol, a line and some sentences in its colour, and the time when the page was written."""
+    as_of = (
+        f"As of {written}, when this page was written. A page that is older than it should be says nothing of today."
+    )
+    lines = [element("p", headline, class_="headline"), *(element("p", text) for text in sentences)]
+    words = element("div", joined([*lines, element("p", as_of, class_="soft")]))
+    return element("div", symbol(state), words, class_=f"state {state.replace(' ', '-')}")
+
+
+def symbol(state: str) -> Html:
+    """A state as a drawing within a circle, in the colour that stands around it."""
+    path = element("path", d=SYMBOLS[state])
+    return element("svg", element("circle", cx=12, cy=12, r=11), path, viewBox="0 0 24 24", aria_hidden="true")
+
+
+def _newest(standing: Standing) -> list[str]:
+    if not standing.has_records:
+        return []
+    text = f"The newest record is of {moment(standing.last)}; one usually comes every {standing.step_text}."
+    newest = standing.evaluations.iloc[-1] if len(standing.evaluations) else None
+    if newest is not None and newest["index"] == newest["index"]:
+        text += f" Its damage index is {significant(newest['index'], 3)}; an event begins above "
+        text += f"{significant(newest['threshold'], 3)}."
+    return [text, standing.recent()]
+
+
+def _open_events(standing: Standing) -> list[str]:
+    sentences = [] if len(standing.opened("damage")) else ["No damage event is open."]
+    for number, event in standing.events[standing.events["end"].isna()].iterrows():
+        text = f"Event {number} ({event['kind']}) has been open since {moment(event['start'])}"
+        sentences.append(text + (f"; modes that drive it: {event['modes']}." if event["modes"] else "."))
+    waiting = _waiting(standing)
+    if len(waiting) == 1:
+        sentences.append(f"Event {waiting[0]} has ended, and nobody has said yet what it was.")
+    elif waiting:
+        shown = listed(waiting) if len(waiting) <= MOST_NAMED else f"{waiting[0]} to {waiting[-1]}"
+        number = counted(len(waiting), "event")
+        sentences.append(f"{number}: {shown} have ended, and nobody has said yet what they were.")
+    return sentences
+
+
+def _waiting(standing: Standing) -> list[int]:
+    """Numbers of events that have ended and were not acknowledged."""
+    events = standing.events
+    return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
+
+
+def _what_to_do(standing: Standing) -> list[str]:
+    steps = []
+    if standing.state == ATTENTION:
+        steps.append("Ask an engineer to look at the parts that have lost stiffness.")
+    if standing.state == ALARM:
+        steps.append(
+            "Ask an engineer to look at the structure, beginning with what the modes named above depend on, and at the "
+            "raw records: works on the structure, unusual loads or ice may be the cause too."
+        )
+    if len(standing.opened("measurement or structure")):
+        steps.append(
+            "Find out whether the sensors or the structure have changed where a response was set aside. If it is the "
+            "sensors, acknowledge the event as harmless: the other responses are evaluated from then on."
+        )
+    if standing.is_silent or standing.is_ahead or standing.error or not standing.has_records:
+        steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")
+    elif standing.state == NOT_EVALUATED:
+        steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")
+    if len(standing.failed):
+        steps.append("Have the failed sensors repaired; the section on sensors lists them.")
+    if _waiting(standing) or len(standing.events[standing.events["end"].isna()]):
+        steps.append("When it is known what an event was, acknowledge it, so that the monitor can learn from it.")
+    return steps
+
+
+def events(standing: Standing) -> Section:
+    """All events, the newest first."""
+    known = standing.events
+    if not len(known):
+        text = "There has been no event." if standing.has_records else "No record has come yet, and so no event."
+        return section("events", "Events", paragraphs(text))
+    counts = known["kind"].value_counts()
+    damage = int(counts.get("damage", 0))
+    text = f"There {'has' if damage == 1 else 'have'} been {counted(damage, 'damage event')} so far"
+    others = [f"{counts[kind]:,} {what}" for kind, what in KINDS.items() if counts.get(kind)]
+    text = "; and ".join([text, *others]) + "."
+    rest = len(known) - MOST_LISTED
+    older = f"The table lists the newest {MOST_LISTED}; {rest:,} older ones are in the monitor." if rest > 0 else ""
+    columns = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
+    rows = [_cells(standing, number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
+    caption = "Events, the newest first, with the modes that drive each, the worst first, and its number of records."
+    return section("events", "Events", paragraphs(text, older), table(caption, columns, rows, is_cards=True))
+
+
+def _cells(standing: Standing, number: object, event: pd.Series) -> list[object]:
+    note = "; ".join(filter(None, [event["note"], _failing(standing, event)]))
+    said = "yes, harmless" if event["harmless"] else "yes, not harmless" if event["acknowledged"] else "not yet"
+    return [
+        f"{number}",
+        event["kind"],
+        moment(event["start"], is_short=True),
+        moment(event["end"], is_short=True) or element("strong", "still open"),
+        f"{significant(event['peak'], 3)} on {moment(event['peak_time'], is_short=True)}",
+        event["modes"] or "none named",
+        f"{event['n_alarms']:,}",
+        said,
+        element("span", note, class_="text") if note else "",
+    ]
+
+
+def _failing(standing: Standing, event: pd.Series) -> str:
+    """Sensors that failed in the time of an event, before the monitor had noticed."""
+    faults = standing.monitor.faults_
+    end = standing.last if pd.isna(event["end"]) else event["end"]
+    names = {
+        str(fault["column"])
+        for _, fault in faults.iterrows()
+        if fault["since"] <= end and event["start"] < fault["detected"] + ONE_DAY
+    }
+    return f"{listed(sorted(names))} failed at that time" if names else ""
 
 
 def _index(standing: Standing, is_small: bool) -> Section:
@@ -52,21 +230,143 @@ def _index(standing: Standing, is_small: bool) -> Section:
     title = "Damage index"
     if not standing.has_records:
         return section("index", title, paragraphs("No record has come since the baseline."))
+    below = "below the dashed line are as the healthy structure; an event begins above it"
+    unknown = "nothing is known of them"
     if is_small:
         caption = (
             "Highest damage index of each day in the year up to the newest record, of "
-            f"{moment(standing.last)}. Dots below the dashed line are as the healthy structure; an event begins above "
-            "it, and is shaded. Ticks at the bottom are days without an evaluated record: nothing is known of them."
+            f"{moment(standing.last)}. Dots {below}, and is shaded. Ticks at the bottom are days without an evaluated "
+            f"record: {unknown}."
         )
         return section("index", title, element("figure", chart_year(standing), element("figcaption", caption)))
     text = (
-        f"The drawings end with the newest record, of {moment(standing.last)}. Points below the dashed line are as the "
-        "healthy structure; an event begins above it. Grey ticks at the bottom are records or days that were not "
-        "evaluated, days without any record among them: nothing is known of them."
+        f"The drawings end with the newest record, of {moment(standing.last)}. Points {below}. Grey ticks at the "
+        f"bottom are records or days that were not evaluated, days without any record among them: {unknown}."
     )
     drawn = [draw_month(standing)] if len(standing.evaluations) else []
     caption = "Damage index: of each record in the last month; the highest and the median of each day in longer times."
     return section("index", title, paragraphs(text), figure(caption, drawn + draw_days(standing)))
+
+
+def drift_sentences(standing: Standing) -> list[str]:
+    """Change of each group that is beyond its error, its rate, and when it reaches a limit."""
+    found = standing.monitor.drift_
+    if found is None:
+        return ["Slow drift is not followed: that needs a model of the structure."]
+    certain = found[found["significant"].astype(bool)]
+    if not len(certain):
+        return ["No drift beyond its error."]
+    sentences = []
+    for name, row in certain.iterrows():
+        change, rate = float(row["change"]), float(row["per_year"])
+        verb, speed = "lost" if change < 0 else "gained", "loses" if rate < 0 else "gains"
+        text = f"{name} has {verb} {_size(change, row['standard_error'])} of its stiffness since the baseline"
+        if np.isfinite(rate):
+            text += f", and {speed} {_size(rate, row['per_year_error'])} a year"
+        sentences.append(f"{text}. {_reached(row, standing) if np.isfinite(rate) else ''}".rstrip())
+    return sentences
+
+
+def _size(value: float, error: float) -> str:
+    """A size in percent with two standard errors."""
+    return f"{100 * abs(value):.1f}{SPACE}% (±{SPACE}{percent(N_ERRORS * error, '.1f')})"
+
+
+def _reached(row: pd.Series, standing: Standing) -> str:
+    """When a loss of so much is reached at this rate; what lies beyond a lifetime is not predicted."""
+    left = standing.limit + float(row["change"])
+    rate, error = -float(row["per_year"]), N_ERRORS * float(row["per_year_error"])
+    loss = f"loss of {percent(standing.limit)}"
+    if left <= 0:
+        return f"A {loss} has been reached."
+    if rate <= 0:
+        return ""
+    if left / rate > FARTHEST:
+        return f"At this rate, it takes more than {FARTHEST:.0f} years until a {loss}."
+    ends = ""
+    if np.isfinite(error):
+        soonest, latest = left / (rate + error), left / (rate - error) if rate > error else np.inf
+        years = [f"{standing.last + span * YEAR:%Y}" for span in (soonest, latest) if span <= FARTHEST]
+        ends = f" (between {years[0]} and {years[1]})" if len(years) > 1 else f" ({years[0]} at the earliest)"
+    return f"A {loss} is reached in about {standing.last + left / rate * YEAR:%Y} at this rate{ends}."
+
+
+def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
+    """Drift by group: in words, perhaps as a drawing, and in numbers."""
+    found = standing.monitor.drift_
+    parts = [bullets(drift_sentences(standing))]
+    if found is not None:
+        meaning = (
+            "Structures age: parts lose stiffness slowly. The monitor follows this with the model of the structure, "
+            "and takes it out before it evaluates, so that slow ageing raises no false alarm. Errors are two standard "
+            "errors. A drift counts as certain only where it is well beyond its error."
+        )
+        drawn = draw_drift(standing) if is_drawn else None
+        caption = "Change of the stiffness of each group since the baseline, with two standard errors at its end."
+        rows = [
+            [
+                name,
+                _signed(row["change"], row["standard_error"]),
+                _signed(row["per_year"], row["per_year_error"]),
+                "yes" if row["significant"] else "no",
+            ]
+            for name, row in found.iterrows()
+        ]
+        columns = ["Group", "Change so far", "Change a year", "Beyond its error"]
+        parts += [paragraphs(meaning), figure(caption, [] if drawn is None else [drawn])]
+        parts.append(table("Change of stiffness by group, ± two standard errors.", columns, rows))
+    return section("drift", "Slow change of the structure", *parts, link="Slow change")
+
+
+def _signed(value: float, error: float) -> str:
+    if not np.isfinite(value):
+        return "not known"
+    return f"{100 * value:+.2f}{SPACE}% ±{SPACE}{significant(100 * N_ERRORS * error)}{SPACE}%"
+
+
+def sensor_sentences(standing: Standing) -> list[str]:
+    """What does not work at present."""
+    if not standing.monitor.sensors:
+        return ["Sensors are not watched."]
+    if not len(standing.failed):
+        return ["All sensors work." if standing.has_records else "No sensor has been seen to fail."]
+    targets = set(standing.monitor.targets_)
+    return [
+        f"{'Mode' if fault['column'] in targets else 'Thermometer'} {fault['column']}: "
+        f"{FAULTS.get(fault['kind'], fault['kind'])}, since {moment(fault['since'])}"
+        + (f" ({fault['detail']})." if fault["detail"] else ".")
+        for _, fault in standing.failed.iterrows()
+    ]
+
+
+def sensors(standing: Standing) -> Section:
+    """Faults that last, and those that are over."""
+    known = standing.monitor.faults_
+    parts = [bullets(sensor_sentences(standing))]
+    if standing.monitor.sensors:
+        meaning = (
+            "Each thermometer is compared with what the others, and references, tell of it, and each response with the "
+            "others and the weather. The monitor goes on without a thermometer that fails. A change that could be "
+            "damage is never put down to a sensor: a response that moves alone by more than damage explains is set "
+            "aside, and the structure is not called healthy until somebody has looked at it."
+        )
+        parts.append(paragraphs(meaning))
+    if len(known):
+        columns = ["Sensor", "What", "Since", "Noticed", "Until", "Detail"]
+        names = listed(sorted({str(name) for name in known["column"]}))
+        rows = [
+            [
+                str(fault["column"]),
+                FAULTS.get(fault["kind"], fault["kind"]),
+                moment(fault["since"], is_short=True),
+                moment(fault["detected"], is_short=True),
+                moment(fault["until"], is_short=True) or "it lasts",
+                fault["detail"],
+            ]
+            for _, fault in known.iloc[::-1].iterrows()
+        ]
+        parts.append(table(f"Faults of sensors, the newest first: {names}.", columns, rows, is_cards=True))
+    return section("sensors", "Sensors", *parts)
 
 
 def not_evaluated(standing: Standing) -> Section:
@@ -87,10 +387,8 @@ def not_evaluated(standing: Standing) -> Section:
     without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
     is_unknown = evaluated["state"] == NOT_EVALUATED
     since = f"since {moment(evaluated.index[0])}" if len(evaluated) else ""
-    forgotten = unknown - int(is_unknown.sum()) - int(counts.get("n_too_late", 0))
-    older = (
-        f"Why {forgotten:,} of them, which are older, were not evaluated is no longer kept." if forgotten > 0 else ""
-    )
+    forgotten = unknown - int(is_unknown.sum()) - sum(int(counts.get(name, 0)) for name in ("n_too_late", "n_ahead"))
+    older = f"Why {forgotten:,} older ones of them were not evaluated is no longer kept." if forgotten > 0 else ""
     parts = [paragraphs(text, older, without)]
     caption = f"Why records were not evaluated: those that are kept, {since}."
     parts.append(_reasons(caption, evaluated.loc[is_unknown, "reason"].replace("", "no reason given")))
@@ -117,13 +415,50 @@ def _reasons(caption: str, reasons: pd.Series) -> Html:
     return table(caption, ["Reason", "Records"], rows) if rows else Html()
 
 
+def false_alarms(standing: Standing) -> Section:
+    """How many false alarms were asked for and are expected, and how many events there were."""
+    monitor, estimate = standing.monitor, standing.monitor.false_alarm_estimate_
+    asked = counted_number(monitor.false_alarms_per_year, "false alarm")
+    expected, years = estimate.expected, standing.years
+    damage = standing.events[standing.events["kind"] == "damage"]
+    sentences = [
+        f"The monitor is set so that a structure that stays healthy gives {asked} a year on average: an alarm without "
+        "damage. Fewer would be bought with damage that is found later, or not at all.",
+        f"Expected are {significant(expected, 2)} a year; in a single year there may be {estimate.lowest:,} to "
+        f"{estimate.highest:,} by chance.",
+    ]
+    if standing.has_records:
+        number, harmless = len(damage), int(damage["harmless"].astype(bool).sum())
+        time = f"{significant(years, 2)} years" if years >= 1 else counted(round(365.25 * years) + 1, "day")
+        seen = f"In {time} of service there {'was' if number == 1 else 'were'} {counted(number, 'damage event')}"
+        seen += f", {harmless:,} of them said to be harmless" if number else ""
+        by_chance = significant(expected * years, 2)
+        sentences.append(f"{seen}. About {by_chance} false alarms were to be expected in this time.")
+    if unseen := getattr(estimate, "unseen", ""):
+        sentences.append(f"Nothing is known of {unseen}: the baseline has no records of that time of year.")
+    sentences.append("This says nothing of damage that is missed: a study of detectability answers that.")
+    rows = [
+        ["Threshold, above which an event begins", significant(monitor.threshold_, 4)],
+        ["Level at or below which the index stays before it ends", significant(monitor.clear_threshold_, 4)],
+        ["Time for which it stays there", duration_text(pd.Timedelta(estimate.rule.hold))],
+        ["Years of baseline behind it", significant(estimate.n_years, 2)],
+        ["How the threshold was found", element("span", estimate.method, class_="text")],
+        ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
+    ]
+    rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
+    return section("promise", "False alarms", paragraphs(*sentences), rule)
+
+
 def _settings(monitor: Monitor) -> Section:
     """Parameters of the monitor, of its detector and of the model."""
     detector = monitor.detector_
     parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
     rows = parameters({"monitor": monitor, **parts, "model": monitor.fem}, but=("monitor: detector", "monitor: fem"))
-    targets = [str(name) for name in monitor.targets_]
-    others = [str(name) for name in monitor.baseline_.columns if name not in set(monitor.targets_)]
-    rows += [["natural frequencies", element("code", ", ".join(targets))]]
-    rows += [["temperatures", element("code", ", ".join(others) or "none")]]
+    units = monitor.units_
+    is_target = {name: name in set(monitor.targets_) for name in monitor.baseline_.columns}
+    for title, wanted in (("responses", True), ("temperatures", False)):
+        names = [
+            f"{name} ({units[name]})" if units.get(name) else f"{name}" for name in units if is_target[name] == wanted
+        ]
+        rows += [[title, element("code", ", ".join(names) or "none")]]
     return settings("For the engineer who looks after this monitor.", "Settings of the monitor and its parts.", rows)

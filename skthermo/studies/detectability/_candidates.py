@@ -26,11 +26,11 @@ class SeenColumns:
     positions: Any
     is_frame: bool
 
-    def table(self, T: Table, F: Array) -> Any:
+    def table(self, T: Table, F: Array) -> Table:
         """Temperatures and frequencies of all modes as the detector sees them."""
         return self._seen(np.hstack([as_floats(T), F]), T)
 
-    def reference(self, records: Table, T: Table, name: str) -> Any:
+    def reference(self, records: Table, T: Table, name: str) -> Table:
         """Measured records of a scenario as the detector sees them, with temperatures T where they lack their own."""
         known = self._positions_of(records, f"the reference of scenario {name!r}")
         values = np.full((len(records), len(self.names)), np.nan)
@@ -46,7 +46,7 @@ class SeenColumns:
             values[:, : self.n_sensors] = as_floats(T)
         return self._seen(values, records if isinstance(records, pd.DataFrame) or len(values) != len(T) else T)
 
-    def _seen(self, values: Array, rows: Table) -> Any:
+    def _seen(self, values: Array, rows: Table) -> Table:
         """The detector's columns of all of the chain's, on the index of some rows."""
         if not self.is_frame:
             return values[:, self.positions]
@@ -73,7 +73,7 @@ class SeenColumns:
         return np.arange(n_all - n_columns, n_all)
 
 
-def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Any]:
+def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Table]:
     """The detector's view, and the records that it learns from: by default those that the chain has learned from.
 
     Only a detector with a part that has ``targets`` sees temperatures.
@@ -133,7 +133,7 @@ class Arrangement:
             counts.setdefault(family, []).append((abs(severity), int((decisions < 0).sum()), evaluated))
         return {family: _a90(*np.transpose(rows)) for family, rows in counts.items()}
 
-    def _seen(self, table: pd.DataFrame) -> Any:
+    def _seen(self, table: pd.DataFrame) -> Table:
         seen = table[list(self.columns)]
         return seen if self.is_frame else seen.to_numpy()
 

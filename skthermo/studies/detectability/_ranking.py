@@ -107,25 +107,19 @@ def rank(
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
     if not any(one.has_noise() for one in contenders.values()):
         margin = [np.nan] * len(names)
-    table["pod_deficit_ci_low"], table["pod_deficit_ci_high"] = (
-        table["pod_deficit"] - margin,
-        table["pod_deficit"] + margin,
-    )
+    table["pod_deficit_ci_low"] = table["pod_deficit"] - margin
+    table["pod_deficit_ci_high"] = table["pod_deficit"] + margin
     table["significantly_worse"] = table["pod_deficit_ci_low"] > 0
-    first = ["false_alarms", "false_alarms_ci_low", "false_alarms_ci_high", "within_limit"]
-    first += [
-        "pod",
-        "pod_ci_low",
-        "pod_ci_high",
-        "pod_at_equal_pfa",
-        "pod_deficit",
-        "pod_deficit_ci_low",
-        "pod_deficit_ci_high",
-    ]
-    first += ["significantly_worse", "auc", "time_to_detection", "not_evaluated"]
+    first = [*with_bounds("false_alarms"), "within_limit", *with_bounds("pod"), "pod_at_equal_pfa"]
+    first += [*with_bounds("pod_deficit"), "significantly_worse", "auc", "time_to_detection", "not_evaluated"]
     table = table[[*first, *(name for name in table if name not in first)]].assign(error="")
     failed = {"within_limit": False, "significantly_worse": False, "error": list(errors.values())}
     return pd.concat([table, pd.DataFrame(failed, index=list(errors))]).rename_axis("detector") if errors else table
+
+
+def with_bounds(name: str, before: str = "_") -> list[str]:
+    """Columns of a rate and its bounds."""
+    return [name, f"{name}{before}ci_low", f"{name}{before}ci_high"]
 
 
 def _contender(name: str, records: Sequence[EvaluatedRecords], calibration: Array | None) -> Contender:
@@ -140,9 +134,9 @@ def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:
     waits = rows.loc[rows["measure"] == "POD", "time_to_detection"].tolist()
     is_known = len({type(wait) for wait in waits}) == 1 and not any(pd.isna(wait) for wait in waits)
     return {
-        **dict(zip(["false_alarms", "false_alarms_ci_low", "false_alarms_ci_high"], means.loc["PFA"], strict=True)),
+        **dict(zip(with_bounds("false_alarms"), means.loc["PFA"], strict=True)),
         "within_limit": bool(means.loc["PFA", "ci_low"] <= limit),
-        **dict(zip(["pod", "pod_ci_low", "pod_ci_high"], means.loc["POD"], strict=True)),
+        **dict(zip(with_bounds("pod"), means.loc["POD"], strict=True)),
         "time_to_detection": pd.Series(waits).mean() if is_known else np.nan,
         "not_evaluated": rows["n_not_evaluated"].sum() / (rows["n_not_evaluated"] + rows["n_records"]).sum(),
     }
@@ -153,7 +147,7 @@ def _by_family(name: str, rows: pd.DataFrame, families: Mapping[Any, Any]) -> di
     found = {}
     for family, some in rows[(rows["measure"] == "POD") & rows["family"].notna()].groupby("family", sort=False):
         rates = some[["rate", "ci_low", "ci_high"]].mean()
-        found |= dict(zip([f"pod {family}", f"pod {family} ci_low", f"pod {family} ci_high"], rates, strict=True))
+        found |= dict(zip(with_bounds(f"pod {family}", " "), rates, strict=True))
         try:
             found[f"mdd {family}"] = families[name, family].on_grid(LEVEL)[0]
         except (KeyError, ValueError):  # no severity, or one twice, or of both signs

@@ -187,7 +187,7 @@ class Records:
         damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
         return replace(self, values=np.where(damaged, self.values, self.healthy))
 
-    def seen_by(self, candidate: Candidate) -> Any:
+    def seen_by(self, candidate: Candidate) -> Table:
         """The columns that a detector sees."""
         if self.source == SIMULATED:
             return candidate.view.table(self.T, self.values)
@@ -207,7 +207,7 @@ class Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
-    def of(self, fem: FittedChain, T: Table, seed: int) -> tuple[Array, Any]:
+    def of(self, fem: FittedChain, T: Table, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
         weather = fem.weather(T)
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
@@ -231,7 +231,7 @@ class Simulation:
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
     def first_repeat(
-        self, measured: Mapping[str, Any], seeds: Sequence[int], errors: Mapping[str, Exception]
+        self, measured: Mapping[str, Table], seeds: Sequence[int], errors: Mapping[str, Exception]
     ) -> Evaluation:
         """Evaluate the records of the first repeat and measured ones.
 
@@ -256,7 +256,7 @@ class Simulation:
         with without_warnings(), single_blas_thread():
             return self._calibrated(self.evaluate(self.records(self.scenarios, number, seeds), {}), number, seeds)
 
-    def _measured(self, measured: Mapping[str, Any]) -> Iterator[Records]:
+    def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:
         for scenario in self.scenarios:
             if scenario.name in measured:
                 values = measured[scenario.name]

@@ -210,7 +210,7 @@ class DetectionTask(Bunch):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
 
-    def refit(self, detector: BaseEstimator) -> Any:
+    def refit(self, detector: BaseEstimator) -> BaseEstimator:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
         Parameters

@@ -76,7 +76,7 @@ class CampaignSimulator:
             return measured
         return np.hstack([measured, self.fem.thermal_.simulated(self.fem.weather(T), self.modes, **changes)])
 
-    def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Any]:
+    def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Table]:
         """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
         measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
         further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
@@ -358,7 +358,7 @@ def _with_sensors(
     return trials
 
 
-def _beside(T: Table, name: Hashable, values: Array) -> Any:
+def _beside(T: Table, name: Hashable, values: Array) -> Table:
     if isinstance(T, pd.DataFrame):
         if name in T.columns:
             raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")

@@ -61,7 +61,7 @@ BLOCK = 7  # days that stay together
 SEASON = 15  # days by which a block may be earlier or later in the year
 
 
-def resampled_days(T: Table, random: np.random.RandomState) -> Any:
+def resampled_days(T: Table, random: np.random.RandomState) -> Table:
     """The temperatures of other days of the same season for each row, whole weeks together, at the same time of day.
 
     Rows keep their stamps, so that onsets of damage and waits keep their meaning. Rows without stamps count as a year.
@@ -105,7 +105,7 @@ def other_years(T: Sequence[Table]) -> list[FEModel]:
     return [first, *(_on_stamps_of(first, one, number) for number, one in enumerate(T[1:], start=1))]
 
 
-def _on_stamps_of(first: Any, other: Any, number: int) -> Any:
+def _on_stamps_of(first: Table, other: Table, number: int) -> Table:
     """Another year of weather on the stamps of the first."""
     if np.ndim(other) != 2 or not len(other) or np.isnan(as_floats(other)).all():
         raise ValueError(f"year {number} of T is {other!r:.200}; expected a table of temperatures, as the first")
@@ -178,7 +178,7 @@ class Replicates:
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
-    def replicate(self, number: int) -> Iterator[tuple[str, Any, Any]]:
+    def replicate(self, number: int) -> Iterator[tuple[str, FittedChain, Table]]:
         """One part after the other, with a chain and temperatures in which it and those before vary.
 
         Other training records are those that the chain's structure could have given as well in the same weather.

@@ -121,7 +121,7 @@ def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
         )
 
 
-def mapping_of(values: ArrayLike, what: str, expected: str) -> Mapping[str, Any]:
+def mapping_of(values: object, what: str, expected: str) -> Mapping[str, Any]:
     """A mapping, or a Series with names as one; None becomes an empty one."""
     mapping = {} if values is None else as_mapping(values)
     if not isinstance(mapping, Mapping):
@@ -239,7 +239,7 @@ def read_scenarios(given: Table, model: FEModel) -> list[BaseScenario]:
     return scenarios
 
 
-def _as_scenario(given: Table) -> Any:
+def _as_scenario(given: BaseScenario | Mapping[str, float]) -> BaseScenario:
     """A scenario of a mapping of groups to severities, with a name such as "soil 18 %, piers 5 %"; others as they are.
 
     An empty mapping is the healthy structure.
@@ -252,7 +252,7 @@ def _as_scenario(given: Table) -> Any:
     return Scenario(name or "healthy", damage)
 
 
-def _short(value: ArrayLike) -> str:
+def _short(value: object) -> str:
     shape = getattr(value, "shape", None)
     return repr(value) if shape is None else f"<{'x'.join(map(str, shape))} matrix>"
 

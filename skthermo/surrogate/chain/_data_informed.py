@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from numbers import Integral, Real
@@ -56,10 +54,10 @@ from skthermo._validation import (
     seeded,
     validate_data,
 )
-from skthermo.exceptions import ResultWarning, UnevaluatedRowsWarning
+from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import BiasAligner, check_records
+from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._memory import remembered
@@ -751,7 +749,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self.recorder_.residuals
 
     @property
-    def training_records_(self) -> tuple[Any, Any]:
+    def training_records_(self) -> tuple[Table, Table]:
         """Temperatures and frequencies that `fit` was given."""
         check_is_fitted(self)
         return self.records_.temperatures, self.records_.frequencies
@@ -834,7 +832,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     def set_params(self, **params: Any) -> Self:
         super().set_params(**params)
-        warn_of_inert(self.inverse, self.model, params)
+        if self.inverse is not None:
+            ChainInverse(self.inverse).warn_of_inert(self.model, params)
         return self
 
     def _part(self, name: str) -> Any:
@@ -851,26 +850,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         for part in (aligner, *aligner.get_params().values()):
             if isinstance(part, BiasAligner) and part.reference is None:
                 part.set_params(reference=self.model)
-        names = list(self.model.parameter_names)
-        for part in ChainInverse(inverse).surrogates:
-            if part.model is None:
-                part.set_params(model=self.model)
-            if part.memory is None:
-                part.set_params(memory=self.memory)
-            if list(part.model.parameter_names) != names:
-                raise ValueError(
-                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
-                    f"{self.model!r} has"
-                )
-            if is_auto(part.reduce) and (not self.reduce or hasattr(part.model, "reduced")):
-                part.set_params(reduce=self.reduce)
+        ChainInverse(inverse).prepare(self.model, self.memory, self.reduce)
         random_state = seeded(self.random_state)
         for part in (inverse, mapper, aligner, imputer):
             if part is not None:
                 seed_parts(part, random_state)
         return inverse, mapper, aligner, imputer
 
-    def _read_records(self, X: Table, y: Any) -> tuple[Any, Any]:
+    def _read_records(self, X: Table, y: Any) -> tuple[Table, Table]:
         """Copies of temperatures and frequencies, checked; frames stay frames."""
         check_model(self.model)
         if y is None:
@@ -887,11 +874,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_columns(T, "temperature", varying=True)
         return T, F
 
-    def _findings(self, T: Table, F: Table) -> Any:
+    def _findings(self, T: Table, F: Table) -> RecordFindings:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
 
-    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Any:
+    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Table:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
@@ -921,23 +908,3 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
-
-
-def warn_of_inert(inverse: Any, model: FEModel, names: Iterable[str]) -> None:
-    """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
-    frame = sys._getframe(2)
-    while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
-        frame = frame.f_back  # past the estimators around the chain
-    if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
-        return
-    parts = {"inverse": inverse} | {f"inverse__{name}": part for name, part in inverse.get_params().items()}
-    for name, part in parts.items():
-        searched = [one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)]
-        if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
-            warn_user(
-                f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
-                "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
-                "search over the InverseSurrogate itself, whose score is that of its regressor",
-                ResultWarning,
-                "inert settings searched",
-            )

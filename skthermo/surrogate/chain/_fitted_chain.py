@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import Table
 from skthermo.fem import FEModel
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
@@ -43,15 +45,15 @@ class FittedChain(Protocol):
     n_features_in_: int
     mode_names_: list[Any]
     parameter_names_: list[str]
-    inverse_: Any
-    mapper_: Any
-    aligner_: Any
+    inverse_: BaseEstimator
+    mapper_: BaseEstimator
+    aligner_: BaseEstimator
     discrepancy_: Discrepancy
     simulator_: Simulator
     sensors_: SensorRegression
     training_range_: TrainingRange
     box_: Box | None
-    parameters_: Any
+    parameters_: Table
     noise_: Array
     thermal_: ThermalModel
     recorder_: RecordSimulator
@@ -59,72 +61,46 @@ class FittedChain(Protocol):
     report_: Any
 
     @property
-    def training_records_(self) -> tuple[Any, Any]:
+    def training_records_(self) -> tuple[Table, Table]:
         """Temperatures and frequencies that ``fit`` was given."""
 
     def residuals(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records by weather.
-
-        Returns
-        -------
-        BaselineResiduals
-            Relative.
-        """
+        """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
 
     def weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled.
+        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        Weather
-            As ``thermal_``, ``recorder_`` and residuals take them.
         """
 
-    def predict(self, X: ArrayLike) -> Any:
-        """Frequencies of the healthy structure.
+    def predict(self, X: ArrayLike) -> Table:
+        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz.
         """
 
-    def predict_parameters(self, X: ArrayLike) -> Any:
-        """Parameters of the FE model.
+    def predict_parameters(self, X: ArrayLike) -> Table:
+        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters.
         """
 
-    def simulate(self, X: ArrayLike, **options: Any) -> Any:
-        """Frequencies of the structure, healthy or damaged, as monitoring would record them.
+    def simulate(self, X: ArrayLike, **options: Any) -> Table:
+        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
             Temperatures in degrees Celsius.
         **options : dict
-            Damage, noise, gaps and outliers, as `DataInformedFEM.simulate` takes them.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            In Hz.
+            Damage, noise, gaps and outliers.
         """

@@ -1,21 +1,24 @@
 """The inverse of a chain, which may be a pipeline or hold several, and what it finds for each record."""
 
+import re
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
+from skthermo._estimators.arguments import Reduce, is_auto
 from skthermo._estimators.regressors import inputs_of_last_step
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import Table, column_names, frame_like
 from skthermo._validation import last_step
-from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
-from skthermo.fem import shape_components
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, ResultWarning, SkthermoWarning
+from skthermo.fem import FEModel, shape_components
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.surrogate.refinement import ShapeInputs, unconverged
 
@@ -58,6 +61,22 @@ class ChainInverse:
         part = next((part for part in self.surrogates if part.dofs is not None), None)
         return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
 
+    def prepare(self, model: FEModel, memory: str | Memory | None, reduce: Reduce) -> None:
+        """Give every surrogate inside what it has not: the chain's model, memory and choice of a reduced model."""
+        names = list(model.parameter_names)
+        for part in self.surrogates:
+            if part.model is None:
+                part.set_params(model=model)
+            if part.memory is None:
+                part.set_params(memory=memory)
+            if list(part.model.parameter_names) != names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                    f"{model!r} has"
+                )
+            if is_auto(part.reduce) and (not reduce or hasattr(part.model, "reduced")):
+                part.set_params(reduce=reduce)
+
     def estimates(self, aligned: Table, parameter_names: list[str]) -> Estimates:
         """What the fitted inverse finds for aligned records, with warnings where they determine little."""
         last = self.refining
@@ -79,7 +98,7 @@ class ChainInverse:
             )
         return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
 
-    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Any:
+    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Table:
         """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
         inputs = self.shape_inputs
         if inputs is None:
@@ -135,3 +154,25 @@ class ChainInverse:
                 "with the signs and gains of the model's axes, or a shape_noise that covers the model's error",
                 "shapes unlike the model's",
             )
+
+    def warn_of_inert(self, model: FEModel, names: Iterable[str]) -> None:
+        """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
+        frame = sys._getframe(2)
+        while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
+            frame = frame.f_back  # past the estimators around the chain
+        if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
+            return
+        params = self.estimator.get_params().items()
+        parts = {"inverse": self.estimator} | {f"inverse__{name}": part for name, part in params}
+        for name, part in parts.items():
+            searched = [
+                one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)
+            ]
+            if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
+                warn_user(
+                    f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
+                    "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
+                    "search over the InverseSurrogate itself, whose score is that of its regressor",
+                    ResultWarning,
+                    "inert settings searched",
+                )

@@ -56,7 +56,7 @@ class TrainingRecords(SavesFrames):
     """
 
     temperatures: Table
-    frequencies: Any
+    frequencies: Table
     inputs: Array
     targets: Array
     learned: Array
@@ -188,7 +188,7 @@ def check_frequencies(F: Table, model: FEModel) -> None:
     check_columns(F, "frequency")
 
 
-def without_outliers(findings: RecordFindings, F: Table) -> Any:
+def without_outliers(findings: RecordFindings, F: Table) -> Table:
     """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
     far = findings.outliers
     if isinstance(F, pd.DataFrame) and far.index.is_unique:

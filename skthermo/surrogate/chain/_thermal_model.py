@@ -185,7 +185,7 @@ class Weather:
         return len(self.filled)
 
     @cached_property
-    def columns(self) -> Any:
+    def columns(self) -> Table:
         """Inputs of the last step of M2, a frame as a frame."""
         return inputs_of_last_step(self.mapper, self.filled)
 
