@@ -100,8 +100,8 @@ class Discoveries:
             f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
             if n_open
             else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
-            f"If all bridges stay healthy, expect {alarms} a year over all bridges, {false} of them significant; of the "
-            f"significant bridges {percent(self.fdr)} are healthy on average.",
+            f"If all bridges stay healthy, expect {alarms} a year over all bridges, {false} of them significant; "
+            f"of the significant bridges {percent(self.fdr)} are healthy on average.",
         ]
         if self.not_evaluated:
             lines.append(f"Not evaluated, and so not known to be healthy: {listed(self.not_evaluated)}.")
