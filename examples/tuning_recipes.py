@@ -14,7 +14,7 @@ PER_DAY = 8  # records
 LIMIT = 0.02  # of false alarms
 GRID = {
     "temperaturecompensator__estimator__lagfeatures__lags": [1, 4, 8],
-    "temperaturecompensator__scale": ["global", "local"],
+    "temperaturecompensator__whiten": ["global", "local"],
     "windowedalarm__window": ["3h", "24h"],
 }
 

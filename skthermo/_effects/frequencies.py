@@ -15,6 +15,7 @@ MOST_AXES = 6  # largest number of directions in which parameters vary with the 
 SMALLEST = 3e-4  # standard deviation of ln theta along a direction, below which it does not count
 MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
 STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
+ALL_GROUPS = "all groups"  # the name of an even change of all of them
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from skthermo._tables.frames import frame_like, warn_of_absurd, warn_of_markers
 from skthermo._tables.times import row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
+from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
 
 
@@ -87,6 +88,14 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     def _index(self, F: Any) -> Array:
         """Damage index of rows; higher is more damaged, NaN where there is none."""
 
+    def _own_index(self, F: Any) -> Array:
+        """Hook: damage index of the baseline as of any rows, beside which the threshold is checked; by default none."""
+        return np.empty(0)
+
+    def _seen_at(self, threshold: float) -> str:
+        """Hook: which shift has the threshold as its damage index, as text."""
+        return ""
+
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         """Why some rows have no damage index."""
         return "no column has a value there, or what the steps before need for it is missing"
@@ -124,7 +133,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         -----
         UserWarning
             If there are numbers that stand for a missing value, such as -999, implausible values far from the others,
-            or too few records for the rate of false alarms that is asked for.
+            or too few records for the rate of false alarms that is asked for; if the threshold is far above the
+            indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
@@ -132,9 +142,11 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
-        self.baseline_index_ = self._learn(self._records(X, F), row_times(X))
+        records = self._records(X, F)
+        self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
+        warn_of_blindness(self._own_index(records), self.threshold_, self.contamination, self._seen_at)
         return self
 
     @overload

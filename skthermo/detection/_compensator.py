@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal, overload
 
@@ -41,10 +42,12 @@ from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records
+from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
 from skthermo.residuals.spread import Spread
 from skthermo.residuals.weather import (
+    BEYOND,
     PredictionError,
     SensorRegression,
     TrainingRange,
@@ -74,13 +77,14 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         - ``"contiguous"``: five periods of time, each predicted from the others. An int gives that many.
         - A splitter, or pairs of training and test rows: every row must be in exactly one test fold, or all but the
           first rows, as with ``TimeSeriesSplit``: the residuals of those are NaN.
-    whiten : {None, "global", "local"}, default=None
-        What the residuals are divided by:
+    whiten : {"auto", "global", "local", None}, default="auto"
+        By which covariance residuals are whitened, so that they are in standard deviations and uncorrelated:
 
-        - ``None``: nothing; they are in Hz.
-        - ``"global"``: their covariance. They are then in standard deviations, and uncorrelated.
-        - ``"local"``: the covariance that they have in similar weather. Frost that makes residuals scatter then no
-          longer hides damage on warm days.
+        - ``"auto"``: the one in similar weather, so that frost that makes residuals scatter does not hide damage on
+          warm days. Where the baseline has no similar weather, it is no smaller than that of all weather.
+        - ``"global"``: that of all weather.
+        - ``"local"``: the one in the most similar weather, however different that is.
+        - ``None``: none; residuals are in Hz.
 
     Attributes
     ----------
@@ -94,8 +98,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and their
         standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
     spread_ : object
-        Covariance of the residuals, by weather if ``whiten="local"``. ``spread_.smoothing`` says over how many records
-        of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        Covariance of the residuals, by weather with "auto" and "local". ``spread_.smoothing`` says over how many
+        records of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
@@ -121,25 +125,33 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     are then too large, and hide damage. A warning says so where 10 % of a fold's records lie outside the weather of the
     others.
 
-    Scaling multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean: each
-    stays close to its own mode. "local" takes S from the records whose weather is most similar (in the principal
-    components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows. Of seven
-    pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are likeliest
-    given the others, records of the same day (at least 24 rows around each) left out, as they are where the baseline
-    itself is scaled. At most 5000 baseline records, evenly spaced in time, teach the covariances. A new record takes S
-    from the baseline record with the most similar weather; where a value is missing that no sensor tells, from all
-    records. Where its temperatures lie outside the baseline's by e ranges of their columns (on average over the
-    columns), "local" also divides by sqrt(1 + (e / 2)^2).
+    Whitening multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
+    each stays close to its own mode. "auto" and "local" take S from the records whose weather is most similar (in the
+    principal components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows.
+    Of seven pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are
+    likeliest given the others, records of the same day (at least 24 rows around each) left out, as they are where the
+    baseline itself is whitened. At most 5000 baseline records, evenly spaced in time, teach the covariances. A new
+    record takes S from the baseline record with the most similar weather; where a value is missing that no sensor
+    tells, from all records. With "auto", a record that is farther from its neighbours in weather than 98 % of the
+    baseline's are from theirs, or outside the baseline's range, takes a covariance that is no smaller than S and than
+    that of all records: wholly at twice that distance, or a quarter of the range outside, before in proportion.
+
+    In weather that is colder or warmer than the baseline's, predictions err by an amount that the baseline's own
+    residuals do not show. "auto" and "local" therefore fit the estimator two more times, without the coldest and
+    without the warmest fifth of the records, and compare the residuals of these with the others'. Where the column that
+    is farthest outside is e ranges below or above the baseline's, g log(1 + e^2) times the covariance of all records is
+    added, with the g that this end has shown. An assumed value of 9 has the weight of some records in it. What no fifth
+    of the baseline shows remains unknown, as the slope above freezing after a winter: `extrapolated` marks such rows.
 
     An estimator that states how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
     n_targets, n_targets) in Hz squared, such as `~skthermo.fleet.FleetMapper` or a ``DataInformedFEM`` with one, has
     residuals r with the covariance S + C: S, which the baseline's out-of-fold residuals teach once what C explains of
     them is taken away, is the scatter of the measurement, and C that of each row, diagonal where each target has a
-    clone of its own. Scaled residuals are divided by the root of S + C; residuals in Hz are shrunk towards their mean
-    by the root of S over that of S + C, so that a detector behind keeps its rate of false alarms. "local" then adds
-    nothing for temperatures beyond the baseline's. What is not known yet of a structure stays the same for a season:
-    alarms that it causes come in runs, and damage that is smaller than C cannot be seen there. Weather that a fleet has
-    seen (``reach_`` and ``from_fleet`` of the estimator) counts as known.
+    clone of its own. Whitened residuals are divided by the root of S + C; residuals in Hz are shrunk towards their mean
+    by the root of S over that of S + C, so that a detector behind keeps its rate of false alarms. Nothing is then added
+    for temperatures beyond the baseline's. What is not known yet of a structure stays the same for a season: alarms
+    that it causes come in runs, and damage that is smaller than C cannot be seen there. Weather that a fleet has seen
+    (``reach_`` and ``from_fleet`` of the estimator) counts as known.
 
     Missing values:
 
@@ -185,7 +197,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         "estimator": [HasMethods(["fit", "predict"])],
         "targets": ["array-like"],
         "cv": ["cv_object", StrOptions({"contiguous"})],
-        "whiten": [StrOptions({"global", "local"}), None],
+        "whiten": [StrOptions({"auto", "global", "local"}), None],
     }
 
     def __init__(
@@ -194,7 +206,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         *,
         targets: Sequence[Hashable],
         cv: int | BaseCrossValidator | Iterable | Literal["contiguous"] | None = None,
-        whiten: Literal["global", "local"] | None = None,
+        whiten: Literal["auto", "global", "local"] | None = "auto",
     ):
         self.estimator = estimator
         self.targets = targets
@@ -222,8 +234,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         ValueError
             If a target is not among the columns or is named twice; if the targets are all of the columns or none; if a
             target is NaN in every row, or in every row that the estimator can learn from; if the residuals that are to
-            be scaled have a singular covariance; if there are fewer rows than folds, or ``cv`` does not test every row
-            exactly once.
+            be whitened have a singular covariance; if there are fewer rows than folds, or ``cv`` does not test every
+            row exactly once.
 
         Warns
         -----
@@ -254,7 +266,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            In Hz, or dimensionless if scaled; each row predicted by a clone that was not fitted on its fold.
+            In Hz, or dimensionless if whitened; each row predicted by a clone that was not fitted on its fold.
         """
         temperatures, frequencies, findings = self._read_baseline(X)
         return frame_like(frequencies, self._learn(temperatures, frequencies, findings))
@@ -274,7 +286,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_targets)
-            Measured minus predicted, in Hz, or dimensionless if scaled. Too small for the rows of `fit`: use
+            Measured minus predicted, in Hz, or dimensionless if whitened. Too small for the rows of `fit`: use
             `fit_transform`.
 
         Raises
@@ -301,7 +313,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Mean log-likelihood of healthy records that `fit` has not seen, per value.
 
         The distribution is the normal one with the mean and the covariance of the baseline's out-of-fold residuals,
-        with ``whiten="local"`` the covariance in similar weather. It is wider where predictions are uncertain.
+        with "auto" and "local" the covariance in similar weather. It is wider where predictions are uncertain.
 
         Parameters
         ----------
@@ -343,6 +355,29 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
         return frame_like(temperatures, self.training_range_.excess(temperatures))
+
+    @overload
+    def extrapolated(self, X: pd.DataFrame) -> pd.Series: ...
+    @overload
+    def extrapolated(self, X: ArrayLike) -> NDArray[np.bool_]: ...
+    def extrapolated(self, X: ArrayLike) -> NDArray[np.bool_] | pd.Series:
+        """Which records are in weather that the baseline does not show, so that their predictions are extrapolated.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Temperatures and frequencies, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray or Series of bool, shape (n_samples,)
+            True where a temperature lies outside the baseline's by more than a twentieth of their range. An alarm there
+            may be damage, or a behaviour in such weather that nobody has seen yet.
+        """
+        check_is_fitted(self)
+        temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        far = (np.nan_to_num(self.training_range_.excess(temperatures)) > BEYOND).any(axis=1)
+        return pd.Series(far, X.index, name="extrapolated") if isinstance(X, pd.DataFrame) else far
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
         """Names of the targets.
@@ -439,13 +474,30 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
-        size, weather = np.fmax.reduce(np.abs(measured)), as_floats(filled)
-        local, widens, near = self.whiten == "local", not self.regression_.tells_errors, rows_near_in_time(filled)
-        self.spread_, white = Spread.of(weather, taught, size, told, local=local, widens=widens, near=near)
+        weather = as_floats(filled)
+        self.spread_ = Spread.of(taught, np.fmax.reduce(np.abs(measured)), told)
+        white = self.spread_.whiten(weather, taught, told)
+        if self.whiten != "global":
+            floor, near = self.whiten == "auto", rows_near_in_time(filled)
+            followed, white = self.spread_.followed(weather, taught, told, floor=floor, near=near)
+            self.spread_ = replace(followed, extrapolation=self._extrapolation(filled, frequencies))
         if not len(fills.rows):
             return white
         untaught = np.isnan(taught).all(axis=1)
         return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white)
+
+    def _extrapolation(self, temperatures: Any, frequencies: Any) -> Extrapolation | None:
+        """How predictions err beyond the baseline's weather; None where the estimator states it, or too few show it."""
+        measured = as_floats(frequencies)
+        if self.regression_.tells_errors or (~np.isnan(measured).all(axis=1)).sum() < FEWEST:
+            return None
+
+        def residuals_of(apart: NDArray[np.bool_]) -> Array:
+            if np.isnan(measured[~apart]).all(axis=0).any():
+                return np.full_like(measured[apart], np.nan)
+            return measured[apart] - self.regression_.predict_apart(temperatures, frequencies, apart)
+
+        return Extrapolation.of(as_floats(temperatures), self.spread_.overall, residuals_of)
 
     def _wanted_folds(self, temperatures: Any) -> Any:
         """The folds that are asked for; rows without stamps stay together where lags need them to."""

@@ -87,6 +87,12 @@ class Regression:
             return predicted, self.errors(X)
         return predicted, PredictionError.of_rows(covariances.reshape(-1, n_targets, n_targets))
 
+    def predict_apart(self, X: Any, y: Any, apart: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Predictions of some rows by a clone of the rest that is fitted on all others."""
+        inputs = self._inputs(X)
+        with without_warnings():  # which the fit on all rows has given
+            return clone(self.rest).fit(inputs[~apart], y[~apart]).predict(inputs[apart])
+
     def reach(self, X: Any) -> tuple[TrainingRange, Any] | None:
         """The weather that the estimator stands on, and X as it is given to its last step; None without ``reach_``."""
         if not offers(self.rest.regressor_, "reach_"):

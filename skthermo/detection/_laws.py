@@ -17,14 +17,15 @@ from skthermo.detection._patterns import as_if_complete
 from skthermo.detection._windows import Windows
 from skthermo.residuals.gaussian import Gaussian, check_invertible
 
+CLIPPED = 1.5  # standard deviations within a window beyond which a record moves the mean of the window no more
 SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
 
 
 @dataclass(frozen=True)
 class MeanLaw:
-    """Length of the mean of whitened records, over its standard deviation.
+    """Length of the robust mean of whitened records, over the standard deviation of their mean.
 
-    It grows with the mean ``correlation`` of two whitened records in one window, mode by mode.
+    This grows with the mean ``correlation`` of two whitened records in one window, mode by mode.
     """
 
     records: Gaussian
@@ -35,7 +36,7 @@ class MeanLaw:
         """Learned from the records in some rows, and from the windows that end there."""
         records = Gaussian.of(windows.rows[rows])
         check_invertible(records.covariance, windows.rows[rows])
-        white = records.whiten(windows.rows)
+        white = _standard(records, windows.rows)
         sums, counts = windows.sums(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
         squares = windows.sums(np.nan_to_num(white) ** 2)
         excess, pairs = (sums**2 - squares)[rows].sum(axis=0), (counts**2 - counts)[rows].sum(axis=0)
@@ -43,12 +44,32 @@ class MeanLaw:
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window; NaN where no record has a mode."""
-        white = self.records.whiten(windows.rows)
-        sums, counts = windows.sums_apart(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
-        variances = (1 - self.correlation) * counts + self.correlation * counts**2
+        white = _standard(self.records, windows.rows)
+        counts, limits = windows.sums((~np.isnan(white)).astype(float)), CLIPPED * np.sqrt(1 - self.correlation)
+        columns = zip(white.T, limits, strict=True)
+        means = np.column_stack([robust_means(windows.inside(column), limit) for column, limit in columns])
         known = counts > 0
-        squared = np.where(known, sums**2, 0.0) / np.where(known, variances, 1.0)
-        return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), sums.shape[1])
+        variances = self.correlation + (1 - self.correlation) / np.where(known, counts, 1.0)
+        squared = np.where(known, means**2, 0.0) / variances
+        return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), means.shape[1])
+
+
+def _standard(learned: Gaussian, rows: Array) -> Array:
+    """Rows in standard deviations and uncorrelated, by a root that does not depend on the units of modes."""
+    scale = np.sqrt(np.diag(learned.covariance))
+    return Gaussian(learned.mean / scale, learned.covariance / np.outer(scale, scale)).whiten(rows / scale)
+
+
+def robust_means(rows: Array, limit: float) -> Array:
+    """Mean of each row, of which no value counts as farther from the median than a limit; NaN left out.
+
+    Moving all values moves it as far, and moving any of them never moves it the other way.
+    """
+    counts = (~np.isnan(rows)).sum(axis=1)
+    middle = np.maximum([counts - 1, counts], 0) // 2
+    medians = np.take_along_axis(np.sort(rows, axis=1), middle.T, axis=1).mean(axis=1, keepdims=True)
+    moves = np.nan_to_num(np.clip(rows - medians, -limit, limit)).sum(axis=1)
+    return medians[:, 0] + moves / np.maximum(counts, 1)
 
 
 @dataclass(frozen=True)
@@ -79,10 +100,7 @@ class CountLaw:
         """Damage index of every window; NaN where no record has a mode."""
         with without_warnings():  # the alarm counts windows that are not evaluated
             single = self.detector.damage_index(windows.rows)
-        padded = np.concatenate([np.full(windows.longest - 1, np.nan), single])
-        last = np.lib.stride_tricks.sliding_window_view(padded, windows.longest)
-        inside = np.arange(windows.longest) >= windows.longest - windows.sizes[:, np.newaxis]
-        return self._as_if_full(np.where(inside, last, np.nan), windows.rows.shape[1])
+        return self._as_if_full(windows.inside(single), windows.rows.shape[1])
 
     def _as_if_full(self, single: Array, n_modes: int) -> Array:
         """The m-th largest index of each row, m in proportion to the records that are there."""

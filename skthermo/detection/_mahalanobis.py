@@ -15,7 +15,7 @@ from skthermo._tables.arrays import Array
 from skthermo._validation import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._patterns import PatternScale, as_if_complete
-from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, modes_text
 from skthermo.residuals.neighbourhoods import Neighbourhoods
@@ -44,7 +44,8 @@ class MahalanobisDetector(DamageDetector):
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances that each of the n baseline
           records has from the others, those left out that are within two correlation times of it. New records that are
           as the baseline's (neither season nor trend) exceed it at about the rate asked for or less, however they are
-          distributed, and also where records depend on those just before them.
+          distributed, and also where records depend on those just before them. Where the neighbours to be left out are
+          more than a fifth of a complete baseline, the distances are its own, times a factor.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5.6 % false alarms
           where 2 % are asked for.
@@ -80,10 +81,19 @@ class MahalanobisDetector(DamageDetector):
     clearly above zero, on the mean over the modes, of what the season does not explain: waves of a year and half a year
     are left out first where the stamps reach over 300 days, or where there are 300 rows without stamps, which count as
     one year. Records are neighbours in the order of the rows or, on the ``DatetimeIndex`` of a frame, in time. From the
-    mean and the covariance of all records, the sums over a record's neighbours are taken away, in closed form; half of
-    the records stay at least. Where modes are missing, or with a ``covariance`` of your own, it is learned ten times
-    more, each time without a tenth of the blocks of time and without their neighbours; blocks last five correlation
-    times at least. Where the baseline counts as fewer than 50 independent records, a warning says so.
+    mean and the covariance of all records, the sums over a record's neighbours are taken away, in closed form; four
+    fifths of the records stay at least. Where modes are missing, or with a ``covariance`` of your own, it is learned
+    ten times more, each time without a tenth of the blocks of time and without their neighbours; blocks last five
+    correlation times at least. Where the baseline counts as fewer than 50 independent records, a warning says so.
+
+    Neighbours of more than a fifth of the records are not left out: a mean and a covariance of the few others would
+    differ so much between baselines that the threshold would hide damage. The factor is that by which, on the mean over
+    drawn baselines of as many normally distributed records with the same correlation time, the distance that new
+    records exceed at the rate asked for is larger than that which the baseline's own exceed. After 144 records with a
+    correlation of 0.95, 2 % asked and 4 modes, new records raise 6.6 % false alarms, and 89 % of those shifted by five
+    standard deviations are found (by "quantile" 43.9 % and 99 %; ``python tests/benchmarks/short_baselines.py --seeds
+    40``). A warning says so where the threshold is far above the baseline's own distances, with the shift that it still
+    sees.
 
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
     normally distributed record exceeds as often, by the approximation of Wilson and Hilferty [WH31]_. Where the
@@ -131,7 +141,7 @@ class MahalanobisDetector(DamageDetector):
             _most_likely(F, names) if self.covariance is None else _fit_complete(self.covariance, F, names)
         )
         self.n_independent_ = baseline.n_independent
-        distances = self._left_out(baseline) if self.threshold == "conformal" else self._distances(F)
+        distances = self._as_if_new(baseline) if self.threshold == "conformal" else self._distances(F)
         index = as_if_complete(distances, present.sum(axis=1), F.shape[1])
         self.pattern_scale_ = PatternScale.of(index, present, self.contamination)
         return index * self.pattern_scale_(present)
@@ -145,6 +155,15 @@ class MahalanobisDetector(DamageDetector):
 
     def _index(self, F: Array) -> Array:
         return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
+
+    def _own_index(self, F: Array) -> Array:
+        return self._index(F)
+
+    def _seen_at(self, threshold: float) -> str:
+        single = 1 / np.sqrt(np.diag(np.linalg.inv(self.covariance_.covariance_)))
+        smallest = np.sqrt(max(threshold**2 - self.n_features_in_, 0.0)) * single
+        sizes = ", ".join(f"{size:.2g}" for size in smallest)
+        return f". Half of the records of a shift of one mode alone raise an alarm if it is {sizes} (mode by mode)"
 
     def _has_likelihood(self) -> bool:
         return True
@@ -163,6 +182,14 @@ class MahalanobisDetector(DamageDetector):
         if self.covariance is not None and not np.isnan(F).any():
             return np.sqrt(self.covariance_.mahalanobis(F))
         return self._normal.distances(F)
+
+    def _as_if_new(self, baseline: Neighbourhoods) -> Array:
+        """Distances of baseline rows, as large as those of new records."""
+        if self.covariance is not None or np.isnan(baseline.records).any() or not baseline.is_short:
+            return self._left_out(baseline)
+        n_records, n_modes = baseline.records.shape
+        time = round(baseline.correlation_time, 2)
+        return self._distances(baseline.records) * factor_of_few(n_records, n_modes, time, self.contamination)
 
     def _left_out(self, baseline: Neighbourhoods) -> Array:
         """Distances of baseline rows from the others."""

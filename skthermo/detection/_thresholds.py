@@ -1,6 +1,10 @@
 """Thresholds of damage indices that keep a rate of false alarms."""
 
+from collections.abc import Callable
+from functools import lru_cache
+
 import numpy as np
+import scipy  # which loads scipy.signal once it is used
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
@@ -13,6 +17,32 @@ def quantile_threshold(index: Array, contamination: float) -> float:
 
 
 FEWEST_INDEPENDENT = 50  # baseline records, from which one baseline's rate of false alarms is close to the mean
+FAR_ABOVE = 2.5  # times as far from the median of a baseline's own indices as their quantile is
+N_SIMULATED, MOST_SIMULATED, N_NEW, START = 200, 400, 50, 200
+"""Number of simulated baselines, most records of each, new records that each evaluates, records before the first."""
+
+
+@lru_cache
+def factor_of_few(n_records: int, n_modes: int, correlation_time: float, contamination: float) -> float:
+    """What the indices of a short, dependent baseline are multiplied by, so that they are as those of new records.
+
+    Normally distributed baselines of so many records and modes are drawn, in which each mode is an autoregression of
+    first order with the given correlation time. It is the ratio of the distance that new, independent records exceed
+    at the rate asked for, on the mean over such baselines, to that which as many of a baseline's own records exceed.
+    """
+    n_drawn = min(n_records, MOST_SIMULATED)  # longer steps stand for a long baseline
+    memory = ((correlation_time - 1) / (correlation_time + 1)) ** (n_records / n_drawn)
+    rate, random = max(contamination, 1 / (n_records + 1)), np.random.RandomState(0)
+    shocks = random.standard_normal((N_SIMULATED, START + n_drawn, n_modes))
+    rows = scipy.signal.lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], shocks, axis=1)[:, START:]
+    mean = rows.mean(axis=1, keepdims=True)
+    precision = np.linalg.inv(np.einsum("rij,rik->rjk", rows - mean, rows - mean) / n_drawn)
+    new = random.standard_normal((N_SIMULATED, N_NEW, n_modes))
+    own, later = (
+        np.sqrt(np.einsum("rij,rjk,rik->ri", some - mean, precision, some - mean, optimize=True))
+        for some in (rows, new)
+    )
+    return float(np.quantile(later / np.quantile(own, 1 - rate, axis=1)[:, np.newaxis], 1 - rate))
 
 
 def conformal_threshold(
@@ -50,3 +80,20 @@ def conformal_threshold(
             "few records for a threshold",
         )
     return threshold
+
+
+def warn_of_blindness(own: Array, threshold: float, contamination: float, seen_at: Callable[[float], str]) -> None:
+    """Warn if a threshold is far above the indices that a detector gives its own baseline, with what it still sees."""
+    own = own[~np.isnan(own)]
+    if not own.size:
+        return
+    middle, suggested = np.quantile(own, [0.5, 1 - contamination])
+    if threshold - middle > FAR_ABOVE * (suggested - middle):
+        warn_user(
+            f"the threshold is {threshold:.3g}, far above the {suggested:.3g} that {contamination:.2g} of the "
+            "baseline's own indices exceed: the baseline has few records, records that depend on each other, or some "
+            f"far from all others{seen_at(threshold)}; expected a longer baseline, or one without outliers "
+            "(threshold='quantile' takes the lower one, with more false alarms)",
+            FewRecordsWarning,
+            "few records for a sensitive threshold",
+        )

@@ -159,6 +159,12 @@ class WindowedAlarm(DamageDetector):
         index = np.concatenate([_index_of_run(self.law_, windows, run.start, run.stop) for run in windows.runs()])
         return np.where(windows.n_known < self.fewest_, np.nan, index)
 
+    def _own_index(self, windows: Windows) -> Array:
+        return self._index(windows)
+
+    def _seen_at(self, threshold: float) -> str:
+        return f". It sees shifts of the mean of a window of {threshold:.2g} of its standard deviations"
+
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return (
             f"their windows hold fewer than {self.fewest_} records with a value, half as many as in the baseline; the "

@@ -52,13 +52,11 @@ class Windows:
         """Sums of the values of the records in every window."""
         return range_sums(values, self.first, np.arange(len(values)) + 1)
 
-    def sums_apart(self, values: Array) -> Array:
-        """The same, each window for itself: what comes before it, however large, moves no digit of its sum."""
-        totals, sizes = np.zeros_like(values), self.sizes
-        for back in range(self.longest):
-            inside = sizes[back:, np.newaxis] > back
-            totals[back:] += np.where(inside, values[: len(values) - back], 0.0)
-        return totals
+    def inside(self, values: Array) -> Array:
+        """The value of each record in every window, (n_rows, longest), in order of time after NaN in shorter ones."""
+        padded = np.concatenate([np.full(self.longest - 1, np.nan), values])
+        last = np.lib.stride_tricks.sliding_window_view(padded, self.longest)
+        return np.where(np.arange(self.longest) >= self.longest - self.sizes[:, np.newaxis], last, np.nan)
 
     def ending_in(self, start: int, stop: int) -> Windows:
         """The windows that end in a run of records, after those of the records before it that they need."""

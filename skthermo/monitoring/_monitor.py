@@ -17,7 +17,7 @@ from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.frames import positions_of
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import counted
+from skthermo._tables.text import counted, probability_text
 from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
@@ -118,7 +118,7 @@ class Monitor(SavesFrames, Estimator):
         Sensors that have failed: ``column``, ``kind``, ``since``, ``detected``, ``until``, ``detail``.
     drift_ : DataFrame or None
         Change of each group's stiffness that was followed: ``change``, ``standard_error``, ``per_year``,
-        ``per_year_error``, ``significant``; None without ``fem``.
+        ``per_year_error``, ``significant``, and the ``p_value`` of the structure's drift; None without ``fem``.
     counts_ : dict
         ``n_records`` that came, without repeated ones; of these ``n_not_evaluated``, ``n_late`` (evaluated all the
         same), ``n_too_late`` and ``n_ahead`` (set aside at present), neither of them evaluated; ``n_repeated``; and
@@ -619,6 +619,8 @@ class Monitor(SavesFrames, Estimator):
         for _, fault in faults[faults["until"].isna()].iterrows():
             lines.append(f"sensor: {fault['column']} {fault['kind']} since {fault['since']}")
         if drift is not None:
+            found = "the structure drifts" if drift["significant"].any() else "none is seen"
+            lines.append(f"drift: {found} (probability by chance {probability_text(drift['p_value'].iloc[0])})")
             lines += [
                 f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
                 f"{'; beyond the limit' if one['beyond_limit'] else ''}"

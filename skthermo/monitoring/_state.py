@@ -215,7 +215,7 @@ class MonitorState(SavesFrames):
         """Daily summaries, those of some days anew."""
         if corrections.drift is not None:
             by_day = dict(zip(days, states, strict=True))
-            shares = pd.DataFrame({day: corrections.drifts(by_day[day])["taken_out"] for day in new.index}).T
+            shares = pd.DataFrame({day: corrections.drift.taken_out(by_day[day].drift) for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
         before = self.days.iloc[: self.days.index.searchsorted(days[0])]
         return pd.concat([before, new]) if len(before) else new

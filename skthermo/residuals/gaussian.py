@@ -143,6 +143,18 @@ def whitenings(covariances: Array, masks: Mask) -> tuple[Array, Array]:
     return np.where(both, roots, 0.0), np.log(values).sum(axis=-1)
 
 
+def no_smaller(covariances: Array, least: Array) -> Array:
+    """Covariances that have, in every direction, the variance of the given ones or that of the least one, or more.
+
+    Of all such, those that change the given ones only along the directions in which both are uncorrelated.
+    """
+    scale = np.linalg.cholesky(least)
+    inverse = np.linalg.inv(scale)
+    ratios, axes = np.linalg.eigh(inverse @ covariances @ inverse.T)
+    along = scale @ axes
+    return np.einsum("...ij,...j,...kj->...ik", along, np.maximum(ratios, 1.0), along)
+
+
 def check_not_empty(rows: Array, names: Sequence[str] | None = None) -> None:
     """Refuse modes that no row has."""
     empty = np.isnan(rows).all(axis=0)

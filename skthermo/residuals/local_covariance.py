@@ -36,6 +36,12 @@ class Neighbours:
 
     rows: NDArray[np.intp]
     counted: Mask
+    distances: Array
+
+    @property
+    def mean_distances(self) -> Array:
+        """Mean distance from each place of the records that count."""
+        return np.where(self.counted, self.distances, 0.0).sum(axis=1) / np.maximum(self.counted.sum(axis=1), 1)
 
     def weights(self, n_records: int) -> scipy.sparse.csr_array:
         """A row for each place: 1 at the records that count, else 0."""
@@ -59,17 +65,18 @@ class History:
     def neighbours(self, size: int, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Neighbours:
         """The records nearest to each place, by default that of each record, without those near ``order`` in time."""
         number = size if order is None else size + self.most_near
-        near = self._nearest[:, :number] if places is None else nearest(self.places, places, number)[1]
+        of_own = (part[:, :number] for part in self._nearest)
+        distances, near = of_own if places is None else nearest(self.places, places, number)
         if order is None:
-            return Neighbours(near, np.ones(near.shape, dtype=bool))
+            return Neighbours(near, np.ones(near.shape, dtype=bool), distances)
         far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
-        return Neighbours(near, far & (far.cumsum(axis=1) <= size))
+        return Neighbours(near, far & (far.cumsum(axis=1) <= size), distances)
 
     @cached_property
-    def _nearest(self) -> NDArray[np.intp]:
-        """Records by their distance from each record, as many as any candidate asks for."""
+    def _nearest(self) -> tuple[Array, NDArray[np.intp]]:
+        """Distances and positions of the records nearest to each record, as many as any candidate asks for."""
         most = max(one.n_neighbors for one in self._candidates)
-        return nearest(self.places, self.places, most + self.most_near)[1]
+        return nearest(self.places, self.places, most + self.most_near)
 
     @property
     def _candidates(self) -> list[Smoothing]:
@@ -117,6 +124,10 @@ class LocalCovariance:
     def at(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
         """Covariances at places, by default those of the records, without the records near ``order`` in time."""
         return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
+
+    def distances(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
+        """Mean distances of places from the records that covariances `at` them are taken from."""
+        return self.history.neighbours(self.smoothing.n_neighbors, places, order).mean_distances
 
     @property
     def numbers_per_record(self) -> int:

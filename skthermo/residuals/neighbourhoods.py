@@ -19,7 +19,7 @@ from skthermo.residuals.weather import parts
 
 Rows = NDArray[np.intp]
 REACH = 2  # correlation times beyond which records count as independent of each other
-LEAST_KEPT = 0.5  # share of the records that stays when a neighbourhood is left out
+LEAST_KEPT = 0.8  # share of the records that stays when a neighbourhood is left out
 BLOCK = 5  # least length of a block of time that is left out as a whole, in correlation times
 N_BLOCKS = 50  # into which the records are divided where they depend on each other for less than that
 MOST_ROWS = 1e12  # spans below are numbers of rows, and not nanoseconds
@@ -68,6 +68,11 @@ class Neighbourhoods:
         stop = sorted_times.searchsorted(self.times + self.reach, side="right")
         return np.maximum(first, place - most), np.minimum(stop, place + most + 1)
 
+    @property
+    def is_short(self) -> bool:
+        """Whether the neighbours of a record would be more than the share of the records that may be left out."""
+        return 2 * REACH * (self.correlation_time - 1) > (1 - LEAST_KEPT) * len(self.times)
+
     def folds(self, n_folds: int, block: Any = None) -> Iterator[tuple[Rows, Rows]]:
         """Blocks of time dealt in turn to some folds, each after the records that are no neighbours of any of it.
 
@@ -79,7 +84,8 @@ class Neighbourhoods:
             stamps = pd.DatetimeIndex(self.times.astype("datetime64[ns]")) if is_timed else self.times
             yield from BlockedKFold(min(n_folds, n_rows), block=block).split(pd.DataFrame(index=stamps))
             return
-        block = max(n_rows // N_BLOCKS, int(np.ceil(BLOCK * self.correlation_time)))
+        longest = max(n_rows // n_folds, 1)
+        block = max(n_rows // N_BLOCKS, min(int(np.ceil(BLOCK * self.correlation_time)), longest))
         fold_of = np.empty(n_rows, dtype=np.intp)
         fold_of[self.order] = BlockedKFold(min(n_folds, n_rows), block=block).fold_of(self.records)
         for fold in range(min(n_folds, n_rows)):

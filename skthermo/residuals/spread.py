@@ -3,43 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
 from skthermo._tables.arrays import Array, patterns, spread_evenly
-from skthermo.residuals.gaussian import Gaussian, check_invertible, log_determinants, whiten_by, whitenings
-from skthermo.residuals.local_covariance import (
-    CANDIDATES,
-    NEAR_IN_TIME,
-    History,
-    Smoothing,
-    whitened,
+from skthermo.residuals.extrapolation import Extrapolation
+from skthermo.residuals.gaussian import (
+    Gaussian,
+    check_invertible,
+    log_determinants,
+    no_smaller,
+    whiten_by,
+    whitenings,
 )
-from skthermo.residuals.weather import PredictionError, TrainingRange, nearest, parts, weather_coordinates
+from skthermo.residuals.local_covariance import CANDIDATES, NEAR_IN_TIME, History, Smoothing, whitened
+from skthermo.residuals.weather import (
+    FAR_OUTSIDE,
+    PredictionError,
+    TrainingRange,
+    nearest,
+    parts,
+    weather_coordinates,
+)
 
 MOST_PLACES = 5000  # baseline records, evenly spaced in time, from which covariances by weather are learned
 JITTER = 1e-12  # share of its variance that each mode has of its own, so that covariances have roots
-ERROR_PER_RANGE = 0.5  # standard deviations for each range of the baseline's temperatures that a record is beyond them
+FAMILIAR = 0.98  # share of the baseline records that are as close to others in weather as a familiar record is
+
+
+@dataclass(frozen=True)
+class WeatherCovariance:
+    """Covariances at the places of the baseline's weather, each of which is taken for the weather around it.
+
+    Records that are farther from the places than ``familiar``, or outside the ``trained`` range, get a covariance that
+    is, to the extent that they are, no smaller than that of all weather: wholly at twice the distance, or far outside.
+    Without ``trained``, none does.
+    """
+
+    coordinates: Pipeline
+    places: Array
+    covariances: Array
+    smoothing: Smoothing
+    familiar: float
+    trained: TrainingRange | None = None
+
+    def at(self, weather: Array, overall: Array) -> Array:
+        """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
+        wanted = self.coordinates.transform(weather)
+        distances, near = nearest(self.places, wanted, self.smoothing.n_neighbors)
+        return self.floored(self.covariances[near[:, 0]], weather, distances.mean(axis=1), overall)
+
+    def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
+        """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""
+        if self.trained is None:
+            return covariances
+        outside = self.trained.excess(weather).max(axis=1) / FAR_OUTSIDE
+        unknown = np.clip(np.maximum(distances / self.familiar - 1, outside), 0, 1)[:, np.newaxis, np.newaxis]
+        rows = np.flatnonzero(unknown)
+        floored = covariances.copy()
+        floored[rows] += unknown[rows] * (no_smaller(covariances[rows], overall) - covariances[rows])
+        return floored
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean of residuals, and their covariance by weather.
-
-    ``covariances`` are those at the ``places`` of the baseline's weather; the last one is the overall covariance, for
-    unknown weather. ``smoothing`` says how closely they follow it. Beyond the ``reach`` of the baseline's temperatures
-    residuals may be larger.
-    """
+    """Mean of residuals and their covariance, by weather where it is known, and wider beyond that of the baseline."""
 
     overall: Gaussian
-    covariances: Array
-    reach: TrainingRange | None
-    smoothing: Smoothing | None = None
-    coordinates: Pipeline | None = None
-    places: Array | None = None
+    by_weather: WeatherCovariance | None = None
+    extrapolation: Extrapolation | None = None
 
     @classmethod
     def of_all(cls, residuals: Array, errors: PredictionError) -> Spread:
@@ -47,82 +82,84 @@ class Spread:
         empty = np.isnan(residuals).all(axis=0)
         overall = without_errors(np.where(empty, 0.0, residuals), errors)
         overall.covariance[empty], overall.covariance[:, empty] = 0.0, 0.0
-        return cls(overall, overall.covariance[np.newaxis], None)
+        return cls(overall)
 
     @classmethod
-    def of(
-        cls,
-        weather: Array,
-        residuals: Array,
-        size: Array,
-        errors: PredictionError,
-        *,
-        local: bool,
-        widens: bool,
-        near: int = NEAR_IN_TIME,
-    ) -> tuple[Spread, Array]:
-        """Learn from a baseline in order of time; whiten each of its records by others, which are not near in time.
-
-        ``size`` holds magnitudes of the frequencies, ``errors`` what is known of those of predictions. With ``widens``,
-        a local spread is wider beyond the baseline's temperatures.
-        """
-        overall, learned = without_errors(residuals, errors), ~np.isnan(residuals).all(axis=1)
+    def of(cls, residuals: Array, size: Array, errors: PredictionError) -> Spread:
+        """The same covariance in all weather; ``size`` holds magnitudes of the frequencies."""
+        overall = without_errors(residuals, errors)
         check_invertible(overall.covariance, residuals, size)
-        reach = TrainingRange.of(weather, learned) if local and widens else None
-        plain = cls(overall, overall.covariance[np.newaxis], reach)
-        residuals = plain.shrunk(residuals, errors)
-        white = plain.whiten(weather, residuals)
-        usable = np.flatnonzero(learned & ~np.isnan(weather).any(axis=1))
-        if not local or len(usable) < 2 * CANDIDATES[0].n_neighbors:
-            return plain, white
-        coordinates = weather_coordinates(weather[usable])
-        chosen = spread_evenly(usable, MOST_PLACES)
+        return cls(overall)
+
+    def followed(
+        self, weather: Array, residuals: Array, errors: PredictionError, *, floor: bool, near: int = NEAR_IN_TIME
+    ) -> tuple[Spread, Array]:
+        """Let the covariance follow the weather where it makes a baseline in order of time likelier.
+
+        Also gives the whitened residuals of the baseline, each by records that are not near in time. With a ``floor``,
+        the covariance is no smaller than that of all weather where the baseline has no similar weather.
+        """
+        residuals = self.shrunk(residuals, errors)
+        white = self.whiten(weather, residuals)
+        usable = np.flatnonzero(~np.isnan(residuals).all(axis=1) & ~np.isnan(weather).any(axis=1))
+        if len(usable) < 2 * CANDIDATES[0].n_neighbors:
+            return self, white
+        coordinates, chosen = weather_coordinates(weather[usable]), spread_evenly(usable, MOST_PLACES)
         places = coordinates.transform(weather[chosen])
-        covariance = History(chosen, places, residuals[chosen], overall, near).likeliest()
-        if covariance is None:
-            return plain, white
-        for part in parts(len(usable), covariance.numbers_per_record):
+        local = History(chosen, places, residuals[chosen], self.overall, near).likeliest()
+        if local is None:
+            return self, white
+        familiar = float(np.quantile(local.distances(order=chosen), FAMILIAR))
+        trained = TrainingRange.of(weather, usable) if floor else None
+        by_weather = WeatherCovariance(coordinates, places, local.at(), local.smoothing, familiar, trained)
+        for part in parts(len(usable), local.numbers_per_record):
             block = usable[part]
-            by_others = covariance.at(coordinates.transform(weather[block]), order=block)
-            white[block] = whitened(residuals[block], overall, by_others)[0]
-        covariances = np.concatenate([covariance.at(), plain.covariances])
-        return cls(overall, covariances, reach, covariance.smoothing, coordinates, places), white
+            here = coordinates.transform(weather[block])
+            by_others, distances = local.at(here, order=block), local.distances(here, order=block)
+            by_others = by_weather.floored(by_others, weather[block], distances, self.overall.covariance)
+            white[block] = whitened(residuals[block], self.overall, by_others)[0]
+        return replace(self, by_weather=by_weather), white
+
+    @property
+    def smoothing(self) -> Smoothing | None:
+        """Over how many records of similar weather covariances are taken; None if over all."""
+        return None if self.by_weather is None else self.by_weather.smoothing
+
+    def covariances(self, weather: Array) -> Array:
+        """Covariances of residuals in the weather of each row, (n_samples, n_modes, n_modes)."""
+        overall, known = self.overall.covariance, ~np.isnan(weather).any(axis=1)
+        covariances = np.repeat(overall[np.newaxis], len(weather), axis=0)
+        if self.by_weather is not None and known.any():
+            covariances[known] = self.by_weather.at(weather[known], overall)
+        if self.extrapolation is not None:
+            covariances += self.extrapolation.shares(weather)[:, np.newaxis, np.newaxis] * overall
+        return covariances
 
     def deviations(self, weather: Array) -> Array:
         """Standard deviations of residuals in the weather of each row, (n_samples, n_modes)."""
-        variances = np.einsum("ijj->ij", self.covariances)[self._place(np.asarray(weather, dtype=float))]
-        return np.sqrt(variances) * self._widening(weather)[:, np.newaxis]
+        return np.sqrt(np.einsum("ijj->ij", self.covariances(np.asarray(weather, dtype=float))))
 
     def whiten(self, weather: Array, residuals: Array, errors: PredictionError | None = None) -> Array:
         """Residuals of new records in standard deviations and uncorrelated, wider where predictions have errors."""
         white = np.empty_like(residuals)
-        for rows in parts(len(residuals), residuals.shape[1] ** 2):
-            by_place = whiten_by(self.covariances, self._place(weather[rows]), residuals[rows] - self.overall.mean)
-            white[rows] = by_place / self._widening(weather[rows])[:, np.newaxis]
-        if errors is None:
-            return white
-        for rows, covariances in self._in_error(errors):
-            wider = self.covariances[self._place(weather[rows])] + covariances
-            by_row = whitened(residuals[rows], self.overall, wider)[0]
-            white[rows] = by_row / self._widening(weather[rows])[:, np.newaxis]
+        for rows, covariances, which in self._in_parts(weather, errors):
+            white[rows] = whiten_by(covariances, which, residuals[rows] - self.overall.mean)
         return white
 
     def log_volumes(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
         """Logarithms of the factors by which `whiten` changes the volume of each row's values."""
-        volumes, present = np.zeros(len(residuals)), ~np.isnan(residuals)
-        for rows in parts(len(residuals), residuals.shape[1] ** 2):
-            volumes[rows] = log_determinants(self.covariances, self._place(weather[rows]), present[rows])
-        for rows, covariances in self._in_error(errors):
-            wider = self.covariances[self._place(weather[rows])] + covariances
-            volumes[rows] = whitenings(wider, present[rows])[1]
-        return -0.5 * volumes - present.sum(axis=1) * np.log(self._widening(weather))
+        volumes = np.zeros(len(residuals))
+        for rows, covariances, which in self._in_parts(weather, errors):
+            volumes[rows] = -0.5 * log_determinants(covariances, which, ~np.isnan(residuals[rows]))
+        return volumes
 
     def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
         """Residuals with the overall covariance also where errors of predictions add to it; NaN without any."""
         covariance, again = self.overall.covariance, residuals.copy()
         varied = np.diag(covariance) > 0
         covariance = covariance + np.diag(np.where(varied, JITTER * np.diag(covariance), 1.0))
-        for rows, covariances in self._in_error(errors):
+        for part in parts(len(errors.rows), len(varied) ** 2):
+            rows, covariances = errors.rows[part], errors.covariances[part]
             few = np.where(varied, residuals[rows], np.nan)
             white = whitened(few, self.overall, covariance + covariances)[0]
             masks, of_row = patterns(~np.isnan(few))
@@ -132,26 +169,20 @@ class Spread:
             again[rows] = np.where(np.isnan(few), np.nan, back + self.overall.mean)
         return again
 
-    def _in_error(self, errors: PredictionError) -> Iterator[tuple[NDArray[np.intp], Array]]:
-        """Rows whose predictions have errors, and the covariances of these, some after others: memory is bounded."""
-        for part in parts(len(errors.rows), len(self.overall.mean) ** 2):
-            yield errors.rows[part], errors.covariances[part]
-
-    def _widening(self, weather: Array) -> Array:
-        """Factor of the deviations where weather is beyond that of the baseline."""
-        if self.reach is None:
-            return np.ones(len(weather))
-        varied = self.reach.highest > self.reach.lowest
-        excess = np.nan_to_num(self.reach.excess(weather))[:, varied]
-        return np.sqrt(1 + (ERROR_PER_RANGE * excess.sum(axis=1) / max(varied.sum(), 1)) ** 2)
-
-    def _place(self, weather: Array) -> NDArray[np.intp]:
-        """The nearest place of every row; the overall covariance where a temperature is missing."""
-        place = np.full(len(weather), len(self.covariances) - 1)
-        known = ~np.isnan(weather).any(axis=1)
-        if self.places is not None and known.any():
-            place[known] = nearest(self.places, self.coordinates.transform(weather[known]), 1)[1][:, 0]
-        return place
+    def _in_parts(
+        self, weather: Array, errors: PredictionError | None
+    ) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
+        """Some rows after others, covariances, and which of these each row has: memory is bounded."""
+        same = self.by_weather is None and self.extrapolation is None
+        errors = errors or PredictionError.none()
+        for rows in parts(len(weather), 2 * self.overall.covariance.size):
+            first, stop = np.searchsorted(errors.rows, [rows.start, rows.stop])
+            if same and first == stop:
+                yield rows, self.overall.covariance[np.newaxis], np.zeros(rows.stop - rows.start, dtype=np.intp)
+                continue
+            covariances = self.covariances(weather[rows])
+            covariances[errors.rows[first:stop] - rows.start] += errors.covariances[first:stop]
+            yield rows, covariances, np.arange(len(covariances))
 
 
 def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:

@@ -29,7 +29,9 @@ def year(memory=0.0, seed=0, n_rows=365 * 8):
 
 
 def compensator(estimator=None, **options):
-    return TemperatureCompensator(estimator or LinearRegression(), **({"targets": ["f1", "f2"]} | options))
+    return TemperatureCompensator(
+        estimator or LinearRegression(), **({"targets": ["f1", "f2"], "whiten": None} | options)
+    )
 
 
 LAGGED = make_pipeline(LagFeatures([0, 2]), LinearRegression())

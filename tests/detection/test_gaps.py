@@ -315,7 +315,7 @@ def test_patterns_alike_get_no_factors():
     np.testing.assert_allclose(factors, 1, atol=0.15)
 
 
-@pytest.mark.filterwarnings("ignore:the 400 baseline records depend on each other")
+@pytest.mark.filterwarnings("ignore:the 400 baseline records depend on each other", "ignore:the threshold is .* far")
 def test_rare_patterns_get_no_factors():
     rare = F.copy()
     rare[:40, 0] = np.nan

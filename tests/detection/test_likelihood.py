@@ -143,6 +143,7 @@ def test_rows_that_nothing_predicts_are_not_scored():
     assert score == pytest.approx(fitted.score(NEW.iloc[3:]))
 
 
+@pytest.mark.filterwarnings("ignore:the threshold is .* far above")
 def test_densities_of_other_packages_serve():
     for density in (GaussianMixture(random_state=0), KernelDensity(bandwidth=0.2)):
         detector = OutlierDetector(density).fit(X[MODES])

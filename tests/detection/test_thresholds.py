@@ -8,15 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
-from scipy.stats import chi
+from scipy.stats import beta, chi
+from scipy.stats import f as f_law
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
 from skthermo._tables.times import correlation_time
 from skthermo.detection import MahalanobisDetector
-from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
+from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
+from skthermo.exceptions import FewRecordsWarning
+from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
 REMEMBERED = pytest.mark.filterwarnings("ignore:the .* baseline records depend on each other in time")
+FAR_ABOVE = pytest.mark.filterwarnings("ignore:the threshold is .* far above")
 TOO_FEW = pytest.mark.filterwarnings("ignore:.* independent baseline records are too few")
 
 
@@ -148,11 +152,12 @@ def test_neighbours_are_those_in_time_where_there_are_stamps():
     np.testing.assert_allclose(MahalanobisDetector().fit(frame.iloc[order]).baseline_index_, index[order], rtol=1e-9)
 
 
-@REMEMBERED
-def test_half_of_the_records_stay_however_long_they_remember():
-    rows = autoregressive(80, 0.98)
-    index = MahalanobisDetector().fit(rows).baseline_index_
-    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(80), 20)), rtol=1e-9)
+def test_four_fifths_of_the_records_stay_however_long_they_remember():
+    rows = autoregressive(85, 0.98)
+    baseline = Neighbourhoods(np.arange(85.0), rows)
+    assert baseline.is_short
+    index = baseline.distances(Gaussian.of(rows))
+    np.testing.assert_allclose(index, distances_without(rows, within(np.arange(85), 8)), rtol=1e-9)
 
 
 @REMEMBERED
@@ -199,6 +204,7 @@ def test_thresholds_agree_on_many_normal_records():
     np.testing.assert_allclose(chosen, chosen[2], rtol=0.01)
 
 
+@FAR_ABOVE
 @TOO_FEW
 def test_false_alarms_on_new_records_are_as_asked_where_the_baseline_is_small():
     rates = {"quantile": [], "conformal": []}
@@ -238,3 +244,47 @@ def test_the_empirical_covariance_is_the_default(threshold):
 def test_a_baseline_in_which_each_row_decides_alone_about_a_direction_is_refused():
     with pytest.raises(ValueError, match="5 baseline rows are too few for their number of modes"):
         MahalanobisDetector().fit(records(5))
+
+
+# Short baselines whose records depend on each other
+
+
+@FAR_ABOVE
+@REMEMBERED
+def test_a_short_dependent_baseline_still_lets_damage_be_found():
+    """Of shifts by five standard deviations, the threshold that leaves neighbours out finds about half."""
+    false, found, by_quantile = [], [], []
+    for seed in range(20):
+        rows = autoregressive(144 + 48, 0.95, seed)
+        detector, plain = (MahalanobisDetector(threshold=one).fit(rows[:144]) for one in ("conformal", "quantile"))
+        assert detector.threshold_ >= plain.threshold_
+        false.append((detector.predict(rows[144:]) == -1).mean())
+        by_quantile.append((plain.predict(rows[144:]) == -1).mean())
+        found.append((detector.predict(rows[144:] + 2.5) == -1).mean())
+    assert np.mean(false) < np.mean(by_quantile) / 3
+    assert np.mean(found) > 0.8
+
+
+def test_the_factor_of_a_few_independent_records_gives_their_rate():
+    """By Hotelling's law for the distance of new records, and the beta law for that of a baseline's own."""
+    n, p = 200, 3
+    new = np.sqrt(p * (n * n - 1) / (n * (n - p)) * f_law.isf(0.02, p, n - p) * n / (n - 1))
+    own = np.sqrt((n - 1) * beta.isf(0.02, p / 2, (n - p - 1) / 2))
+    assert factor_of_few(n, p, 1.0, 0.02) == pytest.approx(new / own, rel=0.03)
+
+
+@pytest.mark.parametrize("n_records", [100, 300, 1000])
+def test_the_factor_grows_with_dependence_and_vanishes_with_records(n_records):
+    factors = [factor_of_few(n_records, 4, time, 0.02) for time in (1.0, 3.0, 9.0, 19.0)]
+    assert (np.diff(factors) > 0).all()
+    assert factors[0] == pytest.approx(1, abs=16 / min(n_records, 400))
+
+
+@REMEMBERED
+def test_a_threshold_far_above_the_indices_of_its_baseline_is_told_with_what_it_still_sees():
+    rows = autoregressive(120, 0.97, 3)
+    with pytest.warns(FewRecordsWarning, match="far above"):
+        MahalanobisDetector().fit(rows)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        MahalanobisDetector().fit(records(400))

@@ -1,8 +1,13 @@
 """Residuals in standard deviations: one covariance, or that of similar weather."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import TimeSeriesSplit
@@ -10,6 +15,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.residuals.local_covariance import Smoothing
+from skthermo.residuals.weather import nearest
+from skthermo.surrogate import TemperatureMapper
 
 MODES = ["f1", "f2"]
 FROZEN = 0.1 * np.array([[2.0, 0.0], [1.0, 1.0]])
@@ -127,7 +134,7 @@ def test_some_of_a_long_baseline_tell_the_spread_of_all(monkeypatch):
     monkeypatch.setattr("skthermo.residuals.spread.MOST_PLACES", 600)
     fitted = compensator()
     white = fitted.fit_transform(X)
-    assert len(fitted.spread_.places) == 600
+    assert len(fitted.spread_.by_weather.places) == 600
     for spread in spreads(white, X):
         np.testing.assert_allclose(spread, np.eye(2), atol=0.3)
 
@@ -142,27 +149,78 @@ def test_few_records_have_one_covariance():
 # Weather that the baseline does not know
 
 
-@pytest.mark.parametrize(("whiten", "width_of_one_range"), [("global", 0.0), ("local", 0.5)])
-def test_weather_beyond_the_baseline_widens_the_local_spread(whiten, width_of_one_range):
-    fitted = compensator(whiten).fit(X)
-    hot = LATER.iloc[[500]].copy()
-    hot[["T1", "T2"]] = X[["T1", "T2"]].max().to_numpy()
-    residual = (hot[MODES] - fitted.estimator_.predict(hot[["T1", "T2"]])).to_numpy()
-    inside = fitted.transform(hot).to_numpy()
-    width = (X["T1"].max() - X["T1"].min(), X["T2"].max() - X["T2"].min())
-    for steps in (0.2, 1.0, 3.0):
-        far = hot.assign(T1=hot["T1"] + steps * width[0], T2=hot["T2"] + steps * width[1])
-        far[MODES] = residual + fitted.estimator_.predict(far[["T1", "T2"]])
-        np.testing.assert_allclose(fitted.extrapolation_distance(far), steps, rtol=1e-9)
-        if steps > 0.25:
-            with pytest.warns(UserWarning, match="1 of 1 rows have temperatures far outside"):
-                white = fitted.transform(far).to_numpy()
-        else:
-            white = fitted.transform(far).to_numpy()
-        np.testing.assert_allclose(white, inside / np.sqrt(1 + (width_of_one_range * steps) ** 2), rtol=1e-9)
+AUTO = compensator("auto").fit(X)
 
 
-@pytest.mark.parametrize("whiten", [None, "global", "local"])
+def larger(one, other):
+    """The smallest eigenvalue of each difference of covariances."""
+    return np.linalg.eigvalsh(one - other).min(axis=-1)
+
+
+def test_in_the_weather_of_the_baseline_the_covariance_follows_the_weather():
+    weather = LATER[["T1", "T2"]].to_numpy()
+    by_weather, places = AUTO.spread_.by_weather, LOCAL.spread_.by_weather.places
+    distances = nearest(places, by_weather.coordinates.transform(weather), by_weather.smoothing.n_neighbors)[0]
+    familiar = (distances.mean(axis=1) < by_weather.familiar) & (AUTO.extrapolation_distance(LATER) == 0).all(axis=1)
+    assert familiar.mean() > 0.9
+    ours, local = (fitted.spread_.covariances(weather[familiar]) for fitted in (AUTO, LOCAL))
+    np.testing.assert_allclose(ours, local)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(-3, 3), st.floats(-3, 3))
+def test_outside_the_weather_of_the_baseline_the_covariance_is_no_smaller_than_that_of_all(first, second):
+    lowest, width = X[["T1", "T2"]].min().to_numpy(), np.ptp(X[["T1", "T2"]].to_numpy(), axis=0)
+    weather = (lowest + np.array([first, second]) * width)[np.newaxis]
+    local, ours = (fitted.spread_.covariances(weather) for fitted in (LOCAL, AUTO))
+    assert (larger(ours, local) > -1e-12).all()
+    if max(abs(first - 0.5), abs(second - 0.5)) > 0.75:
+        assert (larger(ours, AUTO.spread_.overall.covariance) > -1e-12).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, len(LATER) - 1), st.floats(-2, 2), arrays(float, 2, elements=st.floats(-1, 1)), st.floats(1, 100))
+def test_a_larger_shift_is_never_a_smaller_index(row, warmer, shift, factor):
+    record = LATER.iloc[[row]].copy()
+    record[["T1", "T2"]] += warmer * np.ptp(X["T1"])
+    healthy = AUTO.estimator_.predict(record[["T1", "T2"]]) + AUTO.spread_.overall.mean
+    indices = []
+    for size in (1.0, factor):
+        record[MODES] = healthy + size * shift
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            indices.append(np.linalg.norm(AUTO.transform(record)))
+    assert indices[1] >= indices[0] * (1 - 1e-9) - 1e-9
+
+
+def test_an_end_of_the_weather_is_wider_where_the_baseline_shows_that_predictions_err_there():
+    random = np.random.default_rng(0)
+    stamps = pd.date_range("2025-01-01", periods=2000, freq="6h")
+    T = 12 * np.sin(2 * np.pi * np.arange(2000) / 1460) + random.normal(0, 3, 2000)
+    frozen = 0.05 * np.maximum(-6 - T, 0)
+    records = pd.DataFrame({"T1": T, "f1": 4 - 0.01 * T + frozen + random.normal(0, 0.01, 2000)}, stamps)
+    fitted = TemperatureCompensator(TemperatureMapper(), targets=["f1"]).fit(records)
+    cold, warm = fitted.spread_.extrapolation.growth
+    assert cold > 10
+    assert warm < 0.1
+    ranges = T.min() + np.ptp(T) * np.linspace(-1, 2, 31)
+    deviations = fitted.spread_.deviations(ranges[:, np.newaxis])[:, 0]
+    assert (np.diff(deviations[:11]) < 0).all()
+    assert deviations[0] > 3 * deviations[15]
+
+
+def test_extrapolated_rows_are_those_outside_the_weather_of_the_baseline():
+    warm = LATER.assign(T1=X["T1"].max() + np.linspace(0, 0.1, len(LATER)) * np.ptp(X["T1"]), T2=X["T2"].max())
+    rows = AUTO.extrapolated(warm)
+    assert list(rows.index) == list(LATER.index)
+    np.testing.assert_array_equal(rows, np.linspace(0, 0.1, len(LATER)) > 0.05)
+    np.testing.assert_array_equal(
+        TemperatureCompensator(LinearRegression(), targets=[2, 3]).fit(X.to_numpy()).extrapolated(warm.to_numpy()), rows
+    )
+    assert not AUTO.extrapolated(X.mask(X < 0)).any()
+
+
+@pytest.mark.parametrize("whiten", [None, "auto", "global", "local"])
 def test_weather_outside_the_baseline_is_counted_in_one_warning(whiten):
     fitted, hot = compensator(whiten).fit(X), LATER.copy()
     hot.iloc[[3, 5, 800], 1] += 60

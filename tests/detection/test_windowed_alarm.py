@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.signal import lfilter
 from scipy.stats import binom, chi
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
-from skthermo.detection._laws import CountLaw, MeanLaw
+from skthermo.detection._laws import CountLaw, MeanLaw, robust_means
 from skthermo.detection._windows import Windows
 from skthermo.metrics import time_to_detection
 
@@ -66,11 +67,17 @@ def test_equal_records_raise_the_index_by_the_root_of_their_number():
     np.testing.assert_allclose(alarm.damage_index(same), expected, rtol=1e-9)
 
 
-def test_the_index_is_the_length_of_the_mean_in_its_standard_deviations():
+def test_the_index_is_the_length_of_the_robust_mean_in_its_standard_deviations():
     alarm = WindowedAlarm(24).fit(X)
-    white = alarm.law_.records.whiten(LATER.to_numpy())
+    scale = np.sqrt(np.diag(alarm.law_.records.covariance))
+    values, vectors = np.linalg.eigh(alarm.law_.records.covariance / np.outer(scale, scale))
+    white = (LATER.to_numpy() - alarm.law_.records.mean) / scale @ (vectors / np.sqrt(values)) @ vectors.T
+    limits = 1.5 * np.sqrt(1 - alarm.law_.correlation)
     for row in (100, 1400):
-        mean = white[row - 23 : row + 1].mean(axis=0)
+        columns = white[row - 23 : row + 1].T
+        mean = np.concatenate(
+            [robust_means(column[np.newaxis], limit) for column, limit in zip(columns, limits, strict=True)]
+        )
         variance = (1 + 23 * alarm.law_.correlation) / 24
         assert alarm.damage_index(LATER).iloc[row] == pytest.approx(np.sqrt((mean**2 / variance).sum()), rel=1e-9)
 
@@ -234,11 +241,8 @@ def test_the_order_of_modes_and_their_units_do_not_matter(rule):
     alarm = fitted(rule)
     for change in (lambda records: records[["f3", "f1", "f2"]], lambda records: records * [1.0, 1e3, 1e-6]):
         other = WindowedAlarm(12, rule=rule).fit(change(X))
-        if rule == "m-of-n":
-            np.testing.assert_allclose(other.damage_index(change(HOLED)), alarm.damage_index(HOLED), rtol=1e-7)
-            assert other.threshold_ == pytest.approx(alarm.threshold_, rel=1e-7)
-        else:  # modes are whitened by a symmetric root, whose axes depend a little on units
-            np.testing.assert_allclose(other.damage_index(change(LATER)), alarm.damage_index(LATER), rtol=0.1)
+        np.testing.assert_allclose(other.damage_index(change(LATER)), alarm.damage_index(LATER), rtol=1e-7)
+        assert other.threshold_ == pytest.approx(alarm.threshold_, rel=1e-7)
 
 
 @each_rule
@@ -332,3 +336,30 @@ def test_lengths_of_time_that_do_not_serve_are_named(window):
 def test_more_records_than_a_window_has_cannot_be_asked_for():
     with pytest.raises(ValueError, match="m is 9, but windows hold 5 records; expected at most as many"):
         WindowedAlarm(5, rule="m-of-n", m=9).fit(X)
+
+
+# Outliers in service
+
+
+def test_outliers_among_the_records_raise_no_more_alarms_by_means():
+    random = np.random.default_rng(0)
+    baseline, later = (pd.DataFrame(random.normal(size=(4000, 4))) for _ in range(2))
+    wrong = random.random(later.shape) < 0.005
+    alarm = WindowedAlarm(12, contamination=0.005).fit(baseline)
+    clean, dirty = (alarm.predict(rows) == -1 for rows in (later, later + 15 * wrong))
+    assert clean.mean() < 0.01
+    assert dirty.mean() < clean.mean() + 0.005
+    assert (alarm.predict(later + 1.5) == -1).mean() > 0.95
+
+
+@given(
+    arrays(float, (3, 7), elements=st.floats(-10, 10) | st.just(np.nan)),
+    st.floats(0, 5),
+    arrays(float, (3, 7), elements=st.floats(0, 10)),
+)
+def test_robust_means_move_with_all_values_and_never_against_any(rows, shift, moves):
+    means, known = robust_means(rows, 1.5), ~np.isnan(rows).all(axis=1)
+    np.testing.assert_allclose(robust_means(rows + shift, 1.5)[known], means[known] + shift, atol=1e-9)
+    assert (robust_means(rows + moves, 1.5)[known] >= means[known] - 1e-9).all()
+    few = np.nan_to_num(rows[:, :2])
+    np.testing.assert_allclose(robust_means(few, 1e3), few.mean(axis=1), atol=1e-9)

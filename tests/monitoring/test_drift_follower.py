@@ -53,7 +53,7 @@ def with_drift(follower, lost, error):
     """A state in which one group has lost a share of its stiffness, known to an error, and the others nothing."""
     start = follower.start()
     mean, covariance = map(np.zeros_like, start.known)
-    mean[0], covariance[0, 0] = np.log1p(-lost), error**2
+    mean[0], covariance[:4, :4] = np.log1p(-lost), error**2 * np.eye(4)
     return replace(start, known=State(mean, covariance))
 
 
@@ -72,13 +72,28 @@ def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
     assert shares[-1] == 0
 
 
-def test_report_says_what_is_taken_out(follower):
-    clear, doubtful = (follower.report(with_drift(follower, 0.06, error)) for error in (1e-5, 0.06))
-    assert clear["change"].tolist() == pytest.approx([-0.06, 0, 0, 0])
-    assert clear["taken_out"].tolist() == pytest.approx([-0.06, 0, 0, 0], abs=1e-6)
+def test_report_says_whether_and_where_there_is_a_drift(follower):
+    clear, doubtful = (with_drift(follower, 0.06, error) for error in (1e-4, 0.06))
+    assert follower.taken_out(clear).tolist() == pytest.approx([-0.06, 0, 0, 0], abs=1e-4)
+    assert not follower.taken_out(doubtful).any()
+    clear, doubtful = follower.report(clear), follower.report(doubtful)
+    assert clear["change"].tolist() == pytest.approx([-0.06, 0, 0, 0], abs=1e-3)
     assert clear["significant"].tolist() == clear["beyond_limit"].tolist() == [True, False, False, False]
+    assert clear["p_value"].unique() == [0.001]
     assert doubtful["change"].tolist() == pytest.approx([-0.06, 0, 0, 0])
-    assert not doubtful[["taken_out", "significant", "beyond_limit"]].any(axis=None)
+    assert not doubtful[["significant", "beyond_limit"]].any(axis=None)
+    assert (doubtful["p_value"] > 0.05).all()
+
+
+def test_an_even_drift_is_one_of_all_groups(follower):
+    """All groups lose 1.2 %: each alone is hardly known, their common change is."""
+    start, error = follower.start(), 0.004
+    mean, covariance = map(np.zeros_like, start.known)
+    mean[:4], covariance[:4, :4] = np.log1p(-0.012), error**2 * np.eye(4)
+    report = follower.report(replace(start, known=State(mean, covariance)))
+    assert report.index[report["significant"]].tolist() == ["all groups"]
+    assert report.loc["all groups", "change"] == pytest.approx(-0.012, abs=1e-6)
+    assert report.loc["all groups", "standard_error"] < error
 
 
 def test_slow_drift_is_followed(follower, second_year):
@@ -87,7 +102,7 @@ def test_slow_drift_is_followed(follower, second_year):
     states = list(followed(follower, second_year, changes))
     report = follower.report(states[-1])
     assert report["significant"].tolist() == [False, False, True, False]
-    assert changes[-1] < report["taken_out"]["diagonal"] < changes[-1] / 2
+    assert changes[-1] < follower.taken_out(states[-1])["diagonal"] < changes[-1] / 2
     assert not any(state.sudden.any() for state in states)
 
 

@@ -18,7 +18,7 @@ from tests.reporting.fleets import FakeFleet
 from tests.reporting.monitors import FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
 
-LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True}
+LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True, "p_value": 0.001}
 ENDED = event_row("2025-03-02", "2025-03-20")
 
 

@@ -191,28 +191,30 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
             "per_year": [-0.01, 0.0],
             "per_year_error": [0.001, 0.002],
             "significant": [True, False],
+            "p_value": 0.001,
         },
         ["deck", "piers"],
     )
     monitor = FakeMonitor(drift=found)
     standing = standing_of(monitor)
-    (said,) = drift_sentences(standing)
+    whether, said = drift_sentences(standing)
+    assert whether == "The structure drifts (probability by chance 0.001)."
     loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert said.startswith(loss)
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
     assert said.endswith(f"{reached} {years[0.008]}).")
-    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[0]
+    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[1]
     page = Page(drift(standing))
     assert said in page.text
     assert len(page.drawings()) == 1
     assert page.cells[2::3] == ["yes", "no"]
 
     def sentence(**changed):
-        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[0]
+        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[-1]
 
     assert sentence(per_year_error=0.01).endswith("at the earliest).")
-    assert sentence(significant=False) == "No drift beyond its error."
+    assert sentence(significant=False).startswith("No drift of stiffness is seen")
     assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
     assert "reached" not in sentence(per_year=0.01)
     assert "more than 100 years" in sentence(per_year=-1e-4)
@@ -221,7 +223,7 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
 @pytest.mark.parametrize("significant", [True, False])
 def test_no_structure_is_healthy_that_has_lost_much_stiffness_slowly(significant):
     columns = {"change": [-0.12], "standard_error": [0.01], "per_year": [-0.01], "per_year_error": [0.001]}
-    drift = pd.DataFrame(columns, ["deck"]).assign(significant=significant)
+    drift = pd.DataFrame(columns, ["deck"]).assign(significant=significant, p_value=0.001 if significant else 0.2)
     page = today_of(FakeMonitor(drift=drift))
     assert state_of(page) == ("attention" if significant else "healthy")
     assert (f"deck has lost 10{SPACE}% or more of the stiffness" in page.text) == significant

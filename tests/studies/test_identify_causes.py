@@ -31,7 +31,7 @@ def test_causes_have_plain_names_bounds_and_one_sign():
         *("bottom", "top", "diagonal", "vertical", "top stiffer", "diagonal lower", "diagonal higher", "asphalt")
     ]
     assert all(cause.lowest * cause.highest == 0 != cause.highest - cause.lowest for cause in CAUSES)
-    opposed = {(a.name, b.name) for a in CAUSES for b in CAUSES if a.opposes(b) and a.name < b.name}
+    opposed = {(a.name, b.name) for a in CAUSES for b in CAUSES if a.excludes(b) and a.name < b.name}
     assert opposed == {("top", "top stiffer"), ("diagonal higher", "diagonal lower")}
 
 

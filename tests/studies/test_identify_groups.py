@@ -91,9 +91,9 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
         found = identify_damage(fem, WEATHER, F, random_state=0)
     assert found.unseen == ["vertical"]
     assert found.table.index.tolist() == [*GROUPS, "vertical"]
-    # of the explanations that remain, those with or without it: 1/4 of single causes
+    # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     numbers = found.prior.numbers
-    expected = numbers[1] / 4 / (numbers[0] + numbers[1] / 4)
+    expected = numbers[1] / 5 / (numbers[0] + numbers[1] / 5)
     assert found.table.loc["vertical", "probability"] == pytest.approx(expected, rel=0.5)
     assert found.table.loc["vertical", "if_damaged"] == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.6)
     assert (found.draws["vertical"] > 0).any()
@@ -217,3 +217,14 @@ def test_a_model_that_cannot_be_damaged(fem):
 def test_bad_priors(options, message):
     with pytest.raises(ValueError, match=message):
         DamagePrior(**options)
+
+
+def test_an_even_loss_is_one_of_all_groups(fem):
+    """1.2 % everywhere is no 3 % in one group: nobody has to ask for it, and every group is damaged then."""
+    F = simulated(fem, WEATHER, dict.fromkeys((*GROUPS, "vertical"), 0.012))
+    found = identify_damage(fem, WEATHER, F, noise=0.002, random_state=0)
+    assert found.most_probable == ("all groups",)
+    assert found.probability_even > 0.9
+    assert found.table["probability"].min() > 0.9
+    assert found.severities.to_dict() == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)
+    assert found.damage == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)

@@ -22,6 +22,7 @@ PRIOR = {1: 0.8, 2: 0.2}
 AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not told apart: a factor of 20
 NOTABLE = 0.05  # change of a group over the records that should be seen, and told from that of others
 DRAWS = 999
+SIGNIFICANT = 0.01  # probability with which a structure that does not age is said to drift
 TINY = 1e-14  # variance of what cannot change
 
 
@@ -46,6 +47,11 @@ class ModeTrends:
     def n_shapes(self) -> int:
         """Number of shapes of time."""
         return len(self.mean) // len(self.slopes)
+
+    @property
+    def walks(self) -> Array:
+        """Random walks that are tried: none where there is only a line."""
+        return WALKS if self.n_shapes > 1 else WALKS[:1]
 
     def variances(self, rate: float, walk: float) -> Array:
         """Prior variances of the coefficients of a group's drift, by the deviations of its rate and random walk."""
@@ -90,7 +96,7 @@ class ModeTrends:
 
 @dataclass(frozen=True)
 class Explanations:
-    """Sets of one or two groups whose drift may explain the trends, the best first.
+    """Sets of one or two groups, or all groups alike, whose drift may explain the trends, the best first.
 
     ``evidence`` is the logarithm of how many times likelier the trends are with each than without any drift, and
     ``walk`` the standard deviation of each set's random walk in a year. ``p_value`` is the probability that trends
@@ -107,23 +113,24 @@ class Explanations:
     unseen: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, trends: ModeTrends, freedom: float, random: np.random.RandomState) -> Explanations:
-        """Weigh all sets of one or two groups; draws give the probability by chance."""
+    def of(
+        cls, trends: ModeTrends, freedom: float, random: np.random.RandomState, even: Sequence[int] = ()
+    ) -> Explanations:
+        """Weigh all sets of one or two groups, and ``even`` changes alone; draws give the probability by chance."""
         unseen = _structure(trends)[1]
         seen = np.flatnonzero(~unseen).tolist() or list(range(trends.n_groups))
         singles = [(group,) for group in seen]
         first = max(singles, key=lambda one: max(_evidences(trends, one)))
         widening = trends.widening(first)
-        if len(seen) > 1:
-            pairs = [(*first, group) for group in seen if group != first[0]]
-            widening = min(widening, min(trends.widening(pair) for pair in pairs))
+        pairs = list(combinations([group for group in seen if group not in even], 2))
+        widening = min([widening, *(trends.widening(pair) for pair in pairs if first[0] in pair)])
         trends = trends.widened(widening)
-        sets = [*singles, *combinations(seen, 2)]
+        sets = [*singles, *pairs]
         table = np.array([_evidences(trends, one) for one in sets])
         sizes = np.array([len(one) for one in sets])
         prior = np.array([np.log(PRIOR[size] / (sizes == size).sum()) for size in sizes])
-        evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(WALKS))
-        walk = WALKS[table.argmax(axis=1)]
+        evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(trends.walks))
+        walk = trends.walks[table.argmax(axis=1)]
         order = np.argsort(-(evidence + prior), kind="stable")
         observed = table[: len(singles)].max()
         p_value = _chance(trends, singles, observed, freedom, random)
@@ -152,7 +159,7 @@ class Explanations:
 def _evidences(trends: ModeTrends, groups: Sequence[int]) -> list[float]:
     """Logarithm of how many times likelier the trends are with drift of some groups than without, for each walk."""
     found = []
-    for walk in WALKS:
+    for walk in trends.walks:
         quadratic, logarithm = _form(trends, groups, walk)
         found.append(float(trends.mean @ quadratic @ trends.mean - logarithm) / 2)
     return found
@@ -175,7 +182,7 @@ def _chance(
     draws *= np.sqrt(freedom / random.chisquare(freedom, size=(DRAWS, 1)))
     largest = np.full(DRAWS, -np.inf)
     for groups in singles:
-        for walk in WALKS:
+        for walk in trends.walks:
             quadratic, logarithm = _form(trends, groups, walk)
             largest = np.maximum(largest, (((draws @ quadratic) * draws).sum(axis=1) - logarithm) / 2)
     return float((1 + (largest >= observed).sum()) / (1 + DRAWS))

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from skthermo._effects.frequencies import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
@@ -18,6 +19,7 @@ from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
+from skthermo.monitoring.drift._explanations import SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State, absorb
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.monitoring.drift._observations import (
@@ -34,7 +36,7 @@ DELAY = 30
 
 SUDDEN = 1e-3  # probability that the mean of waiting days is as far from what was foretold by chance
 CLEAR = 0.05  # probability that frequencies without drift would seem to drift as much, from which it is taken out
-SIGNIFICANT = 2.58  # standard errors of a group's change: by chance in 1 % of groups that do not drift
+ROUNDING = 1e-6  # share of the mean variance of the shifts by which directions that no group moves are known
 LIMIT = 0.05
 RATE = 0.02  # standard deviation of the yearly change of a group that is expected beforehand
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
@@ -82,8 +84,8 @@ class DriftFollower:
     becomes clear.
 
     ``members`` are the model's groups behind each group, ``slopes``, (n_modes, n_groups), relative changes of
-    frequencies per relative change of stiffness; ``start_`` is what is known at the end of the baseline. A change of a
-    group's stiffness by `LIMIT` is worth attention however slowly it came.
+    frequencies per relative change of stiffness; ``start_`` is what is known at the end of a baseline of so many
+    ``years``. A change of a group's stiffness by `LIMIT` is worth attention however slowly it came.
     """
 
     records: DailyRecords
@@ -91,6 +93,7 @@ class DriftFollower:
     slopes: Array
     noise: DailyNoise
     memory: Memory
+    years: float
     start_: FollowerState = field(repr=False)
 
     @classmethod
@@ -114,7 +117,7 @@ class DriftFollower:
         T, F = T[temperatures], F[list(fem.mode_names_)]
         check_records(fem, T, F)
         records, memory, days = DailyRecords.of(fem, T), Memory.of(fem.mapper_), calendar(F.index, "1D")
-        daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups)
+        daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups).without_even()
         noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
         n_groups, n_modes, span = len(effects.names), F.shape[1], len(days) * A_DAY
         sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
@@ -125,7 +128,7 @@ class DriftFollower:
         covariance[-n_modes:, -n_modes:] = noise.stationary
         known, sudden = State(np.zeros(len(covariance)), covariance), np.empty(0, dtype=bool)
         start = FollowerState(days[-1], known, daily[:0], sudden, daily.weather, *_latest(memory, T))
-        found = cls(records, effects.members, effects.slopes, noise, memory, start)
+        found = cls(records, effects.members, effects.slopes, noise, memory, span, start)
         for number in range(len(days)):
             known = found.next_day(known, observation(daily, number, noise, effects.slopes))
         return replace(found, start_=replace(start, known=known))
@@ -171,25 +174,59 @@ class DriftFollower:
         """Drift of each group since the baseline.
 
         Of its stiffness: relative ``change`` and ``standard_error``, the same a year (``per_year``,
-        ``per_year_error``), whether the change is ``significant``, ``taken_out`` (the change that is taken out of the
-        frequencies), and whether a significant change is ``beyond_limit``.
+        ``per_year_error``), the ``p_value`` of the structure's drift, by which groups it is explained best
+        (``significant``, none if that may be chance), and whether such a change is ``beyond_limit``. The explanation,
+        of one or two groups or of "all groups", which has a row then, is that of `track_parameters`.
         """
-        found = self.estimate(state.known)
+        found, explained = self.estimate(state.known), self.explanations(state)
+        if explained.p_value <= SIGNIFICANT:
+            best = self.estimate_of(explained.sets[0], state)
+            found = pd.concat([found.drop(index=best.index, errors="ignore"), best])
+            found = found.reindex([*self.members, *best.index.difference(list(self.members))]).rename_axis("group")
         scale = np.exp(found["change"])
-        share = self.share(state)
-        clear = (np.abs(found["change"]) > SIGNIFICANT * found["standard_error"]) & (share > 0)
-        change = scale - 1
+        clear = found.index.isin(best.index) if explained.p_value <= SIGNIFICANT else np.zeros(len(found), dtype=bool)
         return pd.DataFrame(
             {
-                "change": change,
+                "change": scale - 1,
                 "standard_error": scale * found["standard_error"],
                 "per_year": np.expm1(found["per_year"]),
                 "per_year_error": found["per_year_error"],
+                "p_value": explained.p_value,
                 "significant": clear,
-                "taken_out": np.expm1(share * found["change"]),
-                "beyond_limit": clear & (np.abs(change) > LIMIT),
+                "beyond_limit": clear & (np.abs(scale - 1) > LIMIT),
             }
         )
+
+    def taken_out(self, state: FollowerState) -> pd.Series:
+        """Relative change of each group's stiffness that is taken out of the frequencies."""
+        return np.expm1(self.share(state) * self.estimate(state.known)["change"])
+
+    def explanations(self, state: FollowerState) -> Explanations:
+        """What explains the drift since the baseline, and the probability of such a drift by chance."""
+        trends, n = self.trends(state), len(self.members)
+        return Explanations.of(trends, self.noise.freedom, np.random.RandomState(0), range(n, trends.n_groups))
+
+    def trends(self, state: FollowerState) -> ModeTrends:
+        """Shift of the modes from the middle of the baseline on, and the effects of groups and of all of them."""
+        shift, covariance = self.frequency_drift(state.known)
+        rounding = ROUNDING * np.diag(covariance).mean() * np.eye(len(covariance))
+        years = self.years / 2 + (state.learned - self.start_.learned) / YEAR
+        evenly = [self.slopes.sum(axis=1, keepdims=True)] if len(self.members) > 1 else []
+        return ModeTrends(shift, covariance + rounding, np.hstack([self.slopes, *evenly]), years)
+
+    def estimate_of(self, groups: Sequence[int], state: FollowerState) -> pd.DataFrame:
+        """As `estimate`, if only these groups drift, of which the last may be all groups alike."""
+        trends, n = self.trends(state), len(self.members)
+        slopes = trends.slopes[:, list(groups)]
+        weighted = np.linalg.solve(trends.covariance, slopes)
+        inverse = np.linalg.inv(slopes.T @ weighted) @ weighted.T @ self.slopes
+        levels, rates = slice(0, n), slice(n, 2 * n)
+        columns = {}
+        for name, part in (("change", levels), ("per_year", rates)):
+            spread = inverse @ state.known.covariance[part, part] @ inverse.T
+            columns[name] = inverse @ state.known.mean[part]
+            columns["standard_error" if name == "change" else "per_year_error"] = np.sqrt(np.diag(spread))
+        return pd.DataFrame(columns, index=[[*self.members, ALL_GROUPS][group] for group in groups])
 
     def next_day(self, known: State, shown: DayShown | None) -> State:
         """What is known one day later, of which nothing is learned without what that day showed."""

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from skthermo._effects.frequencies import ALL_GROUPS
 from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import frame_like
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
@@ -318,9 +319,10 @@ class ParameterHistory:
             yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
         if self.unseen:
             yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
-        if len(self.groups) > len(self.modes):
+        n_groups = sum(group != ALL_GROUPS for group in self.groups)
+        if n_groups > len(self.modes):
             yield (
-                f"There are {len(self.groups)} groups and {counted(len(self.modes), 'mode')}: which group "
+                f"There are {n_groups} groups and {counted(len(self.modes), 'mode')}: which group "
                 "drifts depends on the stiffness in the chain, which these modes do not determine, and may be "
                 "named wrongly, such as the "
                 "mirror image of the one that drifts."

@@ -13,7 +13,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects, healthy_frequencies, read_groups
+from skthermo._effects.frequencies import ALL_GROUPS, FrequencyEffects, healthy_frequencies, read_groups
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, spread_evenly
 from skthermo._tables.frames import check_same_rows, frame_like
@@ -138,14 +138,30 @@ class GroupEffects:
     incidence: Array = field(repr=False)
 
     @property
+    def even(self) -> list[int]:
+        """Position of an even change of all groups, if it is one of them."""
+        return [place for place, name in enumerate(self.members) if name == ALL_GROUPS]
+
+    @property
     def names(self) -> list[str]:
         """Names of the groups."""
         return list(self.members)
 
+    def without_even(self) -> GroupEffects:
+        """The groups alone."""
+        kept = [place for place in range(len(self.members)) if place not in self.even]
+        members = {name: joined for name, joined in self.members.items() if name != ALL_GROUPS}
+        return replace(self, slopes=self.slopes[:, kept], members=members, incidence=self.incidence[:, kept])
+
     @classmethod
     def of(cls, fem: Any, T: Any, F: Any, groups: Any) -> GroupEffects:
-        """Effects at the parameters that the chain gives for records, for small changes."""
-        members = read_groups(fem.model, groups)
+        """Effects at the parameters that the chain gives for records, for small changes.
+
+        Those of the groups, then those of an even change of all groups.
+        """
+        members = dict(read_groups(fem.model, groups))
+        if len(members) > 1:
+            members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
         frequencies = FrequencyEffects.of(
             fem, parameters(fem, T), as_floats(F), StructuralChanges.of_damage(fem.model, of_model)

@@ -13,7 +13,7 @@ from scipy import stats
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
-from skthermo.monitoring.drift._explanations import N_SHAPES, Explanations, ModeTrends
+from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailySteps, State
 from skthermo.monitoring.drift._noise import DailyNoise
@@ -42,7 +42,7 @@ def track_parameters(
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     freq: str = "1D",
     *,
-    significance: float = 0.01,
+    significance: float = SIGNIFICANT,
     random_state: int | np.random.RandomState | None = None,
 ) -> ParameterHistory:
     """Stiffness of damage groups over years, told from weather and noise.
@@ -95,8 +95,9 @@ def track_parameters(
 
     Bands allow for an error of 1 % of the FE model's effects; if it is less accurate than that, they are too narrow.
 
-    Each mode's trend is estimated first. Sets of one or two groups then explain these trends, weighed by their
-    evidence: most structures age in few places, and changes in all groups at once are hardly ever determined. If no
+    Each mode's trend is estimated first. Sets of one or two groups, and an even change of all groups, then
+    explain these trends, weighed by their evidence: most structures age in few places or everywhere alike, and
+    different changes in all groups at once are hardly ever determined. If no
     set explains the trends within their errors, all errors are widened by Birge's ratio. The ``p_value`` of the drift
     compares the evidence of the best group with that in draws of trends without drift. The best set is followed by a
     Kalman smoother, with the effects of changes as large as theirs. Each other group is followed as one that changes
@@ -126,7 +127,7 @@ def track_parameters(
     effects = GroupEffects.of(fem, T, F, groups)
     noise = DailyNoise.of(daily.values, with_time(daily, N_SHAPES), daily.counts)
     trends = mode_trends(daily, noise, effects.slopes, freq)
-    found = Explanations.of(trends, noise.freedom, random)
+    found = Explanations.of(trends, noise.freedom, random, effects.even)
     followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length)
     changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
     slopes = effects.of_changes(changes if found.p_value <= significance else {})
@@ -212,11 +213,15 @@ class Followed:
         return GroupCourse(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
 
 
-def confused_sets(found: Explanations, rivals: Mapping[int, Sequence[int]]) -> list[tuple[int, ...]]:
-    """Groups that cannot be told apart: in the drift that was found, or by their effects on the modes."""
-    sets = [tuple(others) for others in rivals.values() if len(others) > 1]
+def indistinguishable_sets(
+    found: Explanations, rivals: Mapping[int, Sequence[int]], even: Sequence[int]
+) -> list[tuple[int, ...]]:
+    """Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes."""
+    sets = [tuple(one for one in others if one not in even) for others in rivals.values()]
+    sets = [others for others in sets if len(others) > 1]
     for group, others in found.lookalikes.items():
-        alike = tuple(sorted([group, *(one for one in others if group in found.lookalikes.get(one, []))]))
+        both = [group, *(one for one in others if group in found.lookalikes.get(one, []))]
+        alike = tuple(sorted(one for one in both if one not in even))
         if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
             sets.append(alike)
     return sets
@@ -254,7 +259,7 @@ def history_of(
             replaced = {member for member, others in rivals.items() if group in others}
             others = [member for member in best if member not in replaced] if has_drift else []
             courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
-    sets = confused_sets(found, rivals)
+    sets = indistinguishable_sets(found, rivals, effects.even)
     named = {names[group]: courses[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []

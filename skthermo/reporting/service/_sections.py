@@ -14,6 +14,7 @@ from skthermo._tables.text import (
     duration_text,
     listed,
     percent,
+    probability_text,
     share_text,
     significant,
 )
@@ -249,14 +250,15 @@ def _index(standing: Standing, is_small: bool) -> Section:
 
 
 def drift_sentences(standing: Standing) -> list[str]:
-    """Change of each group that is beyond its error, its rate, and when it reaches a limit."""
+    """Whether the structure drifts, how much each group that does, and when it reaches a limit."""
     found = standing.monitor.drift_
     if found is None:
         return ["Slow drift is not followed: that needs a model of the structure."]
     certain = found[found["significant"].astype(bool)]
+    by_chance = f"(probability by chance {probability_text(found['p_value'].iloc[0])})"
     if not len(certain):
-        return ["No drift beyond its error."]
-    sentences = []
+        return [f"No drift of stiffness is seen {by_chance}."]
+    sentences = [f"The structure drifts {by_chance}."]
     for name, row in certain.iterrows():
         change, rate = float(row["change"]), float(row["per_year"])
         verb, speed = "lost" if change < 0 else "gained", "loses" if rate < 0 else "gains"
@@ -299,7 +301,9 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
         meaning = (
             "Structures age: parts lose stiffness slowly. The monitor follows this with the model of the structure, "
             "and takes it out before it evaluates, so that slow ageing raises no false alarm. Errors are two standard "
-            "errors. A drift counts as certain only where it is well beyond its error."
+            "errors. The structure counts as drifting if one that does not age would seem to drift as much with a "
+            "probability of 1 % at most. The drift is then that of the one or two groups, or of all groups alike, "
+            "which explain it best."
         )
         drawn = draw_drift(standing) if is_drawn else None
         caption = "Change of the stiffness of each group since the baseline, with two standard errors at its end."
@@ -312,7 +316,7 @@ def drift(standing: Standing, *, is_drawn: bool = True) -> Section:
             ]
             for name, row in found.iterrows()
         ]
-        columns = ["Group", "Change so far", "Change a year", "Beyond its error"]
+        columns = ["Group", "Change so far", "Change a year", "Drifts"]
         parts += [paragraphs(meaning), figure(caption, [] if drawn is None else [drawn])]
         parts.append(table("Change of stiffness by group, ± two standard errors.", columns, rows))
     return section("drift", "Slow change of the structure", *parts, link="Slow change")

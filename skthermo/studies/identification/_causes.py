@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._effects.changes import HIGHEST_SEVERITY, StructuralChanges
-from skthermo._effects.frequencies import read_groups
+from skthermo._effects.frequencies import ALL_GROUPS, read_groups
 from skthermo._estimators.arguments import check_names
 from skthermo._tables.arrays import MatrixLike, is_real, real_array
 
@@ -98,9 +98,12 @@ class Cause:
     highest: float = HIGHEST_SEVERITY
     scale: float = 1.0
     of: tuple[str, ...] = ()
+    is_even: bool = False  # the same in all groups, which explains alone
 
-    def opposes(self, other: Cause) -> bool:
-        """Whether both change the same thing in opposite directions, so that only one of them can be true."""
+    def excludes(self, other: Cause) -> bool:
+        """Whether only one of them can be true: one is even, or both change the same thing in opposite directions."""
+        if self.is_even or other.is_even:
+            return True
         acts_on = ({"damage": "stiffness", "stiffening": "stiffness"}.get(one.kind, one.kind) for one in (self, other))
         is_same = len(set(acts_on)) == 1 and bool(set(self.of) & set(other.of))
         return is_same and (self.highest > 0) != (other.highest > 0)
@@ -112,8 +115,10 @@ def read_causes(
     stiffening: bool | Sequence[str] | None = None,
     parameters: Sequence[str] | None = None,
     added_mass: Mapping[str, MatrixLike] | None = None,
+    *,
+    even: bool = False,
 ) -> tuple[list[Cause], StructuralChanges]:
-    """All causes that are asked for, and what they do to the parameters of the model."""
+    """Causes that are asked for, an even loss in all groups if wanted, and what they do to the model's parameters."""
     members = read_groups(model, groups)
     stiffer = _read_stiffening(model, members, stiffening)
     moved = _read_parameters(model, parameters)
@@ -125,15 +130,18 @@ def read_causes(
         causes.append(Cause(f"{name} higher", "parameter", 0.0, MOST_HIGHER, of=(name,)))
     causes += [Cause(name, "mass", 0.0, highest, LIKELY_TIMES, of=(name,)) for name, (_, highest) in masses.items()]
     names = [cause.name for cause in causes]
-    reserved = [name for name in names if name in (SOMETHING_ELSE, NO_DAMAGE, "")]
+    reserved = [name for name in names if name in (SOMETHING_ELSE, NO_DAMAGE, ALL_GROUPS, "")]
     if reserved:
         raise ValueError(
             f"causes have the names {reserved}; expected other names in groups or added_mass, since "
-            f"{SOMETHING_ELSE!r} and {NO_DAMAGE!r} are explanations of their own"
+            f"{SOMETHING_ELSE!r}, {NO_DAMAGE!r} and {ALL_GROUPS!r} are explanations of their own"
         )
     repeated = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if repeated:
         raise ValueError(f"the causes {repeated} have the same names; expected other names in groups or added_mass")
+    if even and len(members) > 1:
+        everything = tuple(dict.fromkeys(name for of in members.values() for name in of))
+        causes.append(Cause(ALL_GROUPS, of=everything, is_even=True))
     return causes, changes_of(model, causes, {name: mass for name, (mass, _) in masses.items()})
 
 

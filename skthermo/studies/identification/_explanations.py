@@ -231,21 +231,21 @@ def explanations(scale: Scale) -> tuple[list[Weight], Array]:
 
 def all_sets(scale: Scale) -> tuple[list[Weight], list[float]]:
     """All sets by tabulated effects. Where there are too many, the best smaller ones are extended by every cause."""
-    numbers = np.array(scale.prior.numbers)[: len(scale.causes) + 1]
+    n_combined = sum(not cause.is_even for cause in scale.causes)  # even changes explain alone
+    numbers = np.array(scale.prior.numbers)[: n_combined + 1]
     numbers = numbers / numbers.sum()
     found: list[Weight] = []
     priors: list[float] = []
     for size, probability in enumerate(numbers):
         if probability == 0:
             continue
-        every = comb(len(scale.causes), size)
-        sets: list[Set] = list(combinations(range(len(scale.causes)), size)) if every <= MOST_SETS else []
+        n_causes = len(scale.causes) if size < 2 else n_combined
+        every = comb(n_causes, size)
+        sets: list[Set] = list(combinations(range(n_causes), size)) if every <= MOST_SETS else []
         if not sets:
             best = sorted(zip(found, priors, strict=True), key=lambda one: -total(scale, one[0]) - one[1])
             parents = [one.causes for one, _ in best if len(one.causes) == size - 1][:N_PARENTS]
-            sets = list(
-                dict.fromkeys(tuple(sorted({*p, c})) for p in parents for c in range(len(scale.causes)) if c not in p)
-            )
+            sets = list(dict.fromkeys(tuple(sorted({*p, c})) for p in parents for c in range(n_combined) if c not in p))
         sets = [one for one in sets if is_possible(one, scale.causes)]
         priors += [float(np.log(probability / every))] * len(sets)
         found += screen(scale, sets, priors[-len(sets) :])
@@ -253,5 +253,5 @@ def all_sets(scale: Scale) -> tuple[list[Weight], list[float]]:
 
 
 def is_possible(causes: Set, all_causes: Sequence[Cause]) -> bool:
-    """Whether no two of the causes oppose each other."""
-    return not any(all_causes[a].opposes(all_causes[b]) for a, b in combinations(causes, 2))
+    """Whether no cause excludes another."""
+    return not any(all_causes[a].excludes(all_causes[b]) for a, b in combinations(causes, 2))

@@ -196,7 +196,7 @@ def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
 def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
     """How much of a cause there is within an explanation."""
     row = found.estimates.loc[(" + ".join(causes), cause)]
-    values = (float(row[name]) for name in ("severity", "ci_low", "ci_high"))
+    values = [float(row[name]) for name in ("severity", "ci_low", "ci_high")]
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
 
 
@@ -410,6 +410,9 @@ class IdentifiedDamage:
         Probability that anything changed.
     probability_other : float
         Probability that something else than the named causes shifted the frequencies, beside them or alone.
+    probability_even : float
+        Probability that all groups lost the same share of their stiffness, as where a whole structure ages or gains
+        mass: "all groups" in ``explanations``, which nobody has to ask for. In ``table`` it is damage of each group.
     similarity : DataFrame
         Cosines between the effects of the causes, in standard errors of the shifts.
     confused : list of tuple of str
@@ -460,6 +463,7 @@ class IdentifiedDamage:
     most_probable: tuple[str, ...]
     probability_of_damage: float
     probability_other: float
+    probability_even: float
     similarity: pd.DataFrame
     confused: list[tuple[str, ...]]
     unseen: list[str]

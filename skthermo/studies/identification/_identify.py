@@ -18,7 +18,7 @@ from skthermo._estimators.arguments import check_jobs
 from skthermo._estimators.warnings import warn_each, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state
-from skthermo.studies.identification._causes import Cause, DamagePrior, read_causes
+from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior, read_causes
 from skthermo.studies.identification._curves import Part, ShiftComparison
 from skthermo.studies.identification._evidence import Observed
 from skthermo.studies.identification._explanations import Scale, explanations
@@ -134,7 +134,8 @@ def identify_damage(
     from few independent records, so that errors follow Student's law of several dimensions. Records that are more than
     six standard deviations from the median of the others in a mode are left out and counted.
 
-    An explanation is a set of at most three causes, each with one unknown amount. Its probability is proportional to
+    An explanation is a set of at most three causes, each with one unknown amount, or the loss of one share of stiffness
+    in all groups, as where a whole structure ages. Its probability is proportional to
     its prior probability (`DamagePrior`) and to its evidence, which is the likelihood of the shift averaged over the
     prior law of the amounts. An amount that hardly improves the fit thereby lowers the probability: few causes
     are preferred without a test. Effects are those of the FE model in the weather of the records, as a mean over a
@@ -173,7 +174,7 @@ def identify_damage(
     if shapes is None and dofs is not None:
         raise ValueError("dofs came without shapes; expected both or neither")
     check_jobs(n_jobs)
-    causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
+    causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass, even=True)
     seen = observe(fem, T, F, noise)
     effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
     every = compared(effects, seen.shift, shapes, dofs, shape_noise)
@@ -181,8 +182,9 @@ def identify_damage(
     scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
     whitened = every.observed().rotation @ scale.curves.first
     alone = errors_alone(whitened)
-    if alone.min() > VISIBLE:
-        errors = ", ".join(f"{cause.name} {error:.2g}" for cause, error in zip(causes, alone, strict=True))
+    asked = [place for place, cause in enumerate(causes) if not cause.is_even]
+    if alone[asked].min() > VISIBLE:
+        errors = ", ".join(f"{causes[place].name} {alone[place]:.2g}" for place in asked)
         raise ValueError(
             f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
             f"{errors}. More records or other modes would lower them"
@@ -245,16 +247,19 @@ def findings(
     ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
     what the causes have in common is judged at the model's nominal state, too.
     """
-    names, observed = [cause.name for cause in causes], nominal.observed()
+    every, observed = [cause.name for cause in causes], nominal.observed()
     signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
     slopes, at_nominal = signs * slopes, signs * nominal.slopes(len(causes))
+    asked = [cause for cause in causes if not cause.is_even]  # they come first
+    names = [cause.name for cause in asked]
+    slopes, at_nominal = slopes[:, : len(asked)], at_nominal[:, : len(asked)]
     factor = two_errors(shift.freedom)
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)
     groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
-    table = posterior.table(names)
-    table["error_alone"], table["kind"] = alone, [cause.kind for cause in causes]
-    first, factors = changes.n_parameters, changes.factors(posterior.drawn(names, N_DRAWS, random))
+    table = posterior.table(asked)
+    table["error_alone"], table["kind"] = alone, [cause.kind for cause in asked]
+    first, factors = changes.n_parameters, changes.factors(posterior.drawn(every, N_DRAWS, random))
     estimates, best = posterior.estimates(LISTED), posterior.explanations[0]
     listed = [one for one in posterior.explanations if one.probability >= LISTED] or [best]
     return IdentifiedDamage(
@@ -272,13 +277,14 @@ def findings(
         rest=max(1 - sum(one.probability for one in listed), 0.0),
         most_probable=best.causes,
         probability_of_damage=1 - posterior.no_damage,
-        probability_other=posterior.probability_of("something else"),
+        probability_other=posterior.probability_of(SOMETHING_ELSE),
+        probability_even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
         confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
         unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
         members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
         draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
-        precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), causes, prior.severity),
+        precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), asked, prior.severity),
         p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
         misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
         records=records,

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy.special import logsumexp
 
+from skthermo._effects.frequencies import ALL_GROUPS
 from skthermo._tables.arrays import Array
 from skthermo.studies.identification._boxes import draws, log_probability
-from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
+from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause
 from skthermo.studies.identification._evidence import ERROR_FACTORS, Amounts
 from skthermo.studies.identification._explanations import Scale, Weight
 
@@ -88,9 +89,14 @@ class Posterior:
         """Probability that nothing changed."""
         return sum(one.probability for one in self.explanations if not one.causes)
 
-    def table(self, causes: Sequence[str]) -> pd.DataFrame:
-        """Average amount of each cause over all explanations, where those without it count as 0."""
-        return pd.DataFrame([self._average(cause) for cause in causes], index=list(causes))
+    def table(self, causes: Sequence[Cause]) -> pd.DataFrame:
+        """Average amount of each cause over all explanations, where those without it count as 0.
+
+        An even loss in all groups is damage of each.
+        """
+        alike = {"damage": (ALL_GROUPS,)}
+        rows = [self._average((cause.name, *alike.get(cause.kind, ()))) for cause in causes]
+        return pd.DataFrame(rows, index=[cause.name for cause in causes])
 
     def estimates(self, least: float) -> pd.DataFrame:
         """Amounts of the causes of each explanation that is at least so probable, if it is right."""
@@ -121,10 +127,10 @@ class Posterior:
         probable = np.array([one.probability for one in self.explanations])
         return probable @ np.array([one.change for one in self.explanations]) / probable.sum()
 
-    def _average(self, cause: str) -> dict[str, float]:
+    def _average(self, names: Sequence[str]) -> dict[str, float]:
         values, weights = [], []
         for one in self.explanations:
-            if cause in one.named:
+            for cause in set(names).intersection(one.named):
                 values.append(one.draws[:, one.named.index(cause)])
                 weights.append(np.full(len(values[-1]), one.probability / len(values[-1])))
         inside, weight = np.concatenate([*values, np.zeros(0)]), np.concatenate([*weights, np.zeros(0)])

@@ -28,7 +28,7 @@ def errors_together(slopes: Array, causes: Sequence[Cause], severity: float) -> 
     information = slopes.T @ slopes + np.diag([(severity * cause.scale) ** -2 for cause in causes])
     errors = []
     for column, cause in enumerate(causes):
-        beside = [other for other, one in enumerate(causes) if other == column or not cause.opposes(one)]
+        beside = [other for other, one in enumerate(causes) if other == column or not cause.excludes(one)]
         inverse = np.linalg.inv(information[np.ix_(beside, beside)])
         errors.append(np.sqrt(inverse[beside.index(column), beside.index(column)]))
     return np.array(errors)
