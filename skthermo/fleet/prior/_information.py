@@ -144,8 +144,8 @@ class Information:
         """Learn noise, memory and outliers in turn with coefficients that have the bridge's own prior."""
         u = basis(records.inputs)
         centre = records.weights @ u / records.weights.sum()
-        level = _mean(records.logs, records.weights)
-        X, y = np.column_stack([np.ones(len(u)), u - centre]), records.logs - level
+        level = _mean(records.linear, records.weights)
+        X, y = np.column_stack([np.ones(len(u)), u - centre]), records.linear - level
         q = records.n_outputs
         expected = None if fleet is None else fleet.scatter(families)
         memory = 1.0 if fleet is None else fleet.memory

@@ -48,21 +48,6 @@ class Bridge:
         return self.place, -self.size
 
     @classmethod
-    def failed(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose records or model could not be used."""
-        return cls(name, FAILED, BROKEN, why=error or "no reason is given", n_warnings=n_warnings)
-
-    @classmethod
-    def unwatched(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose model was fitted, and whose new records are not evaluated."""
-        return cls(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings)
-
-    @classmethod
-    def unread(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose monitor cannot be read or asked."""
-        return cls(name, NOT_EVALUATED, SILENT, np.inf, why=error, n_warnings=n_warnings)
-
-    @classmethod
     def watched(
         cls,
         name: Hashable,
