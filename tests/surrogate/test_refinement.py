@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-from skthermo.surrogate.refinement._posterior import SMALL_STEP, Local, Prior
+from skthermo.surrogate.refinement._refinement import SMALL_STEP, Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 
