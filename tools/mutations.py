@@ -130,10 +130,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_tables/arrays.py", "fem/test_linearise.py"): [
         ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
     ],
-    ("fem/sampling/_evaluate.py", "fem/test_linearise.py"): [
+    ("fem/_evaluate.py", "fem/test_linearise.py"): [
         ("relative derivatives", "jacobian * rows[:, np.newaxis] / freq", "jacobian / freq"),
     ],
-    ("fem/sampling/_evaluate.py", "fem/test_modes_at_sensors.py"): [
+    ("fem/_evaluate.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
     ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
@@ -142,7 +142,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
         ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
-    ("fem/sampling/_evaluate.py", "fem/test_progress.py"): [
+    ("fem/_evaluate.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
     ],
     ("fem/affine/_reduced.py", "fem/test_reduced.py"): [
@@ -186,7 +186,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/refinement/_refinement.py", "surrogate/test_refinement.py"): [
+    ("surrogate/inverse/_refinement.py", "surrogate/test_refinement.py"): [
         ("width of the prior of a box", "half / np.sqrt(3)", "half"),
         ("pull of the prior", "+ distance / self.prior.width", "+ distance"),
         ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
@@ -199,7 +199,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
-    ("surrogate/refinement/_refinement.py", "surrogate/test_reduced_refinement.py"): [
+    ("surrogate/inverse/_refinement.py", "surrogate/test_reduced_refinement.py"): [
         ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [

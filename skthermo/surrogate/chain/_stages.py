@@ -55,8 +55,7 @@ from skthermo.fem import FEModel, shape_components
 from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse import InverseSurrogate
-from skthermo.surrogate.refinement import ShapeInputs, unconverged
+from skthermo.surrogate.inverse import InverseSurrogate, ShapeInputs, unconverged
 
 SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
 FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given

@@ -24,7 +24,7 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample, share_reordered
 from skthermo.surrogate._regression import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
-from skthermo.surrogate.refinement import Refinement, ResponseSurface, ShapeInputs
+from skthermo.surrogate.inverse._refinement import Refinement, ResponseSurface, ShapeInputs
 
 
 @dataclass(frozen=True)

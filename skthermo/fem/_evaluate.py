@@ -39,7 +39,7 @@ from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem._terms import ROWS_PER_CHUNK, warn_of_failures
 
 if TYPE_CHECKING:
-    from skthermo.fem.sampling._samples import Samples
+    from skthermo.fem._samples import Samples
 
 
 Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
@@ -451,7 +451,7 @@ def sample(
     >>> drawn.theta.shape, drawn.frequencies.shape
     ((100, 4), (100, 6))
     """
-    from skthermo.fem.sampling._samples import Samples  # imported here because scikit-learn imports pandas
+    from skthermo.fem._samples import Samples  # imported here because scikit-learn imports pandas
 
     check_model(model)
     lowest, highest = check_bounds(bounds, model.parameter_names).T
