@@ -80,13 +80,13 @@ class FleetPrior(Estimator):
     of how large each function is in any bridge.
 
     Each bridge is left out (of more than 50, one of 50 groups at a time), and compared by the evidence of its records:
-    on its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges have
-    it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges train a
-    family by their probability of following it, so that atypical ones do not widen it.
+    on its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges
+    have it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges
+    train a family by their probability of following it, so that atypical ones do not widen it.
 
     What no function of the basis follows, such as the heat of the ground, is estimated from autocovariances of the
-    residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family. Noise that
-    remembers for so long counts as such, and makes bands wide.
+    residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family.
+    Noise that remembers for so long counts as such, and makes bands wide.
 
     ``tests/benchmarks/fleet_prior.py`` measures errors and bands beside the fleet's mean, a ridge towards it, bridges
     on their own and bridges with a year of records.
