@@ -25,8 +25,8 @@ COUNTED = {
 """States in words, the worst first."""
 
 STEPS = {
-    ALARM: "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, the records "
-    "first.",
+    ALARM: "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, "
+    "the records first.",
     UNEXPLAINED: "Find out what the events were that have ended, and acknowledge them.",
     ATTENTION: "Ask an engineer whether the bridges that lost stiffness slowly can bear it.",
     NOT_EVALUATED: "Check loggers and sensors of the bridges that are not evaluated.",
