@@ -34,6 +34,7 @@ DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
     "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
+    "measurement or structure event": {"facecolor": (GREY, 0.25), "edgecolor": (GREY, 0.7), "hatch": "xx"},
     "event marked as harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
 }
 
