@@ -19,8 +19,8 @@ from skthermo._tables.times import YEAR, has_stamps
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
 DRAWS = 4000
-FARTHEST = 100.0  # years ahead for which a date is told
-SHORT = 1.5  # years of records below which season and drift are hardly told apart
+FARTHEST = 100.0  # years ahead for which a date is given
+SHORT = 1.5  # years of records below which season and drift are hardly distinguished
 
 
 class GroupCourse(NamedTuple):
@@ -54,8 +54,8 @@ class ParameterHistory:
     days : DatetimeIndex
         Beginning of each day.
     courses : mapping of str to GroupCourse
-        Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0
-        on the first day.
+        Ln stiffness of each group, and of each set of indistinguishable groups if all of them change alike; 0 on the
+        first day.
     years : float
         Length of the records in years.
     p_value : float
@@ -65,13 +65,13 @@ class ParameterHistory:
     explanations : DataFrame
         Sets of one or two groups that may drift, the best first: ``groups``; ``probability``, if any of the sets
         drifts; ``log_evidence`` against no drift.
-    sets : list of tuple of str
-        Groups that cannot be told apart: in the drift that was found, or by their effects on the modes.
+    indistinguishable : list of tuple of str
+        Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes.
     rivals : mapping of str to list of str
         Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
     lookalikes : mapping of str to list of str
         Groups of which a drift of 5 % would look like a drift of others, with these.
-    unseen : list of str
+    unobservable : list of str
         Groups of which a loss of 5 % over the records would not be seen.
     noticed_from : Series
         Change a year, by group, from which a steady drift is found in 9 of 10 cases.
@@ -99,7 +99,7 @@ class ParameterHistory:
     >>> history.has_drift, history.explanations["groups"].iloc[0]
     (True, ('bottom',))
     >>> history.table["bottom"].columns.tolist()
-    ['estimate', 'lower', 'upper']
+    ['estimate', 'ci_low', 'ci_high']
     """
 
     days: pd.DatetimeIndex
@@ -108,10 +108,10 @@ class ParameterHistory:
     p_value: float
     significance: float
     explanations: pd.DataFrame = field(repr=False)
-    sets: list[tuple[str, ...]]
+    indistinguishable: list[tuple[str, ...]]
     rivals: Mapping[str, list[str]]
     lookalikes: Mapping[str, list[str]]
-    unseen: list[str]
+    unobservable: list[str]
     noticed_from: pd.Series = field(repr=False)
     modes: pd.DataFrame = field(repr=False)
     misfit_p_value: float
@@ -131,10 +131,10 @@ class ParameterHistory:
 
     @property
     def table(self) -> pd.DataFrame:
-        """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "lower" | "upper"), bands of 95 %."""
+        """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "ci_low" | "ci_high"), at 95 %."""
         columns = {}
         for name, course in self.courses.items():
-            for what, side in (("estimate", 0.0), ("lower", -N_ERRORS), ("upper", N_ERRORS)):
+            for what, side in (("estimate", 0.0), ("ci_low", -N_ERRORS), ("ci_high", N_ERRORS)):
                 columns[name, what] = np.exp(course.mean + side * course.deviation)
         return pd.DataFrame(columns, index=self.days)
 
@@ -144,7 +144,7 @@ class ParameterHistory:
 
         ``change`` over the records, relative, and ``change_error``; ``per_year`` and ``standard_error``; ``p_value`` of
         no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
-        another one of its set), "no sign", or "not seen"; ``noticed_from``.
+        another one of its set), "no sign", or "unobservable"; ``noticed_from``.
         """
         levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.courses.values()]).T
         change, errors = np.expm1(levels), np.exp(levels) * deviations
@@ -180,7 +180,7 @@ class ParameterHistory:
         DataFrame
             One row a group or set: ``date``, before which it is reached with probability one half; ``earliest`` and
             ``latest``, between which it is reached with 95 %; ``probability`` that it is reached within 10 years of the
-            last day. NaT where that takes more than 100 years, and for groups that are not seen.
+            last day. NaT where that takes more than 100 years, and for groups that are unobservable.
 
         Raises
         ------
@@ -192,7 +192,7 @@ class ParameterHistory:
         random, rows = np.random.RandomState(self.seed), {}
         for name, course in self.courses.items():
             years = self._first_passages(course, float(np.log1p(limit)), random)
-            if name in self.unseen:
+            if name in self.unobservable:
                 rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
                 continue
             dates = [self._date(years, share) for share in (0.5, (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)]
@@ -266,8 +266,8 @@ class ParameterHistory:
         return f"ParameterHistory({found or 'no drift'})"
 
     def _drifts(self, name: str) -> str:
-        if name in self.unseen:
-            return "not seen"
+        if name in self.unobservable:
+            return "unobservable"
         members = [others for others in self.rivals.values() if name in others]
         if members:
             return "yes" if len(members[0]) == 1 else "perhaps"
@@ -310,15 +310,15 @@ class ParameterHistory:
             others = [other for other in others if other != group]
             if others:
                 each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
-                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot tell them apart."
+                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot distinguish them."
 
     def _limits(self) -> Iterator[str]:
-        known = [one for one in self.groups if one not in self.unseen]
+        known = [one for one in self.groups if one not in self.unobservable]
         if not self.has_drift and known:
             each = ", ".join(f"{group} {_share(self.noticed_from[group])}" for group in known)
             yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
-        if self.unseen:
-            yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
+        if self.unobservable:
+            yield f"These modes do not show {listed(self.unobservable)}: a loss of 5{SPACE}% would not be seen."
         n_groups = sum(group != ALL_GROUPS for group in self.groups)
         if n_groups > len(self.modes):
             yield (
@@ -332,7 +332,7 @@ class ParameterHistory:
                 yield f"A drift of {group} would look like one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
-                f"The records are {self.years:.1f} years long: season and drift are hardly told apart, and "
+                f"The records are {self.years:.1f} years long: season and drift are hardly distinguished, and "
                 "the bands are wide."
             )
         if self.misfit_p_value < self.significance:

@@ -45,7 +45,7 @@ def track_parameters(
     significance: float = SIGNIFICANT,
     random_state: int | np.random.RandomState | None = None,
 ) -> ParameterHistory:
-    """Stiffness of damage groups over years, told from weather and noise.
+    """Stiffness of damage groups over years, apart from weather and noise.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ def track_parameters(
     Returns
     -------
     ParameterHistory
-        Relative stiffness of each group by day with bands, rates a year, groups that cannot be told apart, and when a
-        limit is reached.
+        Relative stiffness of each group by day with bands, rates a year, indistinguishable groups, and when a limit is
+        reached.
 
     Raises
     ------
@@ -285,10 +285,10 @@ def history_of(
                 "log_evidence": found.evidence,
             }
         ),
-        sets=[tuple(names[group] for group in one) for one in sets],
+        indistinguishable=[tuple(names[group] for group in one) for one in sets],
         rivals={names[group]: [names[other] for other in others] for group, others in rivals.items()},
         lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
-        unseen=[names[group] for group in np.flatnonzero(found.unseen)],
+        unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
         noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
         modes=mode_table(fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes))),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),

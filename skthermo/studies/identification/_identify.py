@@ -25,7 +25,13 @@ from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._identified import IdentifiedDamage, explanation_text
 from skthermo.studies.identification._observe import ComparedRecords, observe
 from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
+from skthermo.studies.identification._separability import (
+    VISIBLE,
+    cosines,
+    errors_alone,
+    indistinguishable_groups,
+    precision,
+)
 from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
 from skthermo.studies.identification._shift import FrequencyShift
 from skthermo.studies.replicates import checked_models
@@ -103,7 +109,7 @@ def identify_damage(
     -------
     IdentifiedDamage
         Explanations with their probabilities, probability and severity of each cause, explained shifts, causes that
-        cannot be told apart, and the draws that ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
+        cannot be distinguished, and the draws that ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
 
     Raises
     ------
@@ -119,8 +125,8 @@ def identify_damage(
     UserWarning
         Once for each kind: if records cannot be compared or are far from the others, with their number and the reasons,
         and if these are the last ones, because the structure may have just changed; if the records, or the training
-        records, are worth few independent ones; if temperatures have other names than in fit, causes cannot be told
-        apart or cannot be seen, a severity is at its bound, or the causes do not explain the shifts.
+        records, are worth few independent ones; if temperatures have other names than in fit, causes cannot be
+        distinguished or cannot be seen, a severity is at its bound, or the causes do not explain the shifts.
 
     Notes
     -----
@@ -256,7 +262,7 @@ def findings(
     factor = two_errors(shift.freedom)
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)
-    groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
+    groups = indistinguishable_groups(at_nominal[:, seen]) + indistinguishable_groups(slopes[:, seen])
     table = posterior.table(asked)
     table["error_alone"], table["kind"] = alone, [cause.kind for cause in asked]
     first, factors = changes.n_parameters, changes.factors(posterior.drawn(every, N_DRAWS, random))
@@ -280,8 +286,8 @@ def findings(
         probability_other=posterior.probability_of(SOMETHING_ELSE),
         probability_even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
-        confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
-        unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
+        indistinguishable=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
+        unobservable=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
         members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
         draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
         precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), asked, prior.severity),

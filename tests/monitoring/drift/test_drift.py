@@ -137,7 +137,7 @@ def test_a_known_drift_is_recovered(history):
     assert history.has_drift
     assert history.explanations["groups"].iloc[0] == ("bottom",)
     assert abs(table["estimate"].iloc[-1] - truth[-1]) < 2.5 * rate["change_error"]
-    assert ((table["lower"] <= truth) & (truth <= table["upper"])).mean() > 0.9
+    assert ((table["ci_low"] <= truth) & (truth <= table["ci_high"])).mean() > 0.9
     assert history.rates["drifts"].to_dict() == {"bottom": "yes", "top": "no sign", "diagonal": "no sign"} | {
         "all groups": "no sign"
     }
@@ -155,7 +155,7 @@ def test_without_drift_none_is_claimed(healthy):
     assert found.summary().startswith("No drift")
     pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
     bands = found.table.iloc[-1].unstack()
-    assert ((bands["lower"] < 1) & (bands["upper"] > 1)).all()
+    assert ((bands["ci_low"] < 1) & (bands["ci_high"] > 1)).all()
 
 
 def test_one_year_is_told_with_wide_bands(ageing):
@@ -163,7 +163,7 @@ def test_one_year_is_told_with_wide_bands(ageing):
     T, F = campaign.temperatures[:365], campaign.frequencies[:365]
     found = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
     bottom = found.table["bottom"].iloc[-1]
-    assert bottom["lower"] < 0.98 < bottom["upper"]
+    assert bottom["ci_low"] < 0.98 < bottom["ci_high"]
     assert "1.0 years long" in found.summary()
 
 
@@ -206,7 +206,7 @@ def test_days_and_modes_may_be_missing(ageing, history):
     table = found.table["bottom"]
     assert found.has_drift
     assert found.explanations["groups"].iloc[0] == ("bottom",)
-    assert table["lower"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["upper"].iloc[-1]
+    assert table["ci_low"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["ci_high"].iloc[-1]
 
 
 def test_filled_temperatures_are_told_once(healthy):
@@ -347,7 +347,7 @@ def test_mirror_images_are_named_together():
         warnings.simplefilter("ignore", UserWarning)  # four modes do not determine six parameters
         fem = DataInformedFEM(model, random_state=0).fit(T[:365], F[:365])
         history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
-    assert history.sets == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
+    assert history.indistinguishable == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
     assert_allclose(*history.rates.loc[["k1", "k6"], "probability"])
     assert (history.rates.loc[["k1", "k6"], "drifts"] == "perhaps").all()
     assert_allclose(history.rates.loc["k1", "per_year"], -0.02, atol=3 * history.rates.loc["k1", "standard_error"])
