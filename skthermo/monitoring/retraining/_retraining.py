@@ -404,6 +404,6 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
     """Which weeks of old records have a time of the year that no new record has within half a week."""
     blocks = blocks_of(old)
     middle = pd.Series(old).groupby(blocks).agg(lambda some: some.iloc[len(some) // 2])
-    covered = np.unique(new.dayofyear)
-    distance = np.abs(middle.dt.dayofyear.to_numpy()[:, np.newaxis] - covered)
+    covered = np.unique(new.day_of_year)
+    distance = np.abs(middle.dt.day_of_year.to_numpy()[:, np.newaxis] - covered)
     return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2

@@ -97,7 +97,7 @@ def _relative(measured: pd.DataFrame, residuals: pd.DataFrame, is_relative: pd.S
 
 
 def _piecewise_linear(targets: list[Any]) -> TemperatureCompensator:
-    return TemperatureCompensator(TemperatureMapper(), targets=targets)
+    return TemperatureCompensator(TemperatureMapper(), targets=targets, whiten=None)
 
 
 @dataclass(frozen=True)
