@@ -233,7 +233,7 @@ class DriftFollower:
         n = len(self.members)
         walk, turn = (deviation**2 * A_DAY * np.eye(n) for deviation in (WALK, TURN))
         predicted = DailySteps(A_DAY, walk, turn, self.noise.memory, self.noise.renewal).predict(known)
-        return predicted if shown is None else absorb(predicted, shown)[0]
+        return predicted if shown is None else absorb(predicted, shown)
 
     def estimate(self, known: State) -> pd.DataFrame:
         """Change of each group's ln stiffness since the baseline, and yearly, with standard errors."""
