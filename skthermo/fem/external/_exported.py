@@ -137,7 +137,9 @@ def load_affine(
     if total is None and stiffness is not None:
         unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
         fitting = [
-            name for name in unnamed if (one := matrices[name]) is not None and one.shape == shape and _is_finite(one)
+            name
+            for name in unnamed
+            if (matrix := matrices[name]) is not None and matrix.shape == shape and _is_finite(matrix)
         ]
         total = _usual(fitting, TOTAL_NAMES, "total", file)
     if stiffness is None:
