@@ -120,7 +120,7 @@ class DriftFollower:
         daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups).without_even()
         noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
         n_groups, n_modes, span = len(effects.names), F.shape[1], len(days) * A_DAY
-        sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
+        sizes = [n_groups, n_groups, n_modes * (records.basis.size + 1), n_modes]
         covariance = np.diag(np.repeat([0.0, RATE**2, MISLEARNED**2, 0.0], sizes))
         levels, slopes = np.arange(n_groups), n_groups + np.arange(n_groups)
         covariance[levels, levels] = (RATE * span / 2) ** 2
@@ -233,7 +233,7 @@ class DriftFollower:
         n = len(self.members)
         walk, turn = (deviation**2 * A_DAY * np.eye(n) for deviation in (WALK, TURN))
         predicted = DailySteps(A_DAY, walk, turn, self.noise.memory, self.noise.renewal).predict(known)
-        return predicted if shown is None else absorb(predicted, shown)[0]
+        return predicted if shown is None else absorb(predicted, shown)
 
     def estimate(self, known: State) -> pd.DataFrame:
         """Change of each group's ln stiffness since the baseline, and yearly, with standard errors."""
@@ -264,7 +264,7 @@ class DriftFollower:
 
     def _no_records(self) -> DailyMeans:
         """A day without any."""
-        n_modes, size = len(self.modes), self.records.basis.size
+        n_modes, size = len(self.modes), self.records.basis.size + 1
         none = np.zeros((1, n_modes))
         return DailyMeans(none + np.nan, none, np.zeros((1, n_modes, size)))
 
