@@ -77,8 +77,8 @@ class DriftFollower:
     A Kalman filter follows the stiffness of groups day by day, apart from weather and noise, relative to the mean of a
     baseline, a month behind: a day is learned from when it has waited `DELAY` days, and only if no time of this length
     that holds it departs from what was predicted. So a sudden change is never learned as drift, however long it lasts;
-    a drift that is much faster than some percent a year is not either. A sudden change that the mean of a month does not
-    show is learned in time, and reported as the drift that it looks like.
+    a drift that is much faster than some percent a year is not either. A sudden change that the mean of a month does
+    not show is learned in time, and reported as the drift that it looks like.
 
     What is taken out is the drift found, times a share that is 0 as long as it may be chance and goes to 1 as it
     becomes clear.

@@ -130,15 +130,15 @@ def identify_damage(
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. It is a difference of two means, and its covariance counts that of both: of the new records, and
-    of the healthy prediction, which errs alike for a season as least squares on the weather would. Records are correlated with those before, so that a mean of
-    n of them scatters more than that of n independent ones. Correlations are learned from the residuals of the
-    training records, as those of an independent part and of one that fades exponentially with time; 30 new records
-    would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between records counts, else
-    their number. Modes that scatter clearly more than in training count as scattering so. The covariance is known
-    from few independent records, so that errors follow Student's law of several dimensions. Records that are more than
-    six standard deviations from the median of the others in a mode are left out and counted.
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
+    weather. It is a difference of two means, and its covariance counts that of both: of the new records, and of the
+    healthy prediction, which errs alike for a season as least squares on the weather would. Records are correlated with
+    those before, so that a mean of n of them scatters more than that of n independent ones. Correlations are learned
+    from the residuals of the training records, as those of an independent part and of one that fades exponentially with
+    time; 30 new records would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between
+    records counts, else their number. Modes that scatter clearly more than in training count as scattering so. The
+    covariance is known from few independent records, so that errors follow Student's law of several dimensions. Records
+    that are more than six standard deviations from the median of the others in a mode are left out and counted.
 
     An explanation is a set of at most three causes, each with one unknown amount, or the loss of one share of stiffness
     in all groups, as where a whole structure ages. Its probability is proportional to
