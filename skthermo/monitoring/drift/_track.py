@@ -15,7 +15,7 @@ from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
-from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
+from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailySteps, State
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.monitoring.drift._observations import (
@@ -62,7 +62,7 @@ def track_parameters(
     freq : str, default="1D"
         Period over which records are averaged: a day or some days, such as "7D".
     significance : float, default=0.01
-        Probability with which a structure that does not age is said to drift.
+        Probability with which a structure that does not age counts as drifting.
     random_state : int, RandomState or None, default=None
         Seed of the draws behind ``p_value`` and `ParameterHistory.reaches`.
 
@@ -130,7 +130,7 @@ def track_parameters(
     trends = mode_trends(daily, noise, effects.slopes, freq)
     found = Explanations.of(trends, noise.freedom, random, effects.even)
     followed = Followed(trends.widened(found.widening), found, len(days))
-    changes = {group: course.mean[-1] for group, course in followed.best().items()}
+    changes = {group: trajectory.mean[-1] for group, trajectory in followed.best().items()}
     slopes = effects.of_changes(changes if found.p_value <= significance else {})
     followed = replace(followed, trends=replace(followed.trends, slopes=slopes))
     return history_of(fem, days, effects, followed, daily.known.any(axis=0), significance, random)
@@ -172,12 +172,12 @@ class Followed:
     found: Explanations
     n_days: int
 
-    def best(self) -> dict[int, GroupCourse]:
+    def best(self) -> dict[int, GroupTrajectory]:
         """The groups of the best set."""
         groups, walk = self.found.sets[0], float(self.found.walk[0])
         return {group: self.beside([group], [one for one in groups if one != group], walk) for group in groups}
 
-    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> GroupCourse:
+    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> GroupTrajectory:
         """Groups that all change alike, if only some others change beside them; from the trends of the modes."""
         trends, n = self.trends, self.trends.n_shapes
         both = replace(
@@ -188,7 +188,7 @@ class Followed:
         shapes = shapes_of_time(self.n_days, n)
         at_end = np.array([shapes[-1], np.append(1 / trends.years, np.zeros(n - 1))])
         deviations = np.sqrt(np.einsum("ti,ij,tj->t", shapes, covariance, shapes))
-        return GroupCourse(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
+        return GroupTrajectory(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
 
 
 def indistinguishable_sets(
@@ -234,28 +234,28 @@ def history_of(
     found, names = followed.found, effects.names
     best, has_drift = found.sets[0], found.p_value <= significance
     rivals = {group: found.instead(group) for group in best} if has_drift else {}
-    courses = followed.best() if has_drift else {}
+    trajectories = followed.best() if has_drift else {}
     for group in range(len(names)):
-        if group not in courses:
+        if group not in trajectories:
             replaced = {member for member, others in rivals.items() if group in others}
             others = [member for member in best if member not in replaced] if has_drift else []
-            courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
+            trajectories[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
     sets = indistinguishable_sets(found, rivals, effects.even)
-    named = {names[group]: courses[group] for group in range(len(names))}
+    named = {names[group]: trajectories[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []
         label = " and ".join(names[group] for group in one)
         named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
-    named = {name: course.with_error_of_effects(EFFECT_ERROR) for name, course in named.items()}
+    named = {name: trajectory.with_error_of_effects(EFFECT_ERROR) for name, trajectory in named.items()}
     information = np.diag(followed.trends.information())
     with np.errstate(divide="ignore"):
         alone = 1 / np.sqrt(information) / followed.trends.years
-    shifts = sum((np.outer(courses[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
+    shifts = sum((np.outer(trajectories[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
     trends = followed.trends
     misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
     return ParameterHistory(
         days=days,
-        courses=named,
+        trajectories=named,
         years=trends.years,
         p_value=found.p_value,
         significance=significance,

@@ -33,7 +33,7 @@ from skthermo.studies.location._division import Division
 PLAUSIBLE = 0.01  # probability of several groups together from which on each of them is divided in turn
 
 ALIKE = 0.98  # cosine between the effects of two stretches from which on modes cannot tell one from the other
-AS_PROBABLE = 0.2  # and the ratio of their probabilities from which on that is said
+AS_PROBABLE = 0.2  # and the ratio of their probabilities from which on both are named
 
 
 @dataclass(frozen=True)
