@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from skthermo._tables.text import counted
-from skthermo.reporting._html import Html, Section, element, joined, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
 from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, banner, first_section
 
@@ -87,7 +87,7 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
     if not bridges:
         return Html()
     shown = [
-        joined([element("a", one.name, href=links[one.name]), Html(one.duration), _small(one.note)])
+        element("span", element("a", one.name, href=links[one.name]), one.duration, _small(one.note))
         for one in bridges[:MOST_NAMED]
     ]
     rest = f" and {len(bridges) - MOST_NAMED:,} more, in the table" if len(bridges) > MOST_NAMED else ""
@@ -96,7 +96,7 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
 
 
 def _small(note: str) -> Html:
-    return element("small", f"({note})") if note else Html()
+    return element("small", f" ({note})") if note else Html()
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:
