@@ -37,7 +37,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ),
     ],
     ("fleet/prior/_comparison.py", "fleet/prior/test_posterior.py"): [
-        ("a bridge that foretells itself", " if i not in group]", "]"),
+        ("a bridge that predicts itself", " if i not in group]", "]"),
     ],
     ("datasets/fleet/_climate.py", "datasets/test_fleet.py"): [
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
@@ -136,11 +136,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/_evaluate.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
-    ("fleet/_crew.py", "fleet/test_fit_fleet.py"): [
+    ("fleet/_workers.py", "fleet/test_fit_fleet.py"): [
         ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
     ],
     ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
-        ("chances know how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
+        ("p values allow for how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
     ("fem/_evaluate.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
@@ -481,7 +481,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("much lost stiffness called healthy", "return ATTENTION if said == HEALTHY and self.worn else", "return"),
     ],
     ("reporting/fleet/_bridge.py", "reporting/test_fleet.py"): [
-        ("called alarms among the others", "CALLED if called & set(opened.index) else OPEN", "OPEN"),
+        ("significant alarms among the others", "SIGNIFICANT if is_significant else OPEN", "OPEN"),
         ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
     ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
@@ -498,9 +498,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_false_alarms.py", "monitoring/test_false_alarms.py"): [
-        ("promised tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
-        ("promised end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
-        ("promised numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
+        ("tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
+        ("end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
+        ("numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
     ],
     ("monitoring/_direction.py", "monitoring/test_direction.py"): [
         ("direction told by lowered frequencies", "and left < nnls(effects", "and left > nnls(effects"),

@@ -222,9 +222,9 @@ class MonitorState(SavesFrames):
 
 
 def _not_closing(index: Array, seen: Corrected, active: ActiveDetector) -> Array:
-    """Indices by which events open and close: where a response was set aside, the others can only open one."""
-    with np.errstate(invalid="ignore"):
-        return np.where(seen.is_held & ~(index > active.threshold), np.nan, index)
+    """Indices by which events open and close: where a response was set aside, the others cannot close one."""
+    above = np.nextafter(active.rules[DAMAGE].release, np.inf)
+    return np.where(seen.is_held, np.maximum(index, above), index)
 
 
 def _pending(is_above: NDArray[np.bool_], is_unknown: NDArray[np.bool_], before: Sequence[str]) -> NDArray[np.bool_]:

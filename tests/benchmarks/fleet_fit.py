@@ -10,7 +10,7 @@ group. The largest memory of this process and of its workers is that of all time
 Some of the bridges are then fitted again with a worker killed by SIGKILL midway, beside a bridge whose maker always
 kills its process and one whose records are broken, and on the workers of a Dask cluster. The folder is also used again:
 nothing is fitted anew. The exit code is 1 if bridges are missing, if any bits differ, if the bridge that is always
-killed is not called so, if a worker needs more than 2 GB, or if more healthy bridges are called than damaged ones.
+killed is not reported, if a worker needs more than 2 GB, or if more healthy bridges are significant than damaged ones.
 """
 
 import argparse
@@ -175,11 +175,11 @@ def main():
         print(fleet.summary())
         found = fleet.discoveries()
         print(found.summary())
-        false = [name for name in found.called if name not in damaged]
+        false = [name for name in found.bridges if name not in damaged]
         alarmed = set(fleet.table.index[fleet.table["n_events"] > 0])
-        n_found, n_called = len(damaged & alarmed), len(damaged & set(found.called))
-        print(f"damaged: {len(damaged)}, of which {n_found} had an event and {n_called} are called")
-        print(f"healthy: {len(alarmed - damaged)} had an event, {len(false)} are called")
+        n_found, n_called = len(damaged & alarmed), len(damaged & set(found.bridges))
+        print(f"damaged: {len(damaged)}, of which {n_found} had an event and {n_called} are significant")
+        print(f"healthy: {len(alarmed - damaged)} had an event, {len(false)} are significant")
         good &= len(false) <= len(damaged)
 
         start = time.perf_counter()

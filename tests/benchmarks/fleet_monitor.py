@@ -238,7 +238,7 @@ def rows_of(kind, bridge, number, options):
             row = {
                 "kind": kind.kind,
                 "bridge": bridge.name,
-                "alien": bridge.is_atypical,
+                "atypical": bridge.is_atypical,
                 "days": days,
                 "detector": name,
             }

@@ -191,13 +191,17 @@ def load_affine(
     says_total = total is not None
     if total is None and stiffness is not None:
         unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
-        fitting = [name for name in unnamed if matrices[name].shape == shape and _is_finite(matrices[name])]
+        fitting = [
+            name
+            for name in unnamed
+            if (matrix := matrices[name]) is not None and matrix.shape == shape and _is_finite(matrix)
+        ]
         total = _usual(fitting, TOTAL_NAMES, "total", file)
     if stiffness is None:
         others = {
             name: _find(matrices, name, file, shape)
-            for name, matrix in matrices.items()
-            if name != mass and (name in square or (np.iscomplexobj(matrix) and matrix.shape == shape))
+            for name, one in matrices.items()
+            if name != mass and (name in square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
         if total is None and len(others) > 1:
             total = _usual(others, TOTAL_NAMES, "total", file)

@@ -77,16 +77,16 @@ class FleetPrior(Estimator):
     whose effects have a ridge. Expectation maximisation finds M and Sigma from the bridges' likelihoods; Sigma is drawn
     to a multiple of the identity by three bridges' worth, and for another bridge it is widened by what a Student
     distribution of so few bridges has. On its own, beta ~ N(0, tau^2 D), with the most likely tau, and a diagonal D
-    that tells which functions are large in any bridge.
+    of how large each function is in any bridge.
 
-    Each bridge is left out (of more than 50, one of 50 groups at a time), and judged by the evidence of its records: on
-    its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges have
-    it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges train a
-    family by their probability of following it, so that atypical do not widen it.
+    Each bridge is left out (of more than 50, one of 50 groups at a time), and compared by the evidence of its records:
+    on its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges
+    have it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges
+    train a family by their probability of following it, so that atypical ones do not widen it.
 
-    What no function of the basis follows, such as the heat of the ground, is told by autocovariances of the residuals
-    two and three days apart (two and three rows, without stamps): the median over the bridges of a family. Noise that
-    remembers for so long counts as such, and makes bands wide.
+    What no function of the basis follows, such as the heat of the ground, is estimated from autocovariances of the
+    residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family.
+    Noise that remembers for so long counts as such, and makes bands wide.
 
     ``tests/benchmarks/fleet_prior.py`` measures errors and bands beside the fleet's mean, a ridge towards it, bridges
     on their own and bridges with a year of records.
@@ -264,7 +264,7 @@ class FleetPrior(Estimator):
                 lines.append(f"{name}: not pooled, {n_bridges}; expected at least {LEAST_BRIDGES}")
             else:
                 lines.append(
-                    f"{name}: not pooled: what {n_bridges} say of each other cannot be told from chance (a gain of "
+                    f"{name}: not pooled: {n_bridges} predict each other no better than chance allows (a gain of "
                     f"{gain} in log likelihood); a new bridge learns it alone"
                 )
         return "\n".join(lines)

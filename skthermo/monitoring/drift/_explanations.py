@@ -22,7 +22,7 @@ PRIOR = {1: 0.8, 2: 0.2}
 AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not distinguished: a factor of 20
 NOTABLE = 0.05  # change of a group over the records that should be seen, and distinguished from that of others
 DRAWS = 999
-SIGNIFICANT = 0.01  # probability with which a structure that does not age is said to drift
+SIGNIFICANT = 0.01  # probability with which a structure that does not age counts as drifting
 TINY = 1e-14  # variance of what cannot change
 
 

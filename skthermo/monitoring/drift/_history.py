@@ -23,7 +23,7 @@ FARTHEST = 100.0  # years ahead for which a date is given
 SHORT = 1.5  # years of records below which season and drift are hardly distinguished
 
 
-class GroupCourse(NamedTuple):
+class GroupTrajectory(NamedTuple):
     """Ln stiffness of a group on each day, its standard deviation, and its random walk's in a year.
 
     ``end`` and ``end_covariance`` are of the level on the last day and the steady rate a year.
@@ -35,8 +35,8 @@ class GroupCourse(NamedTuple):
     end_covariance: Array
     walk: float
 
-    def with_error_of_effects(self, share: float) -> GroupCourse:
-        """The same course, of which a share may be an error of the FE model's effects."""
+    def with_error_of_effects(self, share: float) -> GroupTrajectory:
+        """The same trajectory, of which a share may be an error of the FE model's effects."""
         return self._replace(
             deviation=np.hypot(self.deviation, share * self.mean),
             end_covariance=self.end_covariance + share**2 * np.outer(self.end, self.end),
@@ -53,7 +53,7 @@ class ParameterHistory:
     ----------
     days : DatetimeIndex
         Beginning of each day.
-    courses : mapping of str to GroupCourse
+    trajectories : mapping of str to GroupTrajectory
         Ln stiffness of each group, and of each set of indistinguishable groups if all of them change alike; 0 on the
         first day.
     years : float
@@ -103,7 +103,7 @@ class ParameterHistory:
     """
 
     days: pd.DatetimeIndex
-    courses: Mapping[str, GroupCourse] = field(repr=False)
+    trajectories: Mapping[str, GroupTrajectory] = field(repr=False)
     years: float
     p_value: float
     significance: float
@@ -133,9 +133,9 @@ class ParameterHistory:
     def table(self) -> pd.DataFrame:
         """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "ci_low" | "ci_high"), at 95 %."""
         columns = {}
-        for name, course in self.courses.items():
+        for name, trajectory in self.trajectories.items():
             for what, side in (("estimate", 0.0), ("ci_low", -N_ERRORS), ("ci_high", N_ERRORS)):
-                columns[name, what] = np.exp(course.mean + side * course.deviation)
+                columns[name, what] = np.exp(trajectory.mean + side * trajectory.deviation)
         return pd.DataFrame(columns, index=self.days)
 
     @property
@@ -146,9 +146,9 @@ class ParameterHistory:
         no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
         another one of its set), "no sign", or "unobservable"; ``noticed_from``.
         """
-        levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.courses.values()]).T
+        levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.trajectories.values()]).T
         change, errors = np.expm1(levels), np.exp(levels) * deviations
-        names, weights = list(self.courses), self.explanations
+        names, weights = list(self.trajectories), self.explanations
         shares = [
             weights.loc[[name in groups for groups in weights["groups"]], "probability"].sum()
             if name in self.groups
@@ -190,8 +190,8 @@ class ParameterHistory:
         if not is_real(limit) or not -1 < limit < 1 or limit == 0:
             raise ValueError(f"limit is {limit!r}; expected a relative change, such as -0.1 for a loss of 10 %")
         random, rows = np.random.RandomState(self.seed), {}
-        for name, course in self.courses.items():
-            years = self._first_passages(course, float(np.log1p(limit)), random)
+        for name, trajectory in self.trajectories.items():
+            years = self._first_passages(trajectory, float(np.log1p(limit)), random)
             if name in self.unobservable:
                 rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
                 continue
@@ -238,7 +238,7 @@ class ParameterHistory:
         return list(self._answer())
 
     def limits(self) -> list[str]:
-        """What cannot be said.
+        """What is not known.
 
         Returns
         -------
@@ -248,7 +248,7 @@ class ParameterHistory:
         return list(self._limits())
 
     def summary(self) -> str:
-        """What was found, and what cannot be said.
+        """What was found, and what is not known.
 
         Returns
         -------
@@ -274,17 +274,19 @@ class ParameterHistory:
         is_set = any(" and ".join(others) == name for others in self.rivals.values())
         return "perhaps" if is_set else "no sign"
 
-    def _first_passages(self, course: GroupCourse, level: float, random: np.random.RandomState) -> Array:
+    def _first_passages(self, trajectory: GroupTrajectory, level: float, random: np.random.RandomState) -> Array:
         """Years after the last day at which ln stiffness first reaches a level, in draws; infinite if it never does."""
-        beyond = course.mean <= level if level < 0 else course.mean >= level
+        beyond = trajectory.mean <= level if level < 0 else trajectory.mean >= level
         if beyond[-1]:
             return np.full(DRAWS, (self.days[beyond.argmax()] - self.days[-1]) / YEAR)
-        start, rate = random.multivariate_normal(course.end, course.end_covariance, DRAWS, check_valid="ignore").T
+        start, rate = random.multivariate_normal(
+            trajectory.end, trajectory.end_covariance, DRAWS, check_valid="ignore"
+        ).T
         ahead, towards = np.abs(level - start), np.sign(level) * rate
         ahead = np.where(np.sign(level) * (level - start) > 0, ahead, 0.0)
         speed = np.maximum(towards, 1e-6)
-        if course.walk > 0:  # the first passage of a walk with a rate has an inverse Gaussian law
-            years = random.wald(np.maximum(ahead, 1e-12) / speed, np.maximum(ahead, 1e-12) ** 2 / course.walk**2)
+        if trajectory.walk > 0:  # the first passage of a walk with a rate has an inverse Gaussian law
+            years = random.wald(np.maximum(ahead, 1e-12) / speed, np.maximum(ahead, 1e-12) ** 2 / trajectory.walk**2)
         else:
             years = ahead / speed
         return np.where((towards <= 0) & (ahead > 0), np.inf, years)

@@ -19,10 +19,11 @@ from skthermo._tables.arrays import Array, as_floats, spread_evenly
 from skthermo._tables.frames import check_same_rows, frame_like
 from skthermo._tables.times import YEAR, has_stamps
 from skthermo._validation import check_is_fitted
-from skthermo.monitoring.drift._daily import DailyMeans, WeatherFunctions
+from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.preprocessing import ExponentialMeans
+from skthermo.residuals.weather import WeatherFunctions
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
 MIRRORED = 1e-6  # difference of the cosine of two effects from 1, below which they are the same

@@ -121,7 +121,7 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
         texts.append(f"New records could not be used: {standing.error}.")
     if unexplained:
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
-        texts.append(f"{number} would be significant, but ended before anybody explained what it was.")
+        texts.append(f"{number} would be significant, but ended before it was explained.")
     if len(standing.failed):
         texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
     return " ".join(text for text in texts if text)

@@ -26,7 +26,7 @@ PHRASES = {
     "higher": ("a rise of {size} in {name}", "of {size} in {name}", " higher"),
     "mass": ("added mass of {size} of {name}", "of {size} of {name}", ""),
 }
-"""What is said of a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
+"""Phrases for a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
 
 NAMED, MOST_NAMED = 0.01, 4
 """Probability from which on another explanation is named, and the largest number of those that are."""
@@ -66,7 +66,7 @@ class Amount:
 
     @property
     def saying(self) -> str:
-        """What is said of it: a key of ``PHRASES``."""
+        """Which of ``PHRASES`` names it."""
         return self.kind if self.kind != "parameter" else "lower" if self.value < 0 else "higher"
 
     @property
@@ -275,7 +275,7 @@ def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
 
 
 def limits(found: IdentifiedDamage) -> Iterator[str]:
-    """What cannot be said of the place or the cause."""
+    """What is not known of the place or the cause."""
     best = statements(found)[0]
     for causes in found.indistinguishable:
         yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."

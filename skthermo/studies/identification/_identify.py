@@ -130,15 +130,15 @@ def identify_damage(
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. It is a difference of two means, and its covariance counts that of both: of the new records, and
-    of the training records that have weather like theirs. Records are correlated with those before, so that a mean of
-    n of them scatters more than that of n independent ones. Correlations are learned from the residuals of the
-    training records, as those of an independent part and of one that fades exponentially with time; 30 new records
-    would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between records counts, else
-    their number. Modes that scatter clearly more than in training count as scattering so. The covariance is known
-    from few independent records, so that errors follow Student's law of several dimensions. Records that are more than
-    six standard deviations from the median of the others in a mode are left out and counted.
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
+    weather. It is a difference of two means, and its covariance counts that of both: of the new records, and of the
+    healthy prediction, which errs alike for a season as least squares on the weather would. Records are correlated with
+    those before, so that a mean of n of them scatters more than that of n independent ones. Correlations are learned
+    from the residuals of the training records, as those of an independent part and of one that fades exponentially with
+    time; 30 new records would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between
+    records counts, else their number. Modes that scatter clearly more than in training count as scattering so. The
+    covariance is known from few independent records, so that errors follow Student's law of several dimensions. Records
+    that are more than six standard deviations from the median of the others in a mode are left out and counted.
 
     An explanation is a set of at most three causes, each with one unknown amount, or the loss of one share of stiffness
     in all groups, as where a whole structure ages. Its probability is proportional to
@@ -158,8 +158,8 @@ def identify_damage(
 
     Averages over explanations count causes outside an explanation as 0, so that a band which begins at 0 says that the
     cause may not be there at all. Causes that these modes do not show keep about their prior probability. What causes
-    have in common is judged at the model's nominal state, too, because a chain may have drifted out of the symmetry of
-    its structure.
+    have in common is also assessed at the model's nominal state, because a chain may have drifted out of the symmetry
+    of its structure.
 
     Examples
     --------
@@ -251,7 +251,7 @@ def findings(
     """Tables of a posterior, and what the causes' effects have in common.
 
     ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
-    what the causes have in common is judged at the model's nominal state, too.
+    what the causes have in common is assessed at the model's nominal state, too.
     """
     every, observed = [cause.name for cause in causes], nominal.observed()
     signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts

@@ -89,18 +89,13 @@ def dense(steps, start, days):
     return mean + gain @ (values - design @ mean), covariance - gain @ design @ covariance
 
 
-def test_smoother_and_filter_equal_the_dense_conditional():
+def test_the_filter_equals_the_dense_conditional():
     steps, start, days = small_case()
     mean, covariance = dense(steps, start, days)
-    means, covariances, end = steps.smoothed(start, days)
     n = len(start.mean)
-    for day in range(len(days)):
-        place = slice(n * day, n * day + 2)
-        assert_allclose(means[day], mean[place], atol=1e-9)
-        assert_allclose(covariances[day], covariance[place, place], atol=1e-9)
-    for state in (end, steps.filtered(start, days)):
-        assert_allclose(state.mean, mean[-n:], atol=1e-9)
-        assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
+    state = steps.filtered(start, days)
+    assert_allclose(state.mean, mean[-n:], atol=1e-9)
+    assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
 
 
 def test_memory_and_variances_of_noise_are_recovered():
@@ -270,6 +265,28 @@ def test_the_filter_follows_a_drift(ageing):
     assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * np.sqrt(np.diag(covariance))).all()
     rates = slice(len(GROUPS), 2 * len(GROUPS))
     assert np.array_equal(follower.next_day(known, None).mean[rates], known.mean[rates])
+
+
+@pytest.mark.parametrize(
+    "drift", [{"bottom": 0.02}, dict.fromkeys(("bottom", "top", "diagonal", "vertical"), 0.01), {}]
+)
+def test_a_monitors_drift_and_the_history_tell_one_story(drift):
+    campaign = make_truss_campaign(3, drift=drift or None, random_state=3)
+    fem, T, F = trained(campaign), campaign.temperatures, campaign.frequencies
+    history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
+    follower = DriftFollower.of(fem, T[:365], F[:365])
+    daily, start = follower.records.means(T[365:], F[365:], F.index[365:]), follower.start()
+    known = start.known
+    for day in range(len(F) - 365):
+        known = follower.next_day(known, observation(daily, day, follower.noise, follower.slopes))
+    report = follower.report(replace(start, known=known, learned=F.index[-1]))
+    expected = ["all groups"] if len(drift) > 1 else list(drift)
+    assert report.index[report["significant"]].tolist() == expected
+    assert (report["p_value"].max() <= 0.01) == history.has_drift == bool(drift)
+    assert history.rates.index[history.rates["drifts"] == "yes"].tolist() == expected
+    for group in expected:
+        together = np.hypot(report.loc[group, "per_year_error"], history.rates.loc[group, "standard_error"])
+        assert abs(report.loc[group, "per_year"] - history.rates.loc[group, "per_year"]) < 3 * together
 
 
 def test_days_are_those_of_the_calendar_where_clocks_change(healthy):
