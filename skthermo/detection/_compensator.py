@@ -137,8 +137,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     that of all records: wholly at twice that distance, or a quarter of the range outside, before in proportion.
 
     In weather that is colder or warmer than the baseline's, predictions err by an amount that the baseline's own
-    residuals do not show. "auto" and "local" therefore fit the estimator two more times, without the coldest and
-    without the warmest fifth of the records, and compare the residuals of these with the others'. Where the column that
+    residuals do not show. "auto" therefore fits the estimator two more times, without the coldest and without the
+    warmest fifth of the records, and compares the residuals of these with the others'. Where the column that
     is farthest outside is e ranges below or above the baseline's, g log(1 + e^2) times the covariance of all records is
     added, with the g that this end has shown. An assumed value of 9 has the weight of some records in it. What no fifth
     of the baseline shows remains unknown, as the slope above freezing after a winter: `extrapolated` marks such rows.
@@ -479,8 +479,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         white = self.spread_.whiten(weather, taught, told)
         if self.whiten != "global":
             floor, near = self.whiten == "auto", rows_near_in_time(filled)
+            extrapolation = self._extrapolation(filled, frequencies) if floor else None
             followed, white = self.spread_.followed(weather, taught, told, floor=floor, near=near)
-            self.spread_ = replace(followed, extrapolation=self._extrapolation(filled, frequencies))
+            self.spread_ = replace(followed, extrapolation=extrapolation)
         if not len(fills.rows):
             return white
         untaught = np.isnan(taught).all(axis=1)
