@@ -59,7 +59,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "precisions(covariance, present)",
         ),
     ],
-    ("surrogate/chain/_thermal_model.py", "surrogate/test_predicted_covariance.py"): [
+    ("surrogate/chain/_stages.py", "surrogate/test_predicted_covariance.py"): [
         (
             "covariance in the model's domain",
             "slopes[:, :, np.newaxis] * jacobian",
@@ -91,7 +91,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("follower takes out doubtful drift", "(by_chance / distance) ** 2, 0.0)", "0 * by_chance, 0.0)"),
         ("follower without lags", "beside = pd.concat(", "beside = T[self.temperatures] if len(T) else pd.concat("),
     ],
-    ("fem/modal/_tracking.py", "fem/test_tracking.py"): [
+    ("fem/modal/_pairing.py", "fem/test_tracking.py"): [
         ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
@@ -107,24 +107,22 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("which of two thermometers is wrong", "LEAST_OTHERS = 2", "LEAST_OTHERS = 1"),
     ],
-    ("fem/modal/_condensation.py", "fem/test_condensation.py"): [
+    ("fem/modal/_dense.py", "fem/test_condensation.py"): [
         ("certificate against missed modes", "return positive & (np.triu", "return (np.triu"),
     ],
     ("fem/_factors.py", "fem/test_factors.py"): [
         ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
         ("order of elimination", "solution[self._order] =", "solution[:] ="),
     ],
-    ("fem/modal/_near_modes.py", "fem/test_factors.py"): [
+    ("fem/modal/_sparse.py", "fem/test_factors.py"): [
         ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
     ],
-    ("fem/modal/_shift_invert.py", "fem/test_sparse.py"): [
+    ("fem/modal/_sparse.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
-    ("fem/modal/_beside_modes.py", "fem/test_local_modes.py"): [
+    ("fem/modal/_local_modes.py", "fem/test_local_modes.py"): [
         ("convergence of shape derivatives", "CONVERGED = 1e-5", "CONVERGED = 1e-1"),
         ("massless degrees of freedom", "(x + residuals)[:, ~going]", "x[:, ~going]"),
-    ],
-    ("fem/modal/_local_modes.py", "fem/test_local_modes.py"): [
         ("shape derivative along the mode itself", "-d_masses / 2", "-d_masses"),
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
         ("shape derivative of tracked modes", "model.local_modes(row, follow=True)", "model.local_modes(row)"),
@@ -132,10 +130,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_tables/arrays.py", "fem/test_linearise.py"): [
         ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
     ],
-    ("fem/sampling/_linearise.py", "fem/test_linearise.py"): [
+    ("fem/_evaluate.py", "fem/test_linearise.py"): [
         ("relative derivatives", "jacobian * rows[:, np.newaxis] / freq", "jacobian / freq"),
     ],
-    ("fem/sampling/_linearise.py", "fem/test_modes_at_sensors.py"): [
+    ("fem/_evaluate.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
     ("fleet/_workers.py", "fleet/test_fit_fleet.py"): [
@@ -144,7 +142,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
         ("p values allow for how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
-    ("fem/sampling/_chunks.py", "fem/test_progress.py"): [
+    ("fem/_evaluate.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),
     ],
     ("fem/affine/_reduced.py", "fem/test_reduced.py"): [
@@ -156,23 +154,21 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/affine/_core.py", "updating/test_pairing.py"): [
         ("modes beyond those of the model", "GUARD_MODES = 4", "GUARD_MODES = 0"),
     ],
-    ("updating/_comparison.py", "updating/test_pairing.py"): [
+    ("updating/_residuals.py", "updating/test_pairing.py"): [
         ("pairing where sensors are few", "NOMINAL_SHARE = 0.25", "NOMINAL_SHARE = 0.0"),
     ],
-    ("updating/_comparison.py", "updating/test_updater.py"): [
+    ("updating/_residuals.py", "updating/test_updater.py"): [
         ("derivative of tangents", "d_along / along**2", "d_along / along"),
+        ("slope of the loss", "weights * E / (secant * (1 + secant))", "weights * E / (1 + secant)"),
+        ("prior", "(theta - 1) / prior", "theta / prior"),
+        ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
+        ("information of shapes", "np.sqrt(2 * max(n_dofs - 1, 1))", "np.sqrt(max(n_dofs - 1, 1))"),
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
         ("parameters told apart", "values > np.sqrt(NO_INFORMATION) * values[0]", "values >= 0"),
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
-    ],
-    ("updating/_residuals.py", "updating/test_updater.py"): [
-        ("slope of the loss", "weights * E / (secant * (1 + secant))", "weights * E / (1 + secant)"),
-        ("prior", "(theta - 1) / prior", "theta / prior"),
-        ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
-        ("information of shapes", "np.sqrt(2 * max(n_dofs - 1, 1))", "np.sqrt(max(n_dofs - 1, 1))"),
     ],
     ("updating/_ensemble.py", "updating/test_ensemble.py"): [
         ("models that are all the most probable one", "weights * point.values - self.noise", "weights * point.values"),
@@ -181,16 +177,16 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_fit_report.py", "surrogate/test_report.py"): [
         ("a common factor counts as a hidden offset", " + COMMON**2 + ", " + "),
     ],
-    ("updating/_measured.py", "updating/test_updater_errors.py"): [
+    ("updating/_residuals.py", "updating/test_updater_errors.py"): [
         ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
     ],
-    ("updating/_optimise.py", "updating/test_search.py"): [
+    ("updating/_residuals.py", "updating/test_search.py"): [
         ("convergence beside failures", "success = bool(result.success) and", "success = bool(result.success) or"),
     ],
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/refinement/_posterior.py", "surrogate/test_refinement.py"): [
+    ("surrogate/inverse/_refinement.py", "surrogate/test_refinement.py"): [
         ("width of the prior of a box", "half / np.sqrt(3)", "half"),
         ("pull of the prior", "+ distance / self.prior.width", "+ distance"),
         ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
@@ -199,13 +195,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         ("steps that fail", "found.put(active[better], there.of(better))", "found.put(active, there)"),
         ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
-    ],
-    ("surrogate/refinement/_refinement.py", "surrogate/test_refinement.py"): [
         ("rows that stall", "np.where(lost, guess, np.exp(local.x))", "np.exp(local.x)"),
         ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
         ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
     ],
-    ("surrogate/refinement/_refinement.py", "surrogate/test_reduced_refinement.py"): [
+    ("surrogate/inverse/_refinement.py", "surrogate/test_reduced_refinement.py"): [
         ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [

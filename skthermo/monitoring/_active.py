@@ -123,7 +123,7 @@ class ActiveDetector(SavesFrames):
         per_year: float,
         persistence: int = 1,
     ) -> ActiveDetector:
-        """Learned from what the detector was fitted on; ``by_direction`` tells softening from stiffening."""
+        """Learned from what the detector was fitted on; ``by_direction`` distinguishes stiffening."""
         temperatures = [name for name in trained.columns if name not in targets]
         frequencies = as_floats(trained[targets])
         deviation = np.nanstd(frequencies, axis=0)

@@ -480,7 +480,7 @@ class Monitor(SavesFrames, Estimator):
         detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
         Values of faulty sensors do not train, nor do records that came too late.
 
-        The new detector is refused if the new records differ from the baseline, weather apart, from some day on or
+        The new detector is refused if the new records differ from the baseline, beyond the weather, from some day on or
         steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
         record's standard deviation: a detector that learned them would not see that change any more. It is refused if
         more of the new records are above its threshold, each evaluated by the others, than above the old one; if it

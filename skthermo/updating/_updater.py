@@ -46,9 +46,7 @@ from skthermo.updating._diagnostics import (
 )
 from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
 from skthermo.updating._identifiability import cramer_rao
-from skthermo.updating._measured import Measured, read_measured
-from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise, read_measured
 
 EVALUATIONS_PER_START = 10  # of the model, which a search is expected to take
 

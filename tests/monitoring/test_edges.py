@@ -179,6 +179,21 @@ def test_responses_may_have_any_sign_and_unit():
     assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]
 
 
+def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
+    records, targets = with_displacement(), [*MODES, "d"]
+    records = records.drop(columns=["e1", "e2"])
+    monitor = Monitor(detector(targets), sensors=False).fit(records[:N_BASELINE])
+    new = records[N_BASELINE : N_BASELINE + 60 * PER_DAY]
+    monitor.update(new.assign(d=new["d"] + 3.0))
+    assert monitor.state() == "alarm"
+    retraining = monitor.rebaseline(new.index[0])
+    assert retraining.table.loc["d", "change"] == pytest.approx(3.0, abs=0.2)
+    assert retraining.table.loc[MODES, "change"].abs().max() < 0.002
+    later = records[N_BASELINE + len(new) :][: 20 * PER_DAY]
+    assert (monitor.update(later.assign(d=later["d"] + 3.0))["state"] == "healthy").mean() > 0.9
+    assert set(monitor.update(records[N_BASELINE + len(new) + len(later) :][:40])["state"][SETTLED:]) == {"alarm"}
+
+
 def test_units_are_honest_and_checked():
     assert set(fitted().units_.values()) == {"", "°C"}
     assert {fitted(units="Hz").units_[name] for name in MODES} == {"Hz"}

@@ -60,11 +60,9 @@ from skthermo.metrics import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._memory import remembered
-from skthermo.surrogate._regression import TemperatureMapper
+from skthermo.surrogate._regression import TemperatureMapper, remembered
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
-from skthermo.surrogate.chain._inverse_of_chain import ChainInverse
 from skthermo.surrogate.chain._records import (
     RecordSimulator,
     TrainingRecords,
@@ -72,7 +70,14 @@ from skthermo.surrogate.chain._records import (
     measurement_noise,
     without_outliers,
 )
-from skthermo.surrogate.chain._thermal_model import ThermalModel, Weather, frequencies_of, possible, ratio_regressor
+from skthermo.surrogate.chain._stages import (
+    ChainInverse,
+    ThermalModel,
+    Weather,
+    frequencies_of,
+    possible,
+    ratio_regressor,
+)
 from skthermo.surrogate.inverse import InverseSurrogate
 
 START_SAMPLES, START_PENALTY = 200, 1e-3

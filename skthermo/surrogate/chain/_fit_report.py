@@ -25,8 +25,8 @@ from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.weather import SensorRegression
 from skthermo.surrogate.chain._fitted_chain import FittedChain
-from skthermo.surrogate.chain._inverse_of_chain import Estimates
 from skthermo.surrogate.chain._records import TrainingRecords
+from skthermo.surrogate.chain._stages import Estimates
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
 

@@ -39,7 +39,7 @@ from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
 from skthermo.residuals.weather import SensorRegression, warn_of_unseen
-from skthermo.surrogate.chain._thermal_model import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
+from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
 
 MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
 MOST_FOR_NOISE = 3000  # records, spread evenly, that the noise is estimated from

@@ -32,8 +32,8 @@ from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse._refinement import Refinement, unconverged
 from skthermo.surrogate.inverse._training import InverseColumns, Inversions, ShapeScores, SimulatedTraining, held_out
-from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
 MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given
