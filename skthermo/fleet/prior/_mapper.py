@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._estimators.arguments import check_flag
-from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.arrays import Array, as_columns, check_flag
 from skthermo._tables.frames import (
     check_same_rows,
     check_temperatures,
