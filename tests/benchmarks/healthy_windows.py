@@ -1,4 +1,4 @@
-"""Whether p values of `identify_damage` are ones: how often healthy windows of records look changed, and what is found.
+"""Calibration of the p values of `identify_damage` in healthy windows of records, and the damage that is identified.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/healthy_windows.py
 
