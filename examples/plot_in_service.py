@@ -113,7 +113,7 @@ history = track_parameters(fem, trusted[list(campaign.temperatures)], trusted[mo
 print(history.summary())
 print(history.rates[["per_year", "standard_error", "drifts"]].round(4).to_string())
 change = 100 * (history.table - 1)
-estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "lower", "upper"))
+estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "ci_low", "ci_high"))
 labels = {"labels": ("estimate", ""), "interval_label": "band of 95 %"}
 PredictionDisplay.from_predictions(
     estimate, None, *band, kind="lines", quantity="change of stiffness", unit="%", **labels

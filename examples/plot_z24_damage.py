@@ -138,7 +138,7 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 #    Averaged over all explanations: soil 17 % (between 0 and 22 %; damaged with probability 93 %); abutments 6 %
 #    (between 0 and 13 %; damaged with probability 58 %); girder_torsion 2 % (between 0 and 4 %; damaged with
 #    probability 57 %).
-#    girder_bending and piers cannot be told apart by these modes: only their common effect is known.
+#    girder_bending and piers cannot be distinguished by these modes: only their common effect is known.
 #    Compared: 110 records, worth 7.2 independent ones; with 2,800 training records, worth 99 independent ones.
 #    20 of 130 records could not be compared: 17 in weather far outside that of the training records and 3 far from the
 #    other records.

@@ -13,7 +13,7 @@ from numpydoc.validate import Validator, validate
 
 import skthermo
 import skthermo.fem
-from skthermo.fem.sampling._samples import Samples
+from skthermo.fem._samples import Samples
 
 ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
 

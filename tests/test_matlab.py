@@ -178,11 +178,11 @@ def test_a_crash_too_much_memory_and_too_much_time_are_errors_that_name_the_file
         read(file, mat_file(packed(zeros)))
     ending = tmp_path / "ending.py"
     ending.write_text("import os\nos.kill(os.getpid(), 11)\n")
-    monkeypatch.setattr("skthermo._io._damaged.CHILD", ending)
+    monkeypatch.setattr("skthermo._io._matrix_files.CHILD", ending)
     with pytest.raises(ValueError, match=r"any\.mat: .*reading it ended the process with exit code -?\d+"):
         read(file, mat_file(X))
     ending.write_text("import time\ntime.sleep(60)\n")
-    monkeypatch.setattr("skthermo._io._damaged.SECONDS", 0.2)
+    monkeypatch.setattr("skthermo._io._matrix_files.SECONDS", 0.2)
     with pytest.raises(ValueError, match=r"any\.mat: .*reading it took more than 0 s"):
         read(file, mat_file(X))
 

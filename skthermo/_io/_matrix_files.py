@@ -1,15 +1,85 @@
-"""Named matrices from the files that other programs write."""
+"""Files that may be damaged: SciPy reads them in a child process, with limits of memory and time.
 
+SciPy's readers follow the lengths that a file states; where these are damaged they can end the interpreter, or take
+all memory."""
+
+import json
+import os
+import pickle
 import re
-from collections.abc import Callable
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import scipy.sparse
 
-from skthermo._io._damaged import read_files, read_matlab
+from skthermo._io._child import read
 from skthermo._tables.arrays import Matrix
+
+CHILD = Path(__file__).with_name("_child.py")
+LEAST_MEMORY = 256_000_000
+TIMES_THE_FILE = 10
+EXPECTED = "ten times the size of the file or 256 MB (a sound file can be saved without compression)"
+SECONDS, BYTES_A_SECOND = 60, 1_000_000
+
+
+def read_matlab(file: Path) -> dict[str, Any]:
+    """Every variable of a MATLAB v5 file, or of the only one in a zip file.
+
+    Numbers become arrays of floats or complex numbers with all their dimensions, or sparse matrices; texts a list of
+    one text for each row; cell arrays a list of their values, the first dimension running fastest; structs a mapping
+    of their fields, and arrays of structs a list of such mappings. Anything else becomes None.
+    """
+    return read_files([(file, "MATLAB v5")])[0]
+
+
+def read_half(file: Path) -> Any:
+    """A symmetric matrix from lines of row, column and value for each entry of a half."""
+    return read_files([(file, "lines of row, column and value")])[0]
+
+
+def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
+    """What files hold; each comes with its form, one of the child's ``READERS``."""
+    size = sum(file.stat().st_size for file, _ in files)
+    most_memory = max(TIMES_THE_FILE * size, LEAST_MEMORY)
+    job = {"files": [(str(file), form) for file, form in files], "most_memory": most_memory}
+    results = []
+    with tempfile.TemporaryFile() as output:
+        end = _run(json.dumps(job), output, SECONDS + size / BYTES_A_SECOND)
+        output.seek(0)
+        for file, form in files:
+            try:
+                result = pickle.load(output)
+            except (EOFError, pickle.UnpicklingError):
+                result = ValueError(f"reading it {end}")
+            if isinstance(result, MemoryError):
+                result = f"it would take more than {most_memory / 1e6:.0f} MB of memory; expected at most {EXPECTED}"
+            if isinstance(result, ValueError | str):
+                raise ValueError(f"{file}: not readable as {form} ({result})")
+            results.append(result)
+    return results
+
+
+def _run(job: str, output: IO[bytes], seconds: float) -> str:
+    """Run the child; how it ended."""
+    name = Path(sys.executable or "").name.lower()
+    if getattr(sys, "frozen", False) or not name.startswith(("python", "pypy")):  # a program that embeds Python
+        for file, form in json.loads(job)["files"]:
+            pickle.dump(read(file, form), output)
+        return "failed"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command, pipes = [sys.executable, "-P", str(CHILD)], {"stdout": output, "stderr": subprocess.PIPE}
+    try:
+        done = subprocess.run(command, input=job.encode(), env=environment, timeout=seconds, check=False, **pipes)
+    except subprocess.TimeoutExpired:
+        return f"took more than {seconds:.0f} s"
+    return f"ended the process with exit code {done.returncode} {done.stderr[-300:].decode(errors='replace')}".strip()
+
 
 HALVES = dict.fromkeys((".sti", ".mas", ".txk", ".txm"), "lines of row, column and value")
 FORMS = {".mtx": "Matrix Market", ".npz": "a sparse matrix of scipy.sparse.save_npz"} | HALVES

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._estimators.regressors import warn_of_fleet
 from skthermo._estimators.warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
@@ -22,11 +21,11 @@ from skthermo._tables.frames import (
     check_temperatures,
     column_names,
     frame_like,
+    has_stamps,
     positions_of,
     warn_of_disorder,
     warn_of_markers,
 )
-from skthermo._tables.times import has_stamps
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -37,6 +36,7 @@ from skthermo._validation import (
     check_is_fitted,
     last_step,
     validate_data,
+    warn_of_fleet,
 )
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes

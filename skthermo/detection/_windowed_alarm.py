@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import correlation_time
+from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._laws import CountLaw, MeanLaw

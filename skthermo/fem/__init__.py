@@ -1,5 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling."""
 
+from skthermo.fem._evaluate import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 from skthermo.fem._protocol import (
     BatchModel,
     DamageableModel,
@@ -13,7 +14,6 @@ from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
-from skthermo.fem.sampling import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 
 __all__ = [
     "AffineModel",

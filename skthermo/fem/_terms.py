@@ -1,7 +1,8 @@
-"""Matrices that are affine in products of the parameters."""
+"""Rows of theta, and matrices that are affine in products of its parameters."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,9 +12,49 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
+from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, Matrix, as_dense
+from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import Elimination, elimination
-from skthermo.fem._theta import ROWS_PER_CHUNK
+
+ROWS_PER_CHUNK = 256  # largest number of samples solved together
+
+
+def nominal_theta(n_parameters: int) -> Array:
+    """One row of ones: every parameter at its nominal value."""
+    return np.ones((1, n_parameters))
+
+
+def warn_of_failures(theta: Array, solved: Array) -> None:
+    """Warn of rows without NaN that have no solution: their number and the theta of the first."""
+    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
+    if failed.any():
+        first = np.flatnonzero(failed)[0]
+        warn_user(
+            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
+            f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
+            ModelWarning,
+            "no solution",
+        )
+
+
+def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:
+    """Multipliers by parameter name, for messages."""
+    return dict(zip(parameter_names, row.tolist(), strict=True))
+
+
+@contextmanager
+def failures_named(rows: Array, parameter_names: Sequence[str]) -> Iterator[None]:
+    """Re-raise a user function's error with its theta."""
+    try:
+        yield
+    except Exception as error:
+        many = f"{len(rows)} rows from " if rows.ndim == 2 else ""
+        theta = by_name(np.atleast_2d(rows)[0], parameter_names)
+        raise RuntimeError(
+            f"the model's function failed at {many}theta = {theta}: {type(error).__name__}: {error}"
+        ) from error
+
 
 SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
 

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import false_discovery_control, genpareto
 
-from skthermo._estimators.arguments import check_size
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_size
 from skthermo._tables.text import counted_number, listed, percent, significant
 from skthermo.monitoring import Monitor
 
@@ -93,20 +92,15 @@ class Discoveries:
         """
         names, is_open = self.bridges, self.table["end"].isna()
         n_open = self.table.loc[is_open, "bridge"].nunique()
-        alarms, false = (
-            counted_number(float(significant(number, 2)), what)
-            for number, what in (
-                (self.false_alarms_per_year, "false alarm"),
-                (self.false_discoveries_per_year, "false discovery"),
-            )
-        )
+        alarms = counted_number(float(significant(self.false_alarms_per_year, 2)), "false alarm")
+        false = significant(self.false_discoveries_per_year, 2)
         found = f"{len(names)} of them significantly after correction for many bridges{': ' if names else ''}"
         lines = [
             f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
             if n_open
             else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
-            f"If all bridges stay healthy, expect {alarms} a year over all bridges, and {false}; of the significant "
-            f"bridges {percent(self.fdr)} are healthy on average.",
+            f"If all bridges stay healthy, expect {alarms} a year over all bridges, {false} of them significant; "
+            f"of the significant bridges {percent(self.fdr)} are healthy on average.",
         ]
         if self.not_evaluated:
             lines.append(f"Not evaluated, and so not known to be healthy: {listed(self.not_evaluated)}.")
@@ -132,11 +126,10 @@ def discover(
             not_evaluated.append(name)
             watched.pop(name, None)
     tables, p_values, years = [], {}, {}
-    for name, events in watched.items():
-        table, n_years = events.table, events.n_years
+    for name, (table, since, n_years) in watched.items():
         if len(table):
             shape = tail_shape([one for other, one in excesses.items() if other != name])
-            p = monitors[name].event_p_values(events.since, tail_shape=shape)
+            p = monitors[name].event_p_values(since, tail_shape=shape)
             table = table.assign(p_value=p.reindex(table.index)).reset_index().assign(bridge=name)[COLUMNS]
         is_blind = standings[name]["state"] == "not evaluated" or not n_years
         if (is_blind and not len(table)) or (len(table) and table["p_value"].isna().any()):
@@ -154,23 +147,15 @@ def discover(
     return Discoveries(fdr, table, p, level, not_evaluated, false, expected)
 
 
-@dataclass(frozen=True)
-class _Watched:
-    """Events of a monitor that are open or have ended since a time, and the years that it has evaluated since then."""
-
-    table: pd.DataFrame
-    since: pd.Timestamp
-    n_years: float
-
-
-def _events_since(monitor: Monitor, begin: pd.Timestamp) -> _Watched:
+def _events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, pd.Timestamp, float]:
+    """Events that are open or have ended since a time, that time in their zone, and years evaluated since then."""
     events = monitor.events_
     events = events[(events["kind"] == "damage") & ~events["harmless"].astype(bool)]
     if not len(monitor.days_) or pd.isna(begin):
-        return _Watched(events.iloc[:0], begin, 0.0)
+        return events.iloc[:0], begin, 0.0
     since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
     events = events[events["end"].isna() | (events["end"] >= since)]
-    return _Watched(events, since, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]])))
+    return events, since, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]]))
 
 
 def tail_shape(excesses: Sequence[Array]) -> float | None:

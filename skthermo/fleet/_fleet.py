@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.arguments import check_jobs, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
+from skthermo._tables.arrays import check_jobs, check_path
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, pickled, unpickled
@@ -28,12 +28,8 @@ SILENT = 7  # days without a record, after which a bridge counts as silent
 ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
 
 
-def in_words(fleet: Fleet) -> str:
-    """What was fitted, and how the bridges stand."""
-    return "\n".join(_sentences(fleet))
-
-
 def _sentences(fleet: Fleet) -> Iterator[str]:
+    """What was fitted, and how the bridges stand."""
     table = fleet.table
     broken = table.index[~table["is_fitted"]]
     yield f"{int(table['is_fitted'].sum())} of {len(table)} bridges are fitted."
@@ -360,7 +356,7 @@ class Fleet:
         str
             Plain sentences.
         """
-        return in_words(self)
+        return "\n".join(_sentences(self))
 
     def _states(self) -> dict[str, int]:
         return pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts().to_dict()

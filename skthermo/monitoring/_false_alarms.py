@@ -14,9 +14,9 @@ from scipy.stats import gamma, nbinom
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
-from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
 
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
@@ -364,10 +364,9 @@ def _unseen_season(stamps: pd.DatetimeIndex) -> str:
     seen[(days[:, np.newaxis] + np.arange(-NEAR, NEAR + 1)) % 365] = True
     if seen.all():
         return ""
-    turned = np.roll(np.arange(365), -int(seen.argmax()))  # begins with a day that is seen
-    run = np.zeros(365, dtype=int)
-    for place in range(1, 365):
-        run[place] = 0 if seen[turned[place]] else run[place - 1] + 1
-    last = int(run.argmax())
-    ends = [pd.Timestamp("2001-01-01") + pd.Timedelta(days=int(turned[i])) for i in (last - run[last] + 1, last)]
+    at = np.flatnonzero(np.tile(seen, 2))
+    longest = int(np.diff(at).argmax())
+    ends = [
+        pd.Timestamp("2001-01-01") + pd.Timedelta(days=int(day % 365)) for day in at[[longest, longest + 1]] + [1, -1]
+    ]
     return f"{(~seen).sum()} days of the year ({' to '.join(f'{day.day} {day.month_name()}' for day in ends)})"

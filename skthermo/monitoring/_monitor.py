@@ -13,12 +13,11 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.frames import positions_of
+from skthermo._tables.arrays import check_flag
+from skthermo._tables.frames import DAY, YEAR, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
-from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -480,7 +479,7 @@ class Monitor(SavesFrames, Estimator):
         detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
         Values of faulty sensors do not train, nor do records that came too late.
 
-        The new detector is refused if the new records differ from the baseline, weather apart, from some day on or
+        The new detector is refused if the new records differ from the baseline, beyond the weather, from some day on or
         steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
         record's standard deviation: a detector that learned them would not see that change any more. It is refused if
         more of the new records are above its threshold, each evaluated by the others, than above the old one; if it

@@ -135,8 +135,20 @@ class MonitorState(SavesFrames):
             for kind, number in found.items():
                 numbers[kind][own] = number
         reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :])
-        reasons = _with_stiffening(known["reason"].tolist() + reasons, numbers, len(known))
-        answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, seen.is_held)
+        reasons = known["reason"].tolist() + reasons
+        before = self.evaluations["state"].iloc[: self.evaluations.index.searchsorted(begin.day)]
+        pending = _pending(
+            (index > active.threshold) & (numbers[DAMAGE] == 0), seen.is_held | np.isnan(index), [*before[-1:]]
+        )
+        remarks = {
+            "stiffer than the baseline": numbers.get(STIFFENING, np.zeros(len(raw))) > 0,
+            "above the threshold, not yet for long": pending,
+        }
+        for row in range(len(known), len(raw)):
+            said = [reasons[row], *(remark for remark, rows in remarks.items() if rows[row])]
+            reasons[row] = "; ".join(filter(None, said))
+        is_held = seen.is_held | pending
+        answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
         points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
         evaluations = pd.concat([self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)], answers])
@@ -211,21 +223,24 @@ class MonitorState(SavesFrames):
 
 def _not_closing(index: Array, seen: Corrected, active: ActiveDetector) -> Array:
     """Indices by which events open and close: where a response was set aside, the others cannot close one."""
-    with np.errstate(invalid="ignore"):
-        return np.where(seen.is_held & ~(index > active.rules[DAMAGE].release), np.nan, index)
+    above = np.nextafter(active.rules[DAMAGE].release, np.inf)
+    return np.where(seen.is_held, np.maximum(index, above), index)
+
+
+def _pending(is_above: NDArray[np.bool_], is_unknown: NDArray[np.bool_], before: Sequence[str]) -> NDArray[np.bool_]:
+    """Records above the threshold, but not for long enough for an alarm, just after some that were not evaluated.
+
+    ``before`` is the state of the record before the first one, if there is one.
+    """
+    pending = np.zeros(len(is_above), dtype=bool)
+    for row in np.flatnonzero(is_above & ~is_unknown):
+        pending[row] = "not evaluated" in before if row == 0 else is_unknown[row - 1] or pending[row - 1]
+    return pending
 
 
 def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Checkpoint]:
     """The checkpoints from the last one before a time on."""
     return points[max(n for n, one in enumerate(points) if n == 0 or one.day <= horizon) :]
-
-
-def _with_stiffening(reasons: list[str], numbers: dict[str, NDArray[np.int64]], n_known: int) -> list[str]:
-    """Reasons that say so of records, from a position on, that are stiffer than the baseline."""
-    stiffer = np.flatnonzero(numbers.get(STIFFENING, np.zeros(0)) > 0)
-    for row in stiffer[stiffer >= n_known]:
-        reasons[row] = "; ".join(filter(None, [reasons[row], "stiffer than the baseline"]))
-    return reasons
 
 
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:

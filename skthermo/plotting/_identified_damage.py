@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._tables.text import chance_text
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, drawing, label_of, plain, shortened
+from skthermo.plotting._display import BLACK, BLUE, GREY, LIGHT, ORANGE, Display, drawing, label_of, plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,10 +34,10 @@ class IdentifiedDamageDisplay(Display):
     Parameters
     ----------
     identified : IdentifiedDamage
-        With the frames ``told`` (explanations in rows, the most probable first; probability), ``table`` (causes in
-        rows; probability, severity, lowest, highest, and perhaps highest_if_damaged) and ``shifts`` (modes in rows;
-        measured, explained, standard_error; relative), and perhaps the names ``unseen`` of causes that the modes do not
-        show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
+        With the frames ``summary_table`` (explanations in rows, the most probable first; probability), ``table``
+        (causes in rows; probability, severity, ci_low, ci_high, and perhaps highest_if_damaged) and ``shifts`` (modes
+        in rows; measured, explained, standard_error; relative), and perhaps the names ``unobservable`` of causes that
+        the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
 
     Attributes
     ----------
@@ -63,7 +62,7 @@ class IdentifiedDamageDisplay(Display):
     >>> from types import SimpleNamespace
     >>> from skthermo.plotting import IdentifiedDamageDisplay
     >>> identified = SimpleNamespace(
-    ...     told=pd.DataFrame({"probability": [0.8, 0.2]}, ["piers 20 %", "deck 4 %, piers 12 %"]),
+    ...     summary_table=pd.DataFrame({"probability": [0.8, 0.2]}, ["piers 20 %", "deck 4 %, piers 12 %"]),
     ...     table=pd.DataFrame(
     ...         {"probability": [0.2, 1.0], "severity": [0.01, 0.18], "ci_low": [0, 0.1], "ci_high": [0.04, 0.22]},
     ...         ["deck", "piers"]),
@@ -98,7 +97,7 @@ class IdentifiedDamageDisplay(Display):
         ValueError
             If a frame is missing.
         """
-        missing = [name for name in ("told", "table", "shifts") if not hasattr(identified, name)]
+        missing = [name for name in ("summary_table", "table", "shifts") if not hasattr(identified, name)]
         if missing:
             raise ValueError(
                 f"identified is a {type(identified).__name__} without {missing}; expected an IdentifiedDamage"
@@ -118,7 +117,7 @@ class IdentifiedDamageDisplay(Display):
         IdentifiedDamageDisplay
             Itself.
         """
-        has_long_labels = self.identified.told.index[:MOST_BARS].astype(str).str.len().max() > LABEL
+        has_long_labels = self.identified.summary_table.index[:MOST_BARS].astype(str).str.len().max() > LABEL
         height = max(4.9 if has_long_labels else 3.8, 1.4 + 0.3 * len(self.identified.table))
         names = ["explanations", "severities", "shifts"]
         explanations, severities, shifts = self._take_axes(ax, names, (4.6, height), n_columns=3)
@@ -131,7 +130,7 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_explanations(self, ax: Axes) -> BarContainer:
         """Bars with the causes above and the probability behind them."""
-        told = 100 * self.identified.told["probability"].astype(float)
+        told = 100 * self.identified.summary_table["probability"].astype(float)
         shown = told.iloc[:MOST_BARS]
         if (others := 100 - shown.sum()) >= 0.1:
             shown = pd.concat([shown, pd.Series({"all others": others})])
@@ -151,8 +150,8 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_severities(self, ax: Axes) -> ErrorbarContainer:
         """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
-        table, unseen = self.identified.table, set(getattr(self.identified, "unseen", ()))
-        places, is_known = np.arange(len(table)), ~table.index.isin(unseen)
+        table, unobservable = self.identified.table, set(getattr(self.identified, "unobservable", ()))
+        places, is_known = np.arange(len(table)), ~table.index.isin(unobservable)
         severity, lowest, highest = 100 * table[["severity", "ci_low", "ci_high"]].to_numpy(dtype=float).T
         probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()
         if "highest_if_damaged" in table:

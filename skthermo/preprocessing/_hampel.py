@@ -11,11 +11,17 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
-from skthermo._tables.frames import Table, check_positions_are_names, frame_like, positions_of
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import (
+    Table,
+    as_duration,
+    check_positions_are_names,
+    frame_like,
+    has_stamps,
+    positions_of,
+    row_times,
+)
 from skthermo._validation import Interval
 from skthermo.preprocessing._records import RecordTransformer
-from skthermo.preprocessing._stamps import as_duration
 from skthermo.preprocessing._weather_regression import WeatherRegression
 
 LEAST_WINDOW = 3  # rows

@@ -172,7 +172,9 @@ def draw_identified_damage(identified: IdentifiedDamage) -> Html:
         axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
         return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
 
-    told = ", ".join(f"{label}: {chance_text(row['probability'])}" for label, row in identified.told.head(3).iterrows())
+    told = ", ".join(
+        f"{label}: {chance_text(row['probability'])}" for label, row in identified.summary_table.head(3).iterrows()
+    )
     alt = f"Explanations with their probabilities ({told}), severities, and measured and explained shifts."
     return draw(make, alt, height=sum(heights))
 

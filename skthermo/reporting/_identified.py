@@ -36,7 +36,7 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
             "bounds that hold this with a probability of 90 %. The last column is what a group, if it has changed, "
             "does not exceed with a probability of 95 %.",
             ["Group", "Probability", "What changes", "On average", "Bounds", "If changed, up to"],
-            [_row(str(cause), row, cause in identified.unseen) for cause, row in identified.table.iterrows()],
+            [_row(str(cause), row, cause in identified.unobservable) for cause, row in identified.table.iterrows()],
         ),
         _shifts(identified),
         figure(
@@ -50,7 +50,7 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
 
 def _explanations(identified: IdentifiedDamage) -> Html:
     """Explanations, the most probable first."""
-    told = identified.told[identified.told["probability"] >= LEAST]
+    told = identified.summary_table[identified.summary_table["probability"] >= LEAST]
     explanations = [
         [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
     ]

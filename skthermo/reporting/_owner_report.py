@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
-from skthermo._estimators.arguments import check_path, check_size
 from skthermo._io import write_when_complete
+from skthermo._tables.arrays import check_path, check_size
 from skthermo._tables.text import counted
 from skthermo.fem import Structure
 from skthermo.fleet import Fleet
@@ -94,7 +94,7 @@ def owner_report(
     drift_limit : float, default=0.1
         Loss of stiffness of which the page on a monitor says when slow drift reaches it.
     fdr : float, default=0.1
-        Share of false ones among the events of all bridges that the page on a fleet singles out, on average.
+        False discovery rate: share of healthy ones among the significant bridges of the page on a fleet, on average.
     now : time, optional
         When the page on a monitor or a fleet is written, in the time zone of the records; by default the clock's time.
 

@@ -10,16 +10,16 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
-from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array, patterns
-from skthermo._tables.times import correlation_times
+from skthermo._tables.frames import correlation_times
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.scatter import Scatter
 from skthermo.residuals.weather import (
     TrainingRange,
+    WeatherFunctions,
     nearest_in_parts,
     one_in_each_part,
     order_statistic,
@@ -35,8 +35,6 @@ OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold
 SIMILAR = 0.1  # share of the records whose weather counts as similar, in means
 JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
-MOST_COORDINATES = 3  # of the weather, of which predictions count as quadratic functions
-COLD_AND_HOT = 0.15, 0.85  # quantiles of the first coordinate beyond which their slope may be another
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
 
 
@@ -111,28 +109,17 @@ class BaselineResiduals:
     def prediction_weights(self, weather: Array) -> Array:
         """Weight of each record in the mean of the healthy predictions over all rows, (n_records, n_modes).
 
-        The predictions count as least squares on `weather_functions`, and what these leave as its mean in similar
+        The predictions count as least squares on `WeatherFunctions`, and what these leave as its mean in similar
         weather: the mapper errs alike for a season, the most in the coldest and the warmest.
         """
-        weights, of_records = self.shares(weather), self.weather_functions(self.weather)
-        wanted = self.weather_functions(weather[~np.isnan(weather).any(axis=1)])
+        weights, functions = self.shares(weather), WeatherFunctions.of(self.weather)
+        of_records = functions.values(self.weather)
+        wanted = functions.values(weather[~np.isnan(weather).any(axis=1)], is_clipped=True)
         for column, known in zip(weights.T, ~np.isnan(self.values.T), strict=True):
             if known.any() and len(wanted):
                 some = of_records[known]
                 column[known] += np.linalg.pinv(some).T @ (wanted.mean(axis=0) - some.T @ column[known])
         return weights
-
-    def weather_functions(self, weather: Array) -> Array:
-        """Quadratic functions of the leading weather coordinates, and hinges of the first, (n_samples, n_functions).
-
-        Weather outside that of the records counts as the nearest that they had.
-        """
-        known, places = (one[:, :MOST_COORDINATES] for one in (self.places, self.coordinates.transform(weather)))
-        deviations = np.maximum(known.std(axis=0), np.finfo(float).tiny)
-        places = np.clip(places, known.min(axis=0), known.max(axis=0)) / deviations
-        cold, hot = np.quantile(known[:, 0] / deviations[0], COLD_AND_HOT)
-        hinges = np.maximum(cold - places[:, :1], 0.0), np.maximum(places[:, :1] - hot, 0.0)
-        return np.hstack([PolynomialFeatures(2).fit_transform(places), *hinges])
 
     def n_expected(self, weather: Array) -> Array:
         """Effective sample size of the mean of the expected residuals over all rows, (n_modes,); 0 without any."""

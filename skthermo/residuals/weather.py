@@ -15,8 +15,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, range_sums
-from skthermo._tables.frames import column_names, frame_like
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import column_names, frame_like, has_stamps, row_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.residuals.gaussian import Gaussian
 
@@ -32,6 +31,8 @@ FEWEST = 36  # records in a mean departure of a sensor
 LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
 TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
 MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
+MOST_COORDINATES = 3  # of the weather, of which there are functions
+COLD_AND_HOT = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
 A_DEGREE = 1.0  # below which thermometers may differ without a fault
 
 
@@ -307,6 +308,46 @@ def _telling_rows(values: Array) -> Array:
     if 2 * len(complete) >= n_rows or (most < n_rows and len(complete) >= 10 * n_sensors):
         return values[complete[one_in_each_part(len(complete), MOST_LEARNED)]]
     return values[one_in_each_part(n_rows, most)]
+
+
+@dataclass(frozen=True)
+class WeatherFunctions:
+    """Functions of the weather, of which a sum stands for what a mapper may have mislearned.
+
+    A constant, principal coordinates of the standardised weather and their squares, and two hinges of the first one.
+    """
+
+    mean: Array
+    directions: Array
+    ends: Array
+    reach: Array
+
+    @classmethod
+    def of(cls, weather: Array) -> WeatherFunctions:
+        """The functions for records, (n_records, n_inputs), without gaps in those that count."""
+        known = weather[~np.isnan(weather).any(axis=1)]
+        scaler, components = (step for _, step in weather_coordinates(known).steps)
+        directions = components.components_[:MOST_COORDINATES] / scaler.scale_
+        centre = scaler.mean_ + components.mean_ * scaler.scale_
+        spread = ((known - centre) @ directions.T).std(axis=0)
+        directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
+        places = (known - centre) @ directions.T
+        ends = np.quantile(places[:, 0], COLD_AND_HOT)
+        return cls(centre, directions, ends, np.array([places.min(axis=0), places.max(axis=0)]))
+
+    @property
+    def size(self) -> int:
+        """Number of functions."""
+        return 2 * len(self.directions) + 3
+
+    def values(self, weather: Array, *, is_clipped: bool = False) -> Array:
+        """All functions, (n_records, size); weather outside that of the records may count as the nearest of theirs."""
+        places = (weather - self.mean) @ self.directions.T
+        if is_clipped:
+            places = np.clip(places, *self.reach)
+        first, (low, high) = places[:, :1], self.ends
+        hinges = [np.maximum(low - first, 0.0), np.maximum(first - high, 0.0)]
+        return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
 
 
 def weather_coordinates(weather: Array) -> Pipeline:

@@ -1,14 +1,19 @@
-"""Regressors of multipliers: the temperature mapper M2, the base that it shares with M1, and what they hold."""
+"""Regressors that predict multipliers, and results that are kept in a folder, so that no search computes them again."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from pathlib import Path
+from pickle import PicklingError
+from typing import Any, Literal, TypeVar, overload
+from warnings import WarningMessage
 
+import joblib
 import numpy as np
 import pandas as pd
+import sklearn
 from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -16,11 +21,13 @@ from sklearn.linear_model import RidgeCV
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
+from sklearn.utils.validation import check_memory
 
-from skthermo._estimators.arguments import check_flag, columns_by_name
-from skthermo._estimators.regressors import check_takes_weights, fit_outputs, predict_with_std
+import skthermo
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._tables.arrays import Array, as_columns
+from skthermo._estimators.warnings import give_again, recorded
+from skthermo._io import lock
+from skthermo._tables.arrays import Array, as_columns, check_flag, columns_by_name
 from skthermo._tables.frames import (
     Table,
     check_columns,
@@ -37,13 +44,78 @@ from skthermo._validation import (
     _fit_context,
     check_array,
     check_is_fitted,
+    check_takes_weights,
+    fit_outputs,
+    predict_with_std,
     seed_parts,
     seeded,
     validate_data,
 )
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import HingeFeatures
-from skthermo.surrogate._memory import remembered
+
+Result = TypeVar("Result")
+
+
+def content_of(*parts: Any) -> str:
+    """A text that is the same for equal contents in every process, and another one for other contents or versions.
+
+    Each part counts by itself, whether or not others hold the same objects.
+    """
+    try:
+        hashes = [joblib.hash(_in_order(part), coerce_mmap=True) for part in parts]
+    except PicklingError as error:
+        raise ValueError(
+            f"memory cannot recognise {parts[0]!r:.200}; expected one that can be pickled, with functions and classes "
+            "from a module that can be imported (no lambda, nothing from a script, a notebook or a function), or "
+            "memory=None"
+        ) from error
+    return joblib.hash((skthermo.__version__, sklearn.__version__, *hashes))
+
+
+def _in_order(part: Any) -> Any:
+    """An array with its values row by row, as it is when read from a file."""
+    return np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part
+
+
+def folder_of(memory: str | Memory | None) -> Path | None:
+    """Where results are kept; None where they are not."""
+    location = getattr(memory, "location", memory)
+    return None if location is None else Path(location)
+
+
+def remembered(
+    memory: str | Memory | None, kind: str, make: Callable[[], Result], content: Callable[[], tuple[Any, ...]]
+) -> Result:
+    """What ``make`` returns, which depends on the content alone: read from the memory if it is there.
+
+    Warnings come again with it. If several processes need the same, one makes it and the others wait.
+    """
+    try:
+        memory = check_memory(memory)
+    except OSError as error:
+        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
+    folder = folder_of(memory)
+    if folder is None:
+        return make()
+    identity = content_of(*content())
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / f"{kind}-{identity}.lock", "w") as file:
+        lock(file)
+        known = memory.cache(made, ignore=["make"])
+        if not known.check_call_in_cache(kind, identity, make):
+            known(kind, identity, make)
+        result, told = known(kind, identity, make)  # what is read has the same layout, and bits, each time
+    give_again(told)
+    return result
+
+
+def made(kind: str, identity: str, make: Callable[[], Any]) -> tuple[Any, list[WarningMessage]]:
+    """A result, and the warnings that came with it."""
+    with recorded() as told:
+        result = make()
+    return result, told
+
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},

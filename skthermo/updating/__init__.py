@@ -1,7 +1,6 @@
 """Calibration of FE models to measured modes: sensitivities, identifiability, model updating."""
 
-from skthermo.updating._identifiability import cramer_rao, identifiability
-from skthermo.updating._sensitivity import select_parameters, sensitivity
+from skthermo.updating._identifiability import cramer_rao, identifiability, select_parameters, sensitivity
 from skthermo.updating._updater import ModelUpdater
 
 __all__ = ["ModelUpdater", "cramer_rao", "identifiability", "select_parameters", "sensitivity"]

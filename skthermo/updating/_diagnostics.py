@@ -7,13 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.arguments import seem_rad_per_s
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, seem_rad_per_s
 from skthermo.fem import FEModel, ModalModel, share_reordered
-from skthermo.updating._comparison import macs, paired_modes
-from skthermo.updating._measured import Measured
-from skthermo.updating._optimise import Outcome
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 
 LOW_MAC = 0.5  # MAC below which a measured shape is not that of the mode it is paired with
 DISTANCE_AT_BOUND = 1e-4

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 from joblib import delayed
 
-from skthermo._effects.frequencies import read_groups
-from skthermo._estimators.arguments import check_names
+from skthermo._effects import read_groups
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
-from skthermo.updating._measured import Measured
-from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._residuals import Point, Residuals
+from skthermo.updating._residuals import Measured, Outcome, Point, Residuals, optimise
 
 WIDEST = 4.0
 """Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays

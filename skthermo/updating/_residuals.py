@@ -1,11 +1,227 @@
-"""The residuals that model updating minimises."""
+"""Measured modes, the model's modes paired with them, the residuals between them and the search for their minimum."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_assignment, minimize
 
-from skthermo._tables.arrays import Array
-from skthermo.fem import FEModel
-from skthermo.updating._comparison import PairedModes, paired_modes, tangent_derivatives, tangents
-from skthermo.updating._measured import Measured
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import warn_user
+from skthermo._tables.arrays import Array, as_floats, by_name, central_differences, check_dofs, real_array, shape_array
+from skthermo.exceptions import RecordsWarning
+from skthermo.fem import FEModel, LocalModel
+
+
+@dataclass
+class Measured:
+    """Modes that were measured, each with a frequency, a shape or both."""
+
+    names: list[str]
+    columns: NDArray[np.intp]  # of these modes in F
+    frequencies: Array  # means over records in Hz; NaN where only the shape was measured
+    deviations: Array  # standard deviations in Hz by which residuals are divided
+    shapes: Array  # (n_dofs, n_measured), of unit length; NaN where only the frequency was measured
+    dofs: NDArray[np.intp]  # empty where no shapes were measured
+    shape_weights: Array  # 0 where no shape was measured
+
+    @property
+    def has_frequency(self) -> NDArray[np.bool_]:
+        """Modes with a measured frequency."""
+        return np.isfinite(self.frequencies)
+
+    @property
+    def has_shape(self) -> NDArray[np.bool_]:
+        """Modes with a measured shape."""
+        return _given(self.shapes)
+
+    @property
+    def n_residuals(self) -> int:
+        """Number of independent residuals: a shape has one less than degrees of freedom, since its scale is free."""
+        weighted = self.has_shape & (self.shape_weights > 0)
+        return int(self.has_frequency.sum() + weighted.sum() * max(len(self.dofs) - 1, 0))
+
+
+def read_measured(
+    F: Array,
+    names: list[str],
+    shapes: ArrayLike | None,
+    dofs: ArrayLike | None,
+    frequency_std: ArrayLike | None,
+    shape_weight: ArrayLike,
+    n_dof: int,
+) -> Measured:
+    """Means over records, with shapes and weights, of the modes that were measured."""
+    n_modes = F.shape[1]
+    wrong = np.argwhere(~(np.isnan(F) | ((F > 0) & np.isfinite(F))))
+    if wrong.size:
+        row, column = wrong[0]
+        raise ValueError(
+            f"frequency {names[column]!r} of record {row} is {F[row, column]}; expected Hz above 0, or NaN"
+        )
+    counts = np.isfinite(F).sum(axis=0)
+    means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
+    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
+    weights = _per_mode(shape_weight, names, "shape_weight")
+    if (weights < 0).any() or not np.isfinite(weights).all():
+        raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
+    if not places.size and weights.any():
+        raise ValueError(
+            f"shape_weight is {shape_weight!r} but no shapes were given; expected shapes, or a weight of 0"
+        )
+    with_shape = _given(unit)
+    columns = np.flatnonzero((counts > 0) | with_shape)
+    if not columns.size:
+        raise ValueError(f"F is NaN in all {len(F)} records of all {n_modes} modes; expected a measured frequency")
+    return Measured(
+        names=[names[i] for i in columns],
+        columns=columns,
+        frequencies=means[columns],
+        deviations=_read_deviations(frequency_std, means, names)[columns],
+        shapes=unit[:, columns],
+        dofs=places,
+        shape_weights=np.where(with_shape, weights, 0.0)[columns],
+    )
+
+
+def _real_shapes(shapes: NDArray) -> Array:
+    """Real parts of complex shapes, each rotated by the phase that makes its real part largest."""
+    squares = np.nansum(shapes**2, axis=0)
+    turned = shapes * np.exp(-0.5j * np.angle(squares))
+    lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
+    lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
+    warn_user(
+        f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
+        "shape's length, is dropped",
+        RecordsWarning,
+        "complex shapes",
+    )
+    return np.where(np.isnan(shapes), np.nan, turned.real)
+
+
+def _given(shapes: Array) -> NDArray[np.bool_]:
+    """Which columns hold a measured shape: not those that are NaN throughout, and none if there are no rows."""
+    return np.asarray(np.isfinite(shapes).any(axis=0))
+
+
+def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tuple[NDArray[np.intp], Array]:
+    if (shapes is None) != (dofs is None):
+        given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
+        raise ValueError(f"{given} were given without {missing}; expected both, or neither")
+    if shapes is None:
+        return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
+    places = check_dofs(dofs, n_dof)
+    array = shape_array(shapes, "shapes")
+    if array.shape != (len(places), n_modes):
+        raise ValueError(
+            f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
+            "column for each mode of F"
+        )
+    array = _real_shapes(array) if np.iscomplexobj(array) else array
+    for name, column in zip(names, array.T, strict=True):
+        if np.isnan(column).any() and not np.isnan(column).all():
+            row = np.flatnonzero(np.isnan(column))[0]
+            raise ValueError(f"the shape of {name!r} is NaN in row {row} but not in all; expected all rows or none")
+        if np.isinf(column).any() or not column.any():
+            raise ValueError(f"the shape of {name!r} is zero throughout or infinite; expected a mode shape")
+    return places, array / np.linalg.norm(array, axis=0)
+
+
+def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[str]) -> Array:
+    """Standard deviations in Hz; without any, the frequencies themselves, for a weight of 1."""
+    if frequency_std is None:
+        return means
+    deviations = _per_mode(frequency_std, names, "frequency_std")
+    wrong = np.flatnonzero(np.isfinite(means) & ~((deviations > 0) & np.isfinite(deviations)))
+    if wrong.size:
+        raise ValueError(
+            f"frequency_std of {names[wrong[0]]!r} is {deviations[wrong[0]]}; expected a positive number in Hz"
+        )
+    return deviations
+
+
+def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
+    n_modes = len(names)
+    array = real_array(by_name(values, names, what, "modes"), what)
+    if array.shape not in ((), (n_modes,)):
+        raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
+    return np.broadcast_to(array, (n_modes,)).copy()
+
+
+DIFFERENCE_STEP = 1e-3  # relative step of central differences for a model without ``jacobian``
+NOMINAL_SHARE = 0.25
+"""Weight of the MAC with the nominal modes beside the MAC with the measured shapes. It decides where sensors are so few
+that several modes look the same at them."""
+
+
+@dataclass
+class PairedModes:
+    """The model's modes at one theta, one for each measured mode and in their order."""
+
+    frequencies: Array
+    shapes: Array  # (n_dofs, n_measured) at the measured degrees of freedom
+    ranks: NDArray[np.intp] | None  # among the model's modes; None where modes are paired column by column
+    derivatives: Callable[[], tuple[Array, Array]]  # of frequencies and of shapes, by the parameters
+
+
+def paired_modes(model: FEModel, measured: Measured, theta: Array) -> PairedModes:
+    """Pair modes by their shapes where shapes were measured, else column by column."""
+    if measured.dofs.size and hasattr(model, "local_modes"):
+        return _by_shape(model, measured, theta)
+    return _by_column(model, measured, theta[np.newaxis])
+
+
+def macs(shapes: Array, measured: Array) -> Array:
+    """MAC of each shape with the measured unit shape in the same column, (n_measured,)."""
+    return np.diagonal(mac_table(shapes, measured))
+
+
+def mac_table(shapes: Array, measured: Array) -> Array:
+    """MAC of measured unit shapes and all shapes, (n_measured, n_shapes); 0 for a shape that is zero at all sensors."""
+    squares = (shapes**2).sum(axis=0)
+    return (measured.T @ shapes) ** 2 / np.where(squares > 0, squares, np.inf)
+
+
+def tangents(shapes: Array, measured: Array) -> Array:
+    """Differences e = phi / (u' phi) - u between shapes phi and measured unit shapes u, (n_dofs, n_modes).
+
+    Whatever the scale and sign of phi, e is orthogonal to u, and its length is the tangent of the angle between them:
+    its square is 1 / MAC - 1.
+    """
+    return shapes / np.einsum("dm,dm->m", measured, shapes) - measured
+
+
+def tangent_derivatives(shapes: Array, d_shapes: Array, measured: Array) -> Array:
+    """Derivatives of `tangents`, from derivatives of the shapes (n_dofs, n_modes, n_parameters)."""
+    along = np.einsum("dm,dm->m", measured, shapes)[:, np.newaxis]
+    d_along = np.einsum("dm,dmp->mp", measured, d_shapes)
+    return d_shapes / along - shapes[:, :, np.newaxis] * (d_along / along**2)
+
+
+def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
+    def frequencies_at(rows: Array) -> Array:
+        return as_floats(model.frequencies(rows))  # not `evaluate`, which warns of every theta without modes
+
+    def derivatives() -> tuple[Array, Array]:
+        exact = getattr(model, "jacobian", None)
+        slopes = exact(row) if exact else central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+        return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
+
+    frequencies = frequencies_at(row)
+    return PairedModes(frequencies[0, measured.columns], np.empty((0, len(measured.columns))), None, derivatives)
+
+
+def _by_shape(model: LocalModel, measured: Measured, theta: Array) -> PairedModes:
+    modes = model.local_modes(theta)
+    shapes = modes.shapes(measured.dofs)
+    mac_sums = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
+    with_shape = measured.has_shape
+    mac_sums[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
+    ranks = linear_sum_assignment(np.nan_to_num(mac_sums), maximize=True)[1]
+    wanted_dofs = measured.dofs if measured.shape_weights.any() else measured.dofs[:0]
+    return PairedModes(modes.frequencies[ranks], shapes[:, ranks], ranks, lambda: modes.derivatives(ranks, wanted_dofs))
 
 
 class Residuals:
@@ -100,3 +316,128 @@ class Point:
         return plain, tangent_derivatives(
             self._modes.shapes[:, weighted], d_shapes[:, weighted], measured.shapes[:, weighted]
         )
+
+
+TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
+
+
+class Searched(Protocol):
+    """What a search minimises: residuals at each theta, and the loss of their squares."""
+
+    def at(self, theta: Array) -> Any:
+        """Residuals at one theta: ``values``, ``objective``, ``jacobian()`` and ``gradient()``."""
+
+    def loss(self, squares: Array) -> Array:
+        """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
+
+
+class Outcome(NamedTuple):
+    """The result of one start; ``n_failed`` of its evaluations met theta without modes."""
+
+    start: Array
+    objective: float
+    success: bool
+    n_evaluations: int
+    n_failed: int
+    theta: Array
+
+
+class SearchHistory:
+    """Record of one optimisation: its last and its best point, and how many theta had no modes."""
+
+    def __init__(self, residuals: Searched, start: Array):
+        self._residuals = residuals
+        self._theta = self.theta = start
+        self._point = self.best = residuals.at(start)
+        self.n_evaluations = 1
+        self.n_failed = 0 if np.isfinite(self.best.objective) else 1
+
+    def at(self, theta: Array) -> Any:
+        """Residuals at theta. Those at the last and at the best theta are remembered."""
+        if np.array_equal(theta, self.theta):
+            return self.best
+        if not np.array_equal(theta, self._theta):
+            self.n_evaluations += 1
+            self._theta = theta.copy()
+            self._point = self._residuals.at(self._theta)
+            if not np.isfinite(self._point.objective):
+                self.n_failed += 1
+            elif self._point.objective < self.best.objective:
+                self.theta, self.best = self._theta, self._point
+        return self._point
+
+
+class NoDerivatives(Exception):
+    """The model has no finite derivatives at some theta."""
+
+
+def optimise(residuals: Searched, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
+    """Minimise the residuals' loss within bounds.
+
+    Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
+    therefore started again from its best point, and has converged when it meets none.
+    """
+    search = {"lbfgs": _lbfgs, "least_squares": _least_squares}[method]
+    success = False
+    with single_blas_thread():
+        history = SearchHistory(residuals, start)
+        first, before = history.best.objective, np.inf
+        while max_iter > 0 and history.best.objective < (1 - TOLERANCE) * before:
+            before, n_failed = history.best.objective, history.n_failed
+            try:
+                result = search(history, residuals, bounds, max_iter, first)
+            except NoDerivatives:
+                break
+            max_iter -= result.get("nit", result.nfev)
+            success = bool(result.success) and history.n_failed == n_failed
+            if history.n_failed == n_failed:
+                break
+    return Outcome(start, history.best.objective, success, history.n_evaluations, history.n_failed, history.theta)
+
+
+def _least_squares(
+    history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float
+) -> OptimizeResult:
+    def jacobian(theta: Array) -> Array:
+        return _finite(history.at(theta).jacobian())
+
+    return least_squares(
+        lambda theta: history.at(theta).values.copy(),  # SciPy scales it in place
+        history.theta,
+        jacobian,
+        bounds=(bounds[:, 0], bounds[:, 1]),
+        loss=residuals.loss,
+        ftol=TOLERANCE,
+        xtol=TOLERANCE,
+        gtol=np.finfo(float).eps,
+        max_nfev=max_iter,
+    )
+
+
+def _lbfgs(history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+    """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
+
+    Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
+    """
+
+    def share(theta: Array) -> tuple[float, Array]:
+        point = history.at(theta)
+        if np.isfinite(point.objective):
+            gradient = _finite(point.gradient()) / scale
+            if point is history.best:
+                uphill[:] = gradient
+            return point.objective / scale, gradient
+        step = theta - history.theta
+        slope = abs(uphill @ step)
+        return history.best.objective / scale + slope / 2, 2 * slope * step / (step @ step)
+
+    scale = first or 1.0
+    uphill = np.empty_like(history.theta)
+    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOLERANCE, "gtol": TOLERANCE, "maxcor": 20}
+    return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
+
+
+def _finite(derivatives: Array) -> Array:
+    if not np.isfinite(derivatives).all():
+        raise NoDerivatives
+    return derivatives

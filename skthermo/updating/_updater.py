@@ -12,18 +12,22 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._estimators.arguments import (
+from skthermo._estimators.warnings import warn_each, warn_user
+from skthermo._io import run_jobs
+from skthermo._tables.arrays import (
+    Array,
+    Bounds,
     Reduce,
+    as_random_state,
     check_bounds,
     check_model,
     check_prior,
     check_size,
     is_auto,
+    positive_integer,
+    real_array,
     tolerance,
 )
-from skthermo._estimators.warnings import warn_each, warn_user
-from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, Bounds, as_random_state, positive_integer, real_array
 from skthermo._tables.frames import column_names
 from skthermo._validation import (
     Estimator,
@@ -46,9 +50,7 @@ from skthermo.updating._diagnostics import (
 )
 from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
 from skthermo.updating._identifiability import cramer_rao
-from skthermo.updating._measured import Measured, read_measured
-from skthermo.updating._optimise import Outcome, optimise
-from skthermo.updating._residuals import Residuals
+from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise, read_measured
 
 EVALUATIONS_PER_START = 10  # of the model, which a search is expected to take
 

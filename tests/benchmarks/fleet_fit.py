@@ -4,13 +4,13 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_fit.py --quick
 
 Bridges of ``make_fleet``, each with a year of daily records, an FE model that is a little wrong and a monitor; models
-and records are made in the workers. Then the monitors judge half a year in which every tenth bridge loses 30 % of a
+and records are made in the workers. Then the monitors evaluate half a year in which every tenth bridge loses 30 % of a
 group. The largest memory of this process and of its workers is that of all times, as Linux counts it (VmHWM).
 
 Some of the bridges are then fitted again with a worker killed by SIGKILL midway, beside a bridge whose maker always
 kills its process and one whose records are broken, and on the workers of a Dask cluster. The folder is also used again:
 nothing is fitted anew. The exit code is 1 if bridges are missing, if any bits differ, if the bridge that is always
-killed is not called so, if a worker needs more than 2 GB, or if more healthy bridges are called than damaged ones.
+killed is not reported, if a worker needs more than 2 GB, or if more healthy bridges are significant than damaged ones.
 """
 
 import argparse
@@ -112,7 +112,7 @@ class Watched(threading.Thread):
 
 
 def bits(fleet, names, campaign):
-    """What each bridge predicts and by which threshold it judges, as one text."""
+    """What each bridge predicts and by which threshold it evaluates, as one text."""
     found = {}
     for name in names:
         if name in fleet.chains:
@@ -157,8 +157,8 @@ def main():
         damaged = set(list(campaign)[::EVERY])
         new = {name: partial(later, bridge, name in damaged) for name, bridge in campaign.items()}
         start = time.perf_counter()
-        judged = fleet.update(new, options.jobs)
-        print(f"{len(judged)} records of {LATER} days judged in {time.perf_counter() - start:.0f} s")
+        answers = fleet.update(new, options.jobs)
+        print(f"{len(answers)} records of {LATER} days evaluated in {time.perf_counter() - start:.0f} s")
         with pd.option_context("display.width", 200, "display.max_columns", 40):
             columns = [
                 "n_records",
@@ -175,11 +175,11 @@ def main():
         print(fleet.summary())
         found = fleet.discoveries()
         print(found.summary())
-        false = [name for name in found.called if name not in damaged]
+        false = [name for name in found.bridges if name not in damaged]
         alarmed = set(fleet.table.index[fleet.table["n_events"] > 0])
-        n_found, n_called = len(damaged & alarmed), len(damaged & set(found.called))
-        print(f"damaged: {len(damaged)}, of which {n_found} had an event and {n_called} are called")
-        print(f"healthy: {len(alarmed - damaged)} had an event, {len(false)} are called")
+        n_found, n_called = len(damaged & alarmed), len(damaged & set(found.bridges))
+        print(f"damaged: {len(damaged)}, of which {n_found} had an event and {n_called} are significant")
+        print(f"healthy: {len(alarmed - damaged)} had an event, {len(false)} are significant")
         good &= len(false) <= len(damaged)
 
         start = time.perf_counter()

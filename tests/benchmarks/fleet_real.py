@@ -133,7 +133,7 @@ def main():
     for title, fleet in generated.items():
         for name, tables in real.items():
             joined = FleetPrior().fit(fleet | {name: tables})
-            follows = joined.bridges_["follows"].unstack()
+            follows = joined.bridges_["pooling_probability"].unstack()
             others = follows.drop(index=name).median(axis=None) if name in follows.index else np.nan
             own = follows.loc[name].median() if name in follows.index else np.nan
             print(f"{name} in the {title}: {own:.2f} (generated bridges: {others:.2f})", flush=True)

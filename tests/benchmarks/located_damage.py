@@ -165,7 +165,7 @@ def main():
                     fem = truth.chain(seed)
                     whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
                     healthy[which].append(whole.probability_of_damage)
-                    places = {g: where for g, where in whole.places.items() if g not in whole.found.unseen}
+                    places = {g: where for g, where in whole.places.items() if g not in whole.found.unobservable}
                     found[which].append(judged(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)

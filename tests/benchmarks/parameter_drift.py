@@ -59,7 +59,7 @@ def tracked(fem, T, F):
     history = track_parameters(fem, T, F, random_state=0)
     table = history.table
     estimates = np.log(table.xs("estimate", axis=1, level=1))
-    errors = np.log(table.xs("upper", axis=1, level=1)).sub(estimates) / BAND
+    errors = np.log(table.xs("ci_high", axis=1, level=1)).sub(estimates) / BAND
     first = {group for rivals in history.rivals.values() for group in rivals}
     return estimates, errors, history.has_drift, first, estimates.index[0]
 

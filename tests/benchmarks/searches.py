@@ -29,7 +29,7 @@ from sklearn.model_selection import GridSearchCV, cross_val_score
 from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z24
 from skthermo.preprocessing import BiasAligner, BlockedKFold
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate.refinement import Refinement
+from skthermo.surrogate.inverse._refinement import Refinement
 
 PENALTIES = np.logspace(-2, 3, 12)
 N_FOLDS = 5

@@ -122,6 +122,17 @@ def test_a_damaged_file_is_refused_by_name(file, length):
         CallableModel(Counted(), NAMES, 3, cache=file).frequencies(THETA)
 
 
+def test_a_record_with_a_flipped_bit_is_solved_again(file):
+    CallableModel(three_modes, NAMES, 3, cache=file).frequencies(THETA)
+    content = bytearray(file.read_bytes())
+    content[content.index(PLAIN[7].astype("<f8").tobytes())] ^= 1
+    file.write_bytes(content)
+    again = Counted()
+    for _ in range(2):
+        np.testing.assert_array_equal(CallableModel(again, NAMES, 3, cache=file).frequencies(THETA), PLAIN)
+    np.testing.assert_array_equal(again.rows, THETA[[7]])
+
+
 @pytest.mark.parametrize(("names", "n_modes"), [(["k", "E"], 3), (NAMES, 2)])
 def test_a_file_for_other_parameters_is_refused_and_kept(file, names, n_modes):
     CallableModel(lambda row: three_modes(row)[:n_modes], names, n_modes, cache=file).frequencies(THETA)

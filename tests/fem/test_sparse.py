@@ -12,7 +12,7 @@ import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
 from skthermo.fem._terms import DenseTerms, SparseTerms
-from skthermo.fem.affine._read_terms import DENSE_DOFS
+from skthermo.fem.affine._base import DENSE_DOFS
 from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, SECTION, portal
 

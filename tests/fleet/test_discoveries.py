@@ -1,10 +1,13 @@
 """Events of many bridges: and the false discovery rate is the one asked for."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import genpareto, kstest, norm
 
-from skthermo.fleet._discoveries import significant_bridges, tail_shape
+from skthermo.fleet._discoveries import discover, significant_bridges, tail_shape
 from skthermo.monitoring._false_alarms import Tail
 
 N_PEAKS, RATIO = 60, 0.7
@@ -96,3 +99,39 @@ def test_a_baseline_with_an_outlier_makes_p_values_larger():
     odd = Tail.of(np.r_[200.0, squares[1:]], 1.0)
     for height in (200.0, 400.0, 2000.0):
         assert odd.p_value(height, 1.0) > 10 * odd.p_value(height, 1.0, 0.0)
+
+
+class Watched:
+    """A monitor after a year, with events that began on 1 December and their p values."""
+
+    def __init__(self, p_value, end=None, acknowledged=False):
+        self.p_value, self.last_, self.days_ = p_value, pd.Timestamp("2025-12-31"), [0]
+        tail = Tail(10.0, (2.0,) * 16)
+        self.false_alarm_estimate_ = SimpleNamespace(tail=tail, expected=1.0)
+        event = {"kind": "damage", "start": pd.Timestamp("2025-12-01"), "end": pd.NaT if end is None else end}
+        event |= {"peak": 5.0, "modes": "f1", "acknowledged": acknowledged, "harmless": False}
+        self.events_ = pd.DataFrame([event], pd.RangeIndex(1, 2, name="event")).astype({"end": "datetime64[ns]"})
+
+    def years_watched(self, since):
+        return 1.0
+
+    def event_p_values(self, since, *, tail_shape):
+        return pd.Series(self.p_value, self.events_.index)
+
+
+def test_significant_bridges_are_in_alarm_and_ended_events_wait_for_an_explanation():
+    end = pd.Timestamp("2025-12-20")
+    monitors = {
+        "damaged": Watched(1e-6),
+        "by chance": Watched(0.5),
+        "ended": Watched(1e-6, end),
+        "explained": Watched(1e-6, end, acknowledged=True),
+    }
+    standings = {name: {"last": one.last_, "state": "healthy"} for name, one in monitors.items()}
+    found = discover(monitors, standings, 0.1, 365.25)
+    assert found.bridges == ["damaged"]
+    assert found.table.loc[found.table["is_discovery"], "end"].isna().all()
+    assert found.unexplained["bridge"].tolist() == ["ended"]
+    assert found.p_values.to_dict() == {"damaged": 1e-6, "by chance": 0.5, "ended": 1.0, "explained": 1.0}
+    assert found.summary().startswith("2 of 4 evaluated bridges are in alarm, 1 of them significantly")
+    assert found.false_alarms_per_year == 4.0

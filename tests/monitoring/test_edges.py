@@ -115,10 +115,10 @@ def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back
 
 def test_a_single_value_that_cannot_be_is_explained_and_counted():
     monitor, new = fitted(), changed({}, 2)
-    new.iloc[3, new.columns.get_loc("f2")] = 1e6
+    new.iloc[5, new.columns.get_loc("f2")] = 1e6
     answers = monitor.update(new)
-    assert answers["state"].eq("not evaluated").tolist() == [n == 3 for n in range(8)]
-    assert "f2 is 1e+06" in answers["reason"].iloc[3]
+    assert answers["state"].eq("not evaluated").tolist() == [n == 5 for n in range(8)]
+    assert "f2 is 1e+06" in answers["reason"].iloc[5]
     assert monitor.counts_["n_left_out"] == 1
     assert not len(monitor.events_)
 
@@ -177,6 +177,21 @@ def test_responses_may_have_any_sign_and_unit():
     assert "repeats 0 mm" in stuck.faults_["detail"].iloc[0]
     monitor.update(new[:1].assign(d=500.0))
     assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]
+
+
+def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
+    records, targets = with_displacement(), [*MODES, "d"]
+    records = records.drop(columns=["e1", "e2"])
+    monitor = Monitor(detector(targets), sensors=False).fit(records[:N_BASELINE])
+    new = records[N_BASELINE : N_BASELINE + 60 * PER_DAY]
+    monitor.update(new.assign(d=new["d"] + 3.0))
+    assert monitor.state() == "alarm"
+    retraining = monitor.rebaseline(new.index[0])
+    assert retraining.table.loc["d", "change"] == pytest.approx(3.0, abs=0.2)
+    assert retraining.table.loc[MODES, "change"].abs().max() < 0.002
+    later = records[N_BASELINE + len(new) :][: 20 * PER_DAY]
+    assert (monitor.update(later.assign(d=later["d"] + 3.0))["state"] == "healthy").mean() > 0.9
+    assert set(monitor.update(records[N_BASELINE + len(new) + len(later) :][:40])["state"][SETTLED:]) == {"alarm"}
 
 
 def test_units_are_honest_and_checked():

@@ -35,7 +35,7 @@ def put_into_service(healthy, last=None):
     targets = [name for name in healthy if name.startswith("f")]
     compensator = TemperatureCompensator(LinearRegression(), targets=targets)
     detector = make_pipeline(compensator, last or MahalanobisDetector())
-    return quietly(Monitor(detector, sensors=False, random_state=0).fit, healthy[:YEAR])
+    return quietly(Monitor(detector, sensors=False, random_state=0, persistence=1).fit, healthy[:YEAR])
 
 
 def decisions(monitor, new):

@@ -139,7 +139,7 @@ def test_identified_damage_is_said_first_and_in_full(page, found):
 
 
 def test_groups_that_are_not_seen_have_no_amount():
-    page = Page(identified_damage(identified(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unseen=["piers"])))
+    page = Page(identified_damage(identified(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])))
     assert "piers" in page.heads
     assert page.cells.count("unobservable") == 1
     page = Page(identified_damage(identified(EXPLANATIONS, rest=0.0)))
@@ -221,7 +221,7 @@ def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(page, fou
 def test_control_characters_in_names_are_seen_and_harm_nothing():
     names = ["a\x00b", "line\nbreak \x1b[31m\u202e", "\x07bell", "\ud800"]
     explanations = {name: (0.25, {name: (0.2, 0.01)}) for name in names}
-    text = identified_damage(identified(explanations, unseen=names[2:])).html
+    text = identified_damage(identified(explanations, unobservable=names[2:])).html
     page = Page(text)
     for seen in (r"a\x00b", r"line break \x1b[31m\u202e", r"\x07bell", r"\ud800"):
         assert seen in page.text

@@ -165,6 +165,16 @@ def test_stiffening_is_reported_and_is_no_alarm():
     assert "No damage event is open." in page.text
 
 
+def test_a_response_that_was_set_aside_is_named_and_what_to_do():
+    event = event_row("2025-06-20", None, kind="measurement or structure", modes="f2")
+    monitor = FakeMonitor(events=[event], n_not_evaluated=9, reason="f2 is left out (implausible since 2025-06-20)")
+    page = today_of(monitor)
+    assert headline(page).startswith("Not evaluated since")
+    assert "f2 is left out" in page.text
+    assert "whether the sensors or the structure have changed" in page.text
+    assert "a response was set aside: its sensor, or the structure, has changed" in str(events(standing_of(monitor)))
+
+
 def test_events_that_nobody_has_explained_are_named():
     ended = [event_row(f"2025-0{month}-01", f"2025-0{month}-03") for month in (3, 4)]
     known = event_row("2025-05-01", "2025-05-04", acknowledged=True, harmless=True, note=HOSTILE)

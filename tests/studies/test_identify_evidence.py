@@ -185,7 +185,7 @@ def test_draws_follow_the_law_of_the_amounts(problem):
     law = stats.truncnorm((0 - mean) * precision**0.5, (0.95 - mean) * precision**0.5, mean, precision**-0.5)
     assert one.draws.mean() == pytest.approx(law.mean(), abs=5 * law.std() / np.sqrt(len(one.draws)))
     assert one.draws.std() == pytest.approx(law.std(), rel=0.15)
-    table = posterior.table(["a", "b", "c"])
+    table = posterior.table([Cause(name) for name in "abc"])
     assert table["probability"].sum() == pytest.approx(1)
     assert (table["ci_low"] <= table["severity"]).all()
     drawn = posterior.drawn(["a", "b", "c"], 2000, np.random.RandomState(0))
@@ -199,8 +199,10 @@ def test_posteriors_average_over_models(problem):
     for cause in "abc":
         expected = np.mean([one.probability_of(cause) for one in both])
         assert mean.probability_of(cause) == pytest.approx(expected)
-    severities = np.mean([one.table(["a", "b", "c"])["severity"] for one in both], axis=0)
-    np.testing.assert_allclose(mean.table(["a", "b", "c"])["severity"], severities, rtol=0.05, atol=1e-3)
+    severities = np.mean([one.table([Cause(name) for name in "abc"])["severity"] for one in both], axis=0)
+    np.testing.assert_allclose(
+        mean.table([Cause(name) for name in "abc"])["severity"], severities, rtol=0.05, atol=1e-3
+    )
 
 
 def test_the_best_sets_of_many_causes_are_found():

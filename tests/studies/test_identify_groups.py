@@ -47,9 +47,9 @@ def simulated(fem, T, damage=None):
 def test_mirrored_groups_are_named(symmetric):
     fem, T = symmetric
     F = simulated(fem, T, {"left": 0.1})
-    with pytest.warns(UserWarning, match="cannot tell apart: left and right"):
+    with pytest.warns(UserWarning, match="cannot distinguish: left and right"):
         found = identify_damage(fem, T, F, ["left", "middle", "right"], random_state=0)
-    assert found.confused == [("left", "right")]
+    assert found.indistinguishable == [("left", "right")]
     assert found.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
     assert found.p_value < 0.01
     probable = found.explanations["probability"]
@@ -58,7 +58,7 @@ def test_mirrored_groups_are_named(symmetric):
     joined = {"sides": ["left", "right"], "middle": ["middle"]}
     together = identify_damage(fem, T, F, joined, random_state=0)
     assert together.most_probable == ("sides",)
-    assert together.confused == []
+    assert together.indistinguishable == []
     assert 0.04 < together.severities["sides"] < 0.06
     assert [together.damage[side] for side in ("left", "right")] == pytest.approx(
         [together.severities["sides"]] * 2, abs=1e-3
@@ -74,7 +74,7 @@ def test_shapes_tell_mirrored_groups_apart(symmetric, side):
     found = identify_damage(
         fem, T, simulated(fem, T, damage), shapes=(healthy, damaged), dofs=SENSORS, shape_noise=0.01, random_state=0
     )
-    assert found.confused == []
+    assert found.indistinguishable == []
     expected = {"left": 0.0, "middle": 0.0, "right": 0.0, **damage}
     assert found.severities.to_dict() == pytest.approx(expected, abs=6e-3)
     assert found.most_probable == (side,)
@@ -89,7 +89,7 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
     F = simulated(fem, WEATHER)
     with pytest.warns(UserWarning, match="these modes do not show, of which nothing is known: vertical"):
         found = identify_damage(fem, WEATHER, F, random_state=0)
-    assert found.unseen == ["vertical"]
+    assert found.unobservable == ["vertical"]
     assert found.table.index.tolist() == [*GROUPS, "vertical"]
     # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     numbers = found.prior.numbers

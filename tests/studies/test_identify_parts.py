@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from skthermo._effects.frequencies import read_groups
+from skthermo._effects import read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.residuals.weather import WeatherFunctions
 from skthermo.studies.identification._curves import Part, ShiftComparison
-from skthermo.studies.identification._separability import confused_groups, cosines, errors_alone
+from skthermo.studies.identification._separability import cosines, errors_alone, indistinguishable_groups
 from skthermo.studies.identification._shift import measured_shift, outlying, record_shifts
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -34,10 +35,10 @@ def test_groups_that_imitate_each_other():
     lengths = np.array([50.0, 40.0, 30.0, 60.0])
     directions = np.array([[1.0, 0, 0, 0], [1, 1e-3, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).T
     slopes = directions * lengths
-    assert confused_groups(slopes) == [(0, 1)]
+    assert indistinguishable_groups(slopes) == [(0, 1)]
     sum_of_two = np.column_stack([slopes[:, [0, 2, 3]], slopes[:, 0] + slopes[:, 2]])
-    assert confused_groups(sum_of_two) == [(0, 1, 3)]
-    assert confused_groups(slopes[:, :1]) == []
+    assert indistinguishable_groups(sum_of_two) == [(0, 1, 3)]
+    assert indistinguishable_groups(slopes[:, :1]) == []
     np.testing.assert_allclose(errors_alone(slopes), 1 / np.linalg.norm(slopes, axis=0))
     np.testing.assert_allclose(np.diag(cosines(slopes)), 1)
 
@@ -94,9 +95,10 @@ def test_predictions_err_as_least_squares_on_the_weather_do(fem):
     """What depends on the weather by its functions is predicted exactly, and noise as much as the weights say."""
     residuals = fem.residuals()
     inputs = residuals.weather[:60]
-    weights, functions = residuals.prediction_weights(inputs), residuals.weather_functions(inputs)
-    law = np.random.RandomState(0).standard_normal((functions.shape[1], 1))
-    of_records = residuals.weather_functions(residuals.weather) @ law
+    basis, weights = WeatherFunctions.of(residuals.weather), residuals.prediction_weights(inputs)
+    functions = basis.values(inputs)
+    law = np.random.RandomState(0).standard_normal((basis.size, 1))
+    of_records = basis.values(residuals.weather) @ law
     np.testing.assert_allclose(weights.T @ of_records, np.full((6, 1), (functions @ law).mean()), atol=1e-9)
     np.testing.assert_allclose(weights.sum(axis=0), 1)
     similar = residuals.shares(inputs)

@@ -1,4 +1,4 @@
-"""What an identification says: the most probable explanation first, then what else could be and what cannot be told."""
+"""What an identification says: the most probable explanation first, then what else could be and what is not known."""
 
 import re
 
@@ -40,7 +40,7 @@ ELSE = {"something else": (0.9, {}), "deck + something else": (0.06, {"deck": (0
 CASES = {
     "clear": identified(CLEAR),
     "alike": identified(PIERS, alike=[("pier_1", "pier_2")]),
-    "healthy": identified(HEALTHY, groups=["deck", "piers", "vertical"], unseen=["vertical"], p_value=0.4),
+    "healthy": identified(HEALTHY, groups=["deck", "piers", "vertical"], unobservable=["vertical"], p_value=0.4),
     "something else": identified(ELSE, groups=["deck", "piers"]),
 }
 
@@ -101,21 +101,21 @@ def test_groups_that_look_alike_are_said_together_with_the_sum_of_their_probabil
     first, others, *_ = said(found)
     assert first == (
         "Most probable: a loss of 12 % of stiffness in pier_1 or pier_2 (between 9 and 15 %), which these modes cannot "
-        "tell apart, probability 90 %."
+        "distinguish, probability 90 %."
     )
     assert others == "It could also be: a loss of 3 % in deck (7 %)."
-    assert found.told["probability"].to_dict() == pytest.approx(
+    assert found.summary_table["probability"].to_dict() == pytest.approx(
         {"pier_1 or pier_2 12\xa0%": 0.9, "deck 3\xa0%": 0.07, "no damage": 0.03}
     )
-    assert "pier_1 and pier_2 cannot be told apart by these modes: only their common effect is known." in said(found)
+    assert "pier_1 and pier_2 cannot be distinguished by these modes: only their common effect is known." in said(found)
     apart = identified(PIERS)
-    assert apart.told["probability"].iloc[0] == pytest.approx(0.44)
+    assert apart.summary_table["probability"].iloc[0] == pytest.approx(0.44)
 
 
 def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
-    found = identified(PIERS, confused=[("pier_1", "pier_2", "deck")])
-    assert found.told["probability"].iloc[0] == pytest.approx(0.44)
-    assert "pier_1, pier_2 and deck cannot be told apart by these modes" in found.summary()
+    found = identified(PIERS, indistinguishable=[("pier_1", "pier_2", "deck")])
+    assert found.summary_table["probability"].iloc[0] == pytest.approx(0.44)
+    assert "pier_1, pier_2 and deck cannot be distinguished by these modes" in found.summary()
 
 
 def test_silence_is_never_healthy():
@@ -128,16 +128,16 @@ def test_silence_is_never_healthy():
     bounds = found.table["highest_if_damaged"]
     assert unnoticed == (
         f"A loss of stiffness of up to {100 * bounds['deck']:.2g} % in deck and {100 * bounds['piers']:.2g} % in piers "
-        "could have gone unseen."
+        "could have gone unnoticed."
     )
     assert unseen == "Damage in vertical cannot be seen in these modes: nothing is known of it."
-    doubtful = identified(HEALTHY, unseen=["vertical"], p_value=0.01)
+    doubtful = identified(HEALTHY, unobservable=["vertical"], p_value=0.01)
     assert "Yet a healthy structure shows such shifts with a probability of only 1 %." in said(doubtful)
 
 
 def test_damage_of_a_group_that_is_hardly_seen_is_said_where_it_is_more_probable_than_none():
     severe = {"vertical": (0.97, {"vertical": (0.6, 0.15)}), "no damage": (0.03, {})}
-    (first, *_) = said(identified(severe, unseen=["vertical"]))
+    (first, *_) = said(identified(severe, unobservable=["vertical"]))
     assert first.startswith("Most probable: a loss of 60 % of stiffness in vertical")
 
 
@@ -208,7 +208,7 @@ def test_report_summary_and_drawing_say_the_same(name):
     for sentence in (*found.answer(), *found.limits(), *found.records.sentences()):
         assert sentence.replace(SPACE, " ") in found.summary()
         assert sentence in page
-    for probability in found.told["probability"]:
+    for probability in found.summary_table["probability"]:
         assert probability < 0.005 or chance_text(probability) in page
     display = IdentifiedDamageDisplay.from_predictions(found)
     assert " ".join(display.figure_.get_suptitle().split()) == said(found)[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skthermo.fem import Bar, Beam, Spring, Structure
-from skthermo.studies.location._curves import StretchCurves
+from skthermo.studies.identification import Curves
 from skthermo.studies.location._division import WHOLE, Division, lines_of
 from skthermo.studies.location._located import Places, fewest
 
@@ -89,19 +89,16 @@ def test_curves_are_the_effects_of_single_causes():
         return -0.5 * np.log(sums)[:, np.newaxis], -0.5 * slopes[:, np.newaxis]
 
     incidence = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1], [0, 0, 1]], dtype=bool)
-    curves = StretchCurves.of(effects, incidence, np.array([[2.0]]))
+    curves, each = Curves.of_stretches(effects, incidence, np.array([[2.0]])), np.arange(4)[:, np.newaxis]
     for severity in (0.0, 0.05, 0.2, 0.45, 0.75, 0.9):
         exact, slopes = effects(severity * incidence)
-        found, found_slopes = curves.single(np.arange(4), np.full(4, severity))
-        assert found == pytest.approx(exact, rel=3e-3, abs=1e-9)
-        assert found_slopes[:, 0] == pytest.approx((slopes[:, 0] * incidence).sum(axis=1), rel=2e-2)
+        found, found_slopes = curves.at(each, np.full((4, 1, 1), severity))
+        assert found[:, 0] / 2 == pytest.approx(exact, rel=3e-3, abs=1e-9)
+        assert found_slopes[:, 0, 0, 0] / 2 == pytest.approx((slopes[:, 0] * incidence).sum(axis=1), rel=2e-2)
     change, slope = curves.at(np.array([[0, 3]]), np.array([[[0.1, 0.3]]]))
-    single = [curves.single(np.array(cause), np.array(s))[0] for cause, s in ((0, 0.1), (3, 0.3))]
-    assert change == pytest.approx(2 * sum(single)[np.newaxis, np.newaxis])
-    assert slope.shape == (1, 1, 1, 2)
-    change, slopes = curves(np.array([0.1, 0.0, 0.0, 0.3]))
+    single = [curves.at(np.array([[cause]]), np.array([[[s]]]))[0] for cause, s in ((0, 0.1), (3, 0.3))]
     assert change == pytest.approx(sum(single))
-    assert slopes.shape == (1, 4)
+    assert slope.shape == (1, 1, 1, 2)
 
 
 def test_the_fewest_members_that_hold_the_damage():

@@ -17,7 +17,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate.refinement import Refinement
+from skthermo.surrogate.inverse._refinement import Refinement
 from tests.surrogate.chains import TRUSS
 
 YEAR = make_truss_campaign(samples_per_year=90, random_state=0)

@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-from skthermo.surrogate.refinement._posterior import SMALL_STEP, Local, Prior
+from skthermo.surrogate.inverse._refinement import SMALL_STEP, Local, Prior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 
@@ -332,7 +332,7 @@ def test_scatter_is_the_noise_given_or_what_the_model_leaves():
 
 
 def test_rows_that_fit_has_refined_are_not_refined_again(monkeypatch):
-    from skthermo.surrogate.refinement import _refinement
+    from skthermo.surrogate.inverse import _refinement
 
     refined = []
 

@@ -72,8 +72,7 @@ def test_the_objective_is_as_documented():
 
 @pytest.mark.parametrize("model", [TRUSS, portal(3)], ids=["truss", "frame"])
 def test_gradients_of_the_objective_equal_central_differences(model):
-    from skthermo.updating._measured import read_measured
-    from skthermo.updating._residuals import Residuals
+    from skthermo.updating._residuals import Residuals, read_measured
 
     dofs = np.arange(0, 20, 3)
     frequencies, shapes = measured(model, TRUTH, dofs)

@@ -7,19 +7,21 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import check_flag, check_theta
-from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, positive_integer
-from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem._theta import nominal_theta
-from skthermo.fem.affine._base import AffineBase, Change, Content, Groups, Names
-from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.affine._read_terms import (
+from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, check_flag, check_theta, positive_integer
+from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
+from skthermo.fem.affine._base import (
+    AffineBase,
+    Change,
+    Content,
+    Groups,
+    Names,
     are_sparse,
     check_groups,
     check_names,
     exponents_of,
     read_terms,
 )
+from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.affine._reduced import ReducedModel
 from skthermo.fem.modal import check_supported, count_modes
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, Matrix
-from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem._theta import nominal_theta
+from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
 from skthermo.fem.modal import (
     CondensationSolver,
     EigenSolver,

@@ -1,8 +1,7 @@
 """FE models from other programs, through exported matrices or functions that return matrices or frequencies."""
 
 from skthermo.fem.external._callable import CallableModel
-from skthermo.fem.external._exported import load_affine
+from skthermo.fem.external._exported import load_affine, read_triplets
 from skthermo.fem.external._probe import probe
-from skthermo.fem.external._triplets import read_triplets
 
 __all__ = ["CallableModel", "load_affine", "probe", "read_triplets"]

@@ -1,4 +1,4 @@
-"""FE models that other programs have exported as matrices."""
+"""Affine models and matrices from files that FE programs write."""
 
 from __future__ import annotations
 
@@ -12,12 +12,66 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._estimators.arguments import check_names, check_path
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import read_named_matrices
-from skthermo._tables.arrays import Matrix
+from skthermo._io import read_half, read_named_matrices
+from skthermo._tables.arrays import Matrix, check_names, check_path
 from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
+
+
+def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
+    """A symmetric matrix from a text of row, column and value for each entry of one half.
+
+    CalculiX writes stiffness and mass in this form (``.sti`` and ``.mas``, with ``*FREQUENCY,
+    SOLVER=MATRIXSTORAGE``), and so does SAP2000 (``.TXK`` and ``.TXM``).
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file. Rows and columns are counted from 1. Lines before the first one that begins with a digit are a heading
+        and left out.
+
+    Returns
+    -------
+    csc_array of shape (n_dof, n_dof)
+        The whole matrix, in the units of the program; ``n_dof`` is the largest row or column that occurs.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the path does not exist.
+    ValueError
+        Names the file, if a line does not hold three numbers, rows or columns are not positive integers, there are
+        entries on both sides of the diagonal, or the matrix would need too much memory (see `load_affine`).
+
+    See Also
+    --------
+    load_affine : A model from a folder of such files.
+    probe : A model from a program that writes such files, with one run for each parameter.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skthermo.fem import read_triplets
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "tower.sti"
+    ...     _ = file.write_text("1 1 800.0\\n1 2 -400.0\\n2 2 400.0\\n")
+    ...     stiffness = read_triplets(file)
+    >>> stiffness.toarray()
+    array([[ 800., -400.],
+           [-400.,  400.]])
+    """
+    file = check_path(path)
+    if not file.exists():
+        raise FileNotFoundError(f"{file} does not exist; expected a text of row, column and value in each line")
+    if not file.is_file():
+        raise ValueError(f"{file} is a folder or a device; expected a text of row, column and value in each line")
+    matrix = read_half(file)
+    if not np.isfinite(matrix.data).all():
+        raise ValueError(f"{file} holds values that are not finite; expected finite ones")
+    return matrix
+
 
 Key = tuple[str, ...]
 Total = str | Literal[False] | None
@@ -136,13 +190,17 @@ def load_affine(
     says_total = total is not None
     if total is None and stiffness is not None:
         unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
-        fitting = [name for name in unnamed if matrices[name].shape == shape and _is_finite(matrices[name])]
+        fitting = [
+            name
+            for name in unnamed
+            if (matrix := matrices[name]) is not None and matrix.shape == shape and _is_finite(matrix)
+        ]
         total = _usual(fitting, TOTAL_NAMES, "total", file)
     if stiffness is None:
         others = {
             name: _find(matrices, name, file, shape)
-            for name, matrix in matrices.items()
-            if name != mass and (name in square or (np.iscomplexobj(matrix) and matrix.shape == shape))
+            for name, one in matrices.items()
+            if name != mass and (name in square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
         if total is None and len(others) > 1:
             total = _usual(others, TOTAL_NAMES, "total", file)

@@ -1,11 +1,9 @@
-"""Dense generalised eigenproblems K phi = lambda M phi of many theta in one batch.
+"""Dense eigenproblems K phi = lambda M phi of many theta in one batch.
 
-There are two forms of it. Both scale mode shapes to unit modal mass, and return NaN where the stiffness is not
-positive definite.
-"""
+Three solvers scale mode shapes to unit modal mass, and return NaN where the stiffness is not positive definite."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -149,3 +147,283 @@ def _cholesky(matrices: Array) -> tuple[Array, Array]:
             return np.eye(matrices.shape[1])[np.newaxis], np.full((1, 1), np.nan)
         factors, ones = zip(*(_cholesky(matrix[np.newaxis]) for matrix in matrices), strict=True)
         return np.concatenate(factors), np.concatenate(ones)
+
+
+ROWS_TOGETHER = 32  # whose matrices stay in the processor's cache
+
+FEWEST_DOFS = 40
+"""Size of the matrices below which LAPACK finds all modes sooner."""
+
+SEPARATION = 1.7
+"""Ratio to the highest wanted eigenvalue that the first one beyond the masters has at least at theta = 1."""
+
+GUARD_MASTERS = 2  # fewest masters beyond the wanted modes
+
+STEPS = (3, 5, 5, 5)
+"""Steps of conjugate gradients between one Rayleigh-Ritz step and the next. Rows that need more go to LAPACK."""
+
+TOL_OF_SHAPES = 1e-12
+"""Largest relative error of an eigenvalue whose shape is wanted: that of the shape is about its square root."""
+
+
+LEAST_MASS = 1e-12  # share of the largest mu below which a coordinate is massless
+
+
+class Ritz(NamedTuple):
+    """Eigenvalues (n_samples, m) and shapes x (n_samples, m, n) on a subspace, M x, and the residuals."""
+
+    eigenvalues: Array
+    shapes: Array
+    inertia: Array
+    residuals: Array
+
+    @classmethod
+    def of(cls, eigenvalues: Array, x: Array, Kx: Array, mu: Array) -> "Ritz":
+        """From Kx and the diagonal of M."""
+        inertia = x * mu
+        return cls(eigenvalues, x, inertia, Kx - eigenvalues[:, :, np.newaxis] * inertia)
+
+
+class CondensationSolver:
+    """The lowest modes of K(theta) x = lambda M x for a constant mass, from the nominal ones.
+
+    In coordinates of the nominal modes, of unit strain energy, K(1) = I and M = diag(mu). The first m coordinates are
+    masters. The others, x_s, follow from the second of the two block rows,
+
+        (K_ss - lambda M_ss) x_s = -K_sm x_m,
+
+    by a few steps of conjugate gradients, which converge fast because K_ss is near I. The first block row is solved
+    by a Rayleigh-Ritz step. Both are repeated until a bound certifies every eigenvalue, and that none was missed; rows
+    that are not certified are solved by LAPACK.
+
+    With K(theta) >= c K(1), the form K - s M is at least W = diag(c; c - s mu / (1 - tau)) on the M-orthogonal
+    complement of the m shapes, whose slave coordinates hold the share tau of their modal masses. By Haynsworth's
+    inertia formula, fewer than j eigenvalues lie below s = lambda_j (1 - tol) if
+
+        sum over k >= j of r_k' W^-1 r_k / (lambda_k - s) < 1
+
+    with the residuals r. By Rayleigh and Ritz, at least j are not above lambda_j.
+    """
+
+    def __init__(self, stiffness: DenseTerms, mu: Array, basis: Array, lapack: EigenSolver, tol: float):
+        self._stiffness = stiffness
+        self._mu = mu
+        self._basis = basis
+        self._lapack = lapack
+        self._tol = tol
+        terms = stiffness.matrices * stiffness.factors[:, np.newaxis, np.newaxis]
+        self._floors = np.minimum(np.linalg.eigvalsh(terms)[:, 0], 0.0)
+
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        eigenvalues, _, certified = self._iterate(theta, n_modes, self._tol)
+        if not certified.all():
+            eigenvalues[~certified] = self._lapack.eigenvalues(theta[~certified], n_modes)
+        return eigenvalues
+
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        eigenvalues, coordinates, certified = self._iterate(theta, n_modes, min(self._tol, TOL_OF_SHAPES))
+        shapes = (coordinates @ self._basis.T).swapaxes(1, 2)
+        if not certified.all():
+            eigenvalues[~certified], shapes[~certified] = self._lapack.modes(theta[~certified], n_modes)
+        return eigenvalues, shapes
+
+    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        return self._lapack.local_modes(theta, n_modes)
+
+    def scaled(self, factors: Array) -> EigenSolver:
+        return self._lapack.scaled(factors)
+
+    def certified(self, theta: Array, n_modes: int) -> NDArray[np.bool_]:
+        """Rows whose modes are found by iteration and certified. The others are solved by LAPACK."""
+        return self._iterate(theta, n_modes, min(self._tol, TOL_OF_SHAPES))[2]
+
+    def _iterate(self, theta: Array, n_modes: int, tol: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Eigenvalues (n_samples, n_modes), shapes (n_samples, n_modes, n), and which rows are certified."""
+        eigenvalues = np.full((len(theta), n_modes), np.nan)
+        shapes = np.full((len(theta), n_modes, len(self._mu)), np.nan)
+        certified = np.zeros(len(theta), dtype=bool)
+        n_masters = self._n_masters(n_modes)
+        if n_masters:
+            for first in range(0, len(theta), ROWS_TOGETHER):
+                part = slice(first, first + ROWS_TOGETHER)
+                results = eigenvalues[part], shapes[part], certified[part]
+                self._iterate_together(theta[part], n_masters, tol, *results)
+        return eigenvalues, shapes, certified
+
+    def _n_masters(self, n_modes: int) -> int:
+        """Number of master coordinates; 0 where LAPACK is faster or the modes are not far enough from the others."""
+        apart = np.flatnonzero(SEPARATION * self._mu < self._mu[n_modes - 1])
+        apart = apart[apart >= n_modes + GUARD_MASTERS]
+        most = min(len(self._mu) // 3, np.count_nonzero(self._mu > LEAST_MASS * self._mu[0]))
+        return int(apart[0]) if apart.size and apart[0] <= most else 0
+
+    def _lower_bounds(self, theta: Array) -> Array:
+        """c of each row such that K(theta) >= c K(1)."""
+        products = self._stiffness.products(theta)
+        lowest = products.min(axis=1)
+        return lowest + (products - lowest[:, np.newaxis]) @ self._floors
+
+    def _iterate_together(
+        self, theta: Array, m: int, tol: float, eigenvalues: Array, shapes: Array, certified: NDArray[np.bool_]
+    ) -> None:
+        """Fill in the rows that can be certified."""
+        mu, n_modes = self._mu, eigenvalues.shape[1]
+        bounds = self._lower_bounds(theta)
+        rows = np.flatnonzero(bounds > 0)
+        bounds, K = bounds[rows], self._stiffness.assemble(theta[rows])
+        ritz = masters_alone(K, mu, m)
+        K_ss = K[:, m:, m:].astype(np.float32)
+        for n_steps in STEPS:
+            solvable = bounds > ritz.eigenvalues[:, n_modes - 1] * mu[m]
+            rows, K, K_ss, bounds, ritz = _take(solvable, rows, K, K_ss, bounds, ritz)
+            if not rows.size:
+                return
+            x = ritz.shapes.copy()
+            x[:, :, m:] -= self._corrections(K_ss, ritz, n_modes, n_steps)
+            ritz = rayleigh_ritz(x, x @ K, mu)
+            done = certificate(ritz, mu, bounds, m, n_modes, tol)
+            finished = rows[done]
+            eigenvalues[finished] = ritz.eigenvalues[done, :n_modes]
+            shapes[finished] = ritz.shapes[done, :n_modes]
+            certified[finished] = True
+            rows, K, K_ss, bounds, ritz = _take(~done, rows, K, K_ss, bounds, ritz)
+
+    def _corrections(self, K: Array, ritz: Ritz, n_modes: int, n_steps: int) -> Array:
+        """Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors."""
+        m = ritz.shapes.shape[1]
+        lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes])
+        shift = lowest.astype(K.dtype)[:, :, np.newaxis] * self._mu[m:].astype(K.dtype)
+        return conjugate_gradients(K, shift, ritz.residuals[:, :, m:].astype(K.dtype), n_steps)
+
+
+def batch_solver(
+    stiffness: DenseTerms, mass: DenseTerms, nominal: Array, lapack: EigenSolver, tol: float
+) -> EigenSolver:
+    """A solver for many theta around ``nominal``, which gives eigenvalues to a relative error of ``tol``.
+
+    It is LAPACK for small matrices, and where the mass varies.
+    """
+    if stiffness.n_dof < FEWEST_DOFS or not mass.is_constant:
+        return lapack
+    try:
+        lower = np.linalg.cholesky(stiffness.assemble(nominal)[0])
+    except np.linalg.LinAlgError:
+        return lapack
+    inverse = scipy.linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
+    mu, vectors = np.linalg.eigh(inverse @ mass.assemble(nominal)[0] @ inverse.T)
+    basis = inverse.T @ vectors[:, ::-1]
+    return CondensationSolver(stiffness.projected(basis), np.maximum(mu[::-1], 0.0), basis, lapack, tol)
+
+
+def conjugate_gradients(K: Array, shift: Array, right: Array, n_steps: int) -> Array:
+    """Approximate solutions x (n_samples, m, n) of x_j (K - diag(shift_j)) = right_j, where K is nearly diagonal."""
+    inverse = 1 / (np.einsum("sii->si", K)[:, np.newaxis] - shift)
+    x, r = np.zeros_like(right), right.copy()
+    p = z = r * inverse
+    rz = _dot(r, z)
+    for step in range(n_steps):
+        image = p @ K
+        image -= shift * p
+        length = _ratio(rz, _dot(p, image))
+        x += length * p
+        if step < n_steps - 1:
+            r -= length * image
+            z = r * inverse
+            before, rz = rz, _dot(r, z)
+            p = z + _ratio(rz, before) * p
+    return x
+
+
+def masters_alone(K: Array, mu: Array, m: int) -> Ritz:
+    """Rayleigh-Ritz on the masters, with nothing in the slave coordinates."""
+    to_unit = 1 / np.sqrt(mu[:m])
+    eigenvalues, vectors = np.linalg.eigh(to_unit[:, np.newaxis] * K[:, :m, :m] * to_unit)
+    x = np.zeros((len(K), m, len(mu)))
+    x[:, :, :m] = vectors.swapaxes(1, 2) * to_unit
+    return Ritz.of(eigenvalues, x, x[:, :, :m] @ K[:, :m], mu)
+
+
+def rayleigh_ritz(x: Array, Kx: Array, mu: Array) -> Ritz:
+    """Ritz values in ascending order and shapes of unit modal mass on the span of some shapes."""
+    to_unit = np.linalg.inv(np.linalg.cholesky((x * mu) @ x.swapaxes(1, 2)))
+    eigenvalues, vectors = np.linalg.eigh(to_unit @ (Kx @ x.swapaxes(1, 2)) @ to_unit.swapaxes(1, 2))
+    turned = vectors.swapaxes(1, 2) @ to_unit
+    return Ritz.of(eigenvalues, turned @ x, turned @ Kx, mu)
+
+
+def certificate(ritz: Ritz, mu: Array, bounds: Array, m: int, n_modes: int, tol: float) -> NDArray[np.bool_]:
+    """Rows in which each of the lowest Ritz values exceeds the eigenvalue of its rank by at most ``tol`` times that."""
+    lam = ritz.eigenvalues
+    tau = np.einsum("smi,smi->s", ritz.shapes[:, :, m:], ritz.inertia[:, :, m:])
+    floors = np.repeat(bounds[:, np.newaxis], len(mu), axis=1)
+    floors[:, m:] -= (lam[:, n_modes - 1] / (1 - np.minimum(tau, 0.99)))[:, np.newaxis] * mu[m:]
+    positive = (floors[:, m] > 0) & (tau < 0.99)
+    errors = (ritz.residuals**2 @ (1 / np.where(floors > 0, floors, np.inf))[:, :, np.newaxis])[:, :, 0]
+    wanted = lam[:, :n_modes, np.newaxis]
+    shares = errors[:, np.newaxis] / (np.abs(lam[:, np.newaxis] - wanted) + tol * wanted)
+    return positive & (np.triu(shares).sum(axis=2) < 1).all(axis=1)
+
+
+def _take(kept: NDArray[np.bool_], *arrays: Any) -> tuple[Any, ...]:
+    if kept.all():
+        return arrays
+    *plain, ritz = arrays
+    return *(array[kept] for array in plain), Ritz(*(array[kept] for array in ritz))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.einsum("smi,smi->sm", a, b)[:, :, np.newaxis]
+
+
+def _ratio(a: Array, b: Array) -> Array:
+    """a / b, or 0 where the iteration has found the solution."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+
+
+NUDGE = 1e-9  # share of the stiffness that is added where a repeated eigenvalue makes the equations singular
+
+
+def shape_derivatives(
+    stiffness: DenseTerms, mass: DenseTerms, theta: Array, eigenvalues: Array, shapes: Array
+) -> Array:
+    """Derivatives of mode shapes of unit modal mass, (n_samples, n, n_modes, n_parameters).
+
+    Solves the bordered equations
+
+    [K - lambda M, M phi; phi' M, 0] [d phi; -d lambda] = [-(dK - lambda dM) phi; -1/2 phi' dM phi]
+
+    for each mode of all rows together. They are regular where the eigenvalue is not repeated, also with massless
+    degrees of freedom. Rows with NaN eigenvalues, which have no solution, stay NaN.
+    """
+    solved = np.flatnonzero(np.isfinite(eigenvalues).all(axis=1))
+    derivatives = np.full((*shapes.shape, theta.shape[1]), np.nan)
+    theta, eigenvalues, shapes = theta[solved], eigenvalues[solved], shapes[solved]
+    K, M = stiffness.assemble(theta), mass.assemble(theta)
+    forces, d_masses = -stiffness.batch_derivatives(theta, shapes), np.zeros((len(theta), *derivatives.shape[2:]))
+    if not mass.is_constant:
+        inertia = mass.batch_derivatives(theta, shapes)
+        forces += eigenvalues[:, np.newaxis, :, np.newaxis] * inertia
+        d_masses = np.einsum("sim,simp->smp", shapes, inertia)
+    for mode in range(shapes.shape[2]):
+        phi, shift = shapes[:, :, mode], eigenvalues[:, mode, np.newaxis, np.newaxis]
+        right = np.concatenate([forces[:, :, mode], -0.5 * d_masses[:, np.newaxis, mode]], axis=1)
+        border = (M @ phi[:, :, np.newaxis])[:, :, 0]
+        derivatives[solved, :, mode] = _solve_bordered(K - shift * M, border, right, K)
+    return derivatives
+
+
+def _solve_bordered(matrices: Array, borders: Array, right: Array, scale: Array) -> Array:
+    """The first n unknowns of equations with a border of one row and column."""
+    n = matrices.shape[1]
+    largest = np.abs(scale).max(axis=(1, 2), initial=0.0)
+    factors = largest / np.abs(borders).max(axis=1)
+    bordered = np.zeros((len(matrices), n + 1, n + 1))
+    bordered[:, :n, :n] = matrices
+    bordered[:, :n, n] = bordered[:, n, :n] = borders * factors[:, np.newaxis]
+    right[:, n] *= factors[:, np.newaxis]
+    try:
+        found = np.linalg.solve(bordered, right)
+    except np.linalg.LinAlgError:
+        bordered[:, :n, :n] += NUDGE * largest[:, np.newaxis, np.newaxis] * np.eye(n)
+        found = np.linalg.solve(bordered, right)
+    return np.asarray(found, dtype=float)[:, :n]

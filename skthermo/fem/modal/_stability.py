@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, Matrix, as_dense
 from skthermo.fem._factors import factorise
-from skthermo.fem.modal._shift_invert import seeded_start
+from skthermo.fem.modal._sparse import seeded_start
 
 EPS = np.finfo(float).eps
 

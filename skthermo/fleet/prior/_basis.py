@@ -18,7 +18,7 @@ BREAKING = 0.02  # share from which lines in a component break
 
 @dataclass(frozen=True)
 class FleetBasis:
-    """Principal components of the standardised inputs, and broken lines in the largest; of zero mean in the fleet.
+    """Principal components of the inputs, and piecewise-linear functions of the largest, of zero mean in the fleet.
 
     The lines break at quantiles of the weather of all bridges and have unit variance there. Beyond the weather of the
     fleet they go on straight. ``covariance`` is that of the functions in the fleet. ``names`` are those of the inputs,

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from skthermo._tables.arrays import Array
 from skthermo.fleet.prior._families import CoefficientFamily, Member, expect, learn_families
-from skthermo.fleet.prior._posterior import ALIENS, Mixture, follow_chance, mixture, posterior
+from skthermo.fleet.prior._posterior import ATYPICAL, Mixture, follow_chance, mixture, posterior
 
 LEAST_BRIDGES = 3
 LEAST_DEVIATION = 1.0  # of a bridge's gain: that a few are alike is chance
@@ -19,7 +19,7 @@ LEVEL = 0.95  # probability with which a gain must be one
 COUNT = 10.0  # bridges as which it counts that few are atypical
 MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
 FEW = 60  # bridges of which one changes little of what is known of the others: fewer take more steps without it
-FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: an alien, among at least so many
+FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: atypical, among at least so many
 SETTLED = 0.05
 ROUNDS = 3  # in which atypical are found, and the families learned without them
 
@@ -69,7 +69,7 @@ class PoolingComparison:
         cls, members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
     ) -> PoolingComparison:
         """Learn families, leave bridges out, and learn again without the weight of atypical."""
-        probabilities = dict.fromkeys(names, 1 - ALIENS)
+        probabilities = dict.fromkeys(names, 1 - ATYPICAL)
         several = [name for name in names if sum(name in member.families for member in members) > 1]
         follows = seem_to_follow(members, several, covariance)
         families = learn_families(members, names, follows)
@@ -80,7 +80,7 @@ class PoolingComparison:
             follows = {(i, name): share for i, one in enumerate(found) for name, share in one.follows.items()}
             for name in several:
                 shares = [follows[i, name] for i, member in enumerate(members) if name in member.families]
-                probabilities[name] = (sum(shares) + (1 - ALIENS) * COUNT) / (len(shares) + COUNT)
+                probabilities[name] = (sum(shares) + (1 - ATYPICAL) * COUNT) / (len(shares) + COUNT)
             families = learn_families(members, names, follows, expect(members, families))
             if max((abs(share - before.get(key, 1.0)) for key, share in follows.items()), default=0.0) < SETTLED:
                 break
@@ -124,7 +124,7 @@ def by_bridge(
             alone, chance = one.without_family[name], follow_chance(probabilities[name])
             pooled = float(np.logaddexp(np.log(chance) + one.with_family[name], np.log1p(-chance) + alone))
             rows.append((bridge, name, alone, pooled, pooled - alone, share))
-    columns = ["bridge", "family", "alone", "pooled", "gain", "follows"]
+    columns = ["bridge", "family", "alone", "pooled", "gain", "pooling_probability"]
     return pd.DataFrame(rows, columns=columns).set_index(["bridge", "family"])
 
 

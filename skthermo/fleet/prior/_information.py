@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from skthermo._tables.arrays import Array, rows_by_pattern
-from skthermo._tables.times import correlation_time
+from skthermo._tables.frames import correlation_time
 from skthermo.fleet.prior._basis import FleetBasis
 from skthermo.fleet.prior._posterior import OwnPrior, posterior
 from skthermo.fleet.prior._records import BridgeRecords
@@ -144,8 +144,8 @@ class Information:
         """Learn noise, memory and outliers in turn with coefficients that have the bridge's own prior."""
         u = basis(records.inputs)
         centre = records.weights @ u / records.weights.sum()
-        level = _mean(records.logs, records.weights)
-        X, y = np.column_stack([np.ones(len(u)), u - centre]), records.logs - level
+        level = _mean(records.linear, records.weights)
+        X, y = np.column_stack([np.ones(len(u)), u - centre]), records.linear - level
         q = records.n_outputs
         expected = None if fleet is None else fleet.scatter(families)
         memory = 1.0 if fleet is None else fleet.memory

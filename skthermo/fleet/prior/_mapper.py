@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._estimators.arguments import check_flag
-from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.arrays import Array, as_columns, check_flag
 from skthermo._tables.frames import (
     check_same_rows,
     check_temperatures,
@@ -27,7 +26,7 @@ from skthermo.fleet.prior._covariates import Covariates
 from skthermo.fleet.prior._families import CoefficientFamily, Member
 from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
-from skthermo.fleet.prior._records import BridgeRecords, days_of, families_by_name, usable_rows
+from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics import complete_r2
 from skthermo.residuals.weather import TrainingRange, parts
 
@@ -44,6 +43,7 @@ class FleetKnowledge:
     covariates: Covariates = field(default_factory=lambda: Covariates({}, {}))
     families: Mapping[Hashable, CoefficientFamily] = field(default_factory=dict)
     chances: Mapping[Hashable, float] = field(default_factory=dict)
+    scales: Mapping[Hashable, float] = field(default_factory=dict)
 
     @classmethod
     def none(cls, inputs: Array, n_knots: int) -> FleetKnowledge:
@@ -63,17 +63,19 @@ class FleetKnowledge:
 
 
 class FleetMapper(RegressorMixin, Estimator):
-    """Positive quantities of a bridge from the weather, with a prior that a fleet gives.
+    """Frequencies or other quantities of a bridge from the weather, with a prior that a fleet gives.
 
     Parameters
     ----------
     prior : FleetPrior, optional
-        Fitted. Without one, the bridge is on its own: broken lines in the weather of its own records, and a ridge of
-        the most likely strength.
+        Fitted. Without one, the bridge is on its own: piecewise-linear regression on the weather of its own records,
+        and a ridge of the most likely strength.
     covariates : mapping of str to value, optional
         Covariates of this bridge; what is not given counts as unknown.
     families : mapping of str to str, optional
         Family of each parameter or mode by name; by default as for the fleet. None is never pooled.
+    link : {"log", "linear"} or mapping of family to one of these, optional
+        As in `FleetPrior`, whose link is the default; without a prior, "log".
 
     Attributes
     ----------
@@ -88,7 +90,9 @@ class FleetMapper(RegressorMixin, Estimator):
     basis_ : FleetBasis
         Functions of the weather.
     coefficients_ : ndarray of shape (n_outputs, 1 + n_functions)
-        CoefficientPosterior mean of the level and of the coefficients of the fleet's basis, of ln y.
+        Posterior mean of the level and of the coefficients of the fleet's basis, of ln y or, linear, y over its scale.
+    link_ : Link
+        What is linear in the functions of the weather, with the scales of linear quantities.
     covariance_ : ndarray of shape (n_outputs, 1 + n_functions, n_outputs, 1 + n_functions)
         Their posterior covariance.
     misfit_ : ndarray of shape (n_outputs,)
@@ -120,6 +124,7 @@ class FleetMapper(RegressorMixin, Estimator):
         "prior": [HasMethods(["mapper"]), None],
         "covariates": [Mapping, pd.Series, None],
         "families": [Mapping, None],
+        "link": [str, Mapping, None],
     }
 
     def __init__(
@@ -128,10 +133,12 @@ class FleetMapper(RegressorMixin, Estimator):
         *,
         covariates: Mapping[Hashable, Any] | None = None,
         families: Mapping[Hashable, Any] | None = None,
+        link: str | Mapping[Hashable, str] | None = None,
     ):
         self.prior = prior
         self.covariates = covariates
         self.families = families
+        self.link = link
 
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> FleetMapper:
@@ -142,7 +149,7 @@ class FleetMapper(RegressorMixin, Estimator):
         X : array-like or DataFrame of shape (n_samples, n_inputs)
             Temperatures in degrees Celsius, lagged as those of the fleet.
         y : array-like, Series or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
-            Positive quantities; NaN is allowed.
+            Quantities, positive ones where the link is "log"; NaN is allowed.
         sample_weight : array-like of shape (n_samples,), optional
             Relative precision of each row; a row of weight 0 counts as left out.
 
@@ -169,8 +176,10 @@ class FleetMapper(RegressorMixin, Estimator):
         names = self._names_of(y, values.shape[1])
         given = getattr(self.prior, "families", None) if self.families is None else self.families
         self.families_ = families_by_name(given, names)
-        records = BridgeRecords.of(inputs, values, names, weights, days_of(X))
         families = list(self.families_.values())
+        link = getattr(self.prior, "link", "log") if self.link is None else self.link
+        self.link_ = Link.of(link, families, values[trained], known.scales)
+        records = BridgeRecords.of(inputs, values, names, self.link_, weights, days_of(X))
         found, state = known.posterior(records, families, self.covariates)
         self.pooling_probability_ = {family: state.follows.get(family, 0.0) for family in dict.fromkeys(families)}
         self.basis_, self.centre_ = known.basis, found.centre
@@ -183,7 +192,7 @@ class FleetMapper(RegressorMixin, Estimator):
         return self
 
     def predict(self, X: ArrayLike, return_std: bool = False) -> Any:
-        """Quantities at the posterior mean of their logarithms.
+        """Quantities at the posterior mean of their logarithms, or of themselves with the linear link.
 
         Parameters
         ----------
@@ -195,7 +204,7 @@ class FleetMapper(RegressorMixin, Estimator):
         Returns
         -------
         y : ndarray or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
-            Exponential of the posterior mean, the median of the posterior.
+            The median of the posterior.
         std : ndarray or DataFrame of the same shape
             Only with ``return_std``: roots of the diagonal of `predict_covariance`.
         """
@@ -240,7 +249,7 @@ class FleetMapper(RegressorMixin, Estimator):
     def effects(
         self, temperatures: ArrayLike, name: Hashable = None, *, reference: float | None = None
     ) -> pd.DataFrame:
-        """How ln y changes from a reference temperature to others, where all inputs have been at one for long.
+        """How ln y (y, if linear) changes from a reference temperature to others, where inputs have been so for long.
 
         Parameters
         ----------
@@ -270,7 +279,8 @@ class FleetMapper(RegressorMixin, Estimator):
         values, d = steady_changes(self.basis_, temperatures, reference, self.own_range_)
         variances = np.einsum("ti,ij,tj->t", d, self.covariance_[row, 1:, row, 1:], d)
         columns = {"mean": d @ self.coefficients_[row, 1:], "standard_deviation": np.sqrt(variances)}
-        return pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
+        scale = np.nan_to_num(self.link_.scales[row], nan=1.0)
+        return scale * pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over outputs.
@@ -334,7 +344,7 @@ class FleetMapper(RegressorMixin, Estimator):
         return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
 
     def _posterior_at(self, X: ArrayLike, with_covariance: bool) -> tuple[Array, Array]:
-        """exp of the posterior mean, and its covariance; NaN where an input is missing."""
+        """Median of the posterior, and its covariance; NaN where an input is missing."""
         inputs = self._inputs(X)
         n_outputs = len(self.coefficients_)
         known = np.flatnonzero(~np.isnan(inputs).any(axis=1))
@@ -343,11 +353,12 @@ class FleetMapper(RegressorMixin, Estimator):
         for part in parts(len(known), self.coefficients_.size * n_outputs):
             rows = known[part]
             x = np.column_stack([np.ones(len(rows)), self.basis_(inputs[rows]) - self.centre_])
-            values[rows] = np.exp(x @ self.coefficients_.T)
+            values[rows] = self.link_.inverse(x @ self.coefficients_.T)
             if with_covariance:
                 half = np.einsum("ti,aibj->tabj", x, self.covariance_)
-                logs = np.einsum("tabj,tj->tab", half, x) + np.diag(self.misfit_)
-                covariance[rows] = values[rows][:, :, np.newaxis] * values[rows][:, np.newaxis] * logs
+                linear = np.einsum("tabj,tj->tab", half, x) + np.diag(self.misfit_)
+                slopes = np.broadcast_to(self.link_.slopes(values[rows]), values[rows].shape)
+                covariance[rows] = slopes[:, :, np.newaxis] * slopes[:, np.newaxis] * linear
         return values, covariance
 
     def _as_targets(self, X: ArrayLike, values: Array) -> Array | pd.DataFrame | pd.Series:

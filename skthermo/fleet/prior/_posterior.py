@@ -21,7 +21,10 @@ SMALLEST = 1e-8
 SETTLED = 0.03  # relative change of tau^2 that ends the iteration
 JITTER = 1e-9
 NEGLIGIBLE = 1e-9  # share of a combination
-ALIENS, ALIEN_FOLLOWS = 0.05, 0.2  # share of bridges of another kind, and of the families that one follows by chance
+ATYPICAL, ATYPICAL_FOLLOWS = (
+    0.05,
+    0.2,
+)  # share of bridges of another kind, and of the families that one follows by chance
 MOST_TYPICAL = 5.0  # times the typical deviation of its family that coefficients of a bridge on its own have at most
 
 
@@ -201,14 +204,16 @@ def mixture(
 
 
 def log_chance(flags: Sequence[bool], chances: Array) -> float:
-    """Log probability of a combination before any record; an alien as a whole follows few of its families."""
-    usual, alien = (np.log(np.where(flags, p, 1 - p)).sum() for p in (chances, np.full(len(chances), ALIEN_FOLLOWS)))
-    return float(np.logaddexp(np.log1p(-ALIENS) + usual, np.log(ALIENS) + alien))
+    """Log probability of a combination before any record; an atypical bridge as a whole follows few of its families."""
+    usual, atypical = (
+        np.log(np.where(flags, p, 1 - p)).sum() for p in (chances, np.full(len(chances), ATYPICAL_FOLLOWS))
+    )
+    return float(np.logaddexp(np.log1p(-ATYPICAL) + usual, np.log(ATYPICAL) + atypical))
 
 
 def follow_chance(chance: float) -> float:
-    """Probability of following a family before any record, be the bridge an alien or not."""
-    return (1 - ALIENS) * chance + ALIENS * ALIEN_FOLLOWS
+    """Probability of following a family before any record, be the bridge atypical or not."""
+    return (1 - ATYPICAL) * chance + ATYPICAL * ATYPICAL_FOLLOWS
 
 
 def climb(weight: Callable[[tuple[bool, ...]], float], flags: tuple[bool, ...]) -> None:

@@ -19,7 +19,7 @@ from skthermo.fleet.prior._families import Member
 from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._mapper import FleetKnowledge, FleetMapper
 from skthermo.fleet.prior._posterior import OwnPrior
-from skthermo.fleet.prior._records import bridges_of, common_inputs, families_by_name, read_bridge
+from skthermo.fleet.prior._records import Link, bridges_of, common_inputs, families_by_name, linear_scales, read_bridge
 
 
 class FleetPrior(Estimator):
@@ -33,6 +33,11 @@ class FleetPrior(Estimator):
     families : mapping, optional
         Family of each parameter (or mode) by name, or of each bridge's name such a mapping. What belongs to one family
         responds to the weather alike; None as a family is never pooled. By default each name is a family of its own.
+    link : {"log", "linear"} or mapping of family to one of these, default="log"
+        What is linear in the functions of the weather: "log", the logarithm, for frequencies and other positive
+        quantities, so that bridges are compared by relative changes; "linear", the quantity itself, for displacements,
+        inclinations or strains of any sign. Those of one family need the same unit on all bridges, and are compared by
+        changes in that unit.
 
     Attributes
     ----------
@@ -41,7 +46,7 @@ class FleetPrior(Estimator):
         summed over bridges, by a prior of its own and by what all other bridges say of it; ``gain``, the difference;
         its ``standard_error`` over bridges; and ``is_pooled``.
     bridges_ : DataFrame
-        The same by bridge and family, and ``follows``, the probability that the bridge behaves as the family.
+        The same by bridge and family, and ``pooling_probability``, that the bridge behaves as the family.
     knowledge_ : FleetKnowledge
         What a mapper needs: functions of the weather, distributions of their coefficients by family, noise.
     reach_ : TrainingRange
@@ -65,22 +70,23 @@ class FleetPrior(Estimator):
 
     with one basis u for the fleet: principal components of the standardised inputs, lags included, and hinges of the
     largest of them. Levels l belong to the bridge alone, so that a unit of y changes nothing else. Residuals are
-    N(0, S / w), their precision divided by their correlation time. Records far from what is usual count less.
+    N(0, S / w), their precision divided by their correlation time. Records far from what is usual count less. With the
+    linear link, y over a scale of its family stands in place of ln y.
 
     In family g, beta ~ N(M'z, Sigma) for covariates z: a constant, standardised numbers and indicators of categories,
     whose effects have a ridge. Expectation maximisation finds M and Sigma from the bridges' likelihoods; Sigma is drawn
     to a multiple of the identity by three bridges' worth, and for another bridge it is widened by what a Student
     distribution of so few bridges has. On its own, beta ~ N(0, tau^2 D), with the most likely tau, and a diagonal D
-    that tells which functions are large in any bridge.
+    of how large each function is in any bridge.
 
-    Each bridge is left out (of more than 50, one of 50 groups at a time), and judged by the evidence of its records: on
-    its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges have
-    it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges train a
-    family by their probability of following it, so that atypical do not widen it.
+    Each bridge is left out (of more than 50, one of 50 groups at a time), and compared by the evidence of its records:
+    on its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges
+    have it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges
+    train a family by their probability of following it, so that atypical ones do not widen it.
 
-    What no function of the basis follows, such as the heat of the ground, is told by autocovariances of the residuals
-    two and three days apart (two and three rows, without stamps): the median over the bridges of a family. Noise that
-    remembers for so long counts as such, and makes bands wide.
+    What no function of the basis follows, such as the heat of the ground, is estimated from autocovariances of the
+    residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family.
+    Noise that remembers for so long counts as such, and makes bands wide.
 
     ``tests/benchmarks/fleet_prior.py`` measures errors and bands beside the fleet's mean, a ridge towards it, bridges
     on their own and bridges with a year of records.
@@ -106,11 +112,19 @@ class FleetPrior(Estimator):
     _parameter_constraints: dict = {
         "n_knots": [Interval(Integral, 1, None, closed="left")],
         "families": [Mapping, None],
+        "link": [str, Mapping],
     }
 
-    def __init__(self, n_knots: int = 4, families: Mapping[Hashable, Any] | None = None):
+    def __init__(
+        self,
+        n_knots: int = 4,
+        families: Mapping[Hashable, Any] | None = None,
+        *,
+        link: str | Mapping[Hashable, str] = "log",
+    ):
         self.n_knots = n_knots
         self.families = families
+        self.link = link
 
     def __sklearn_clone__(self) -> FleetPrior:
         # A mapper's clones share what the fleet knows: it is not theirs to learn.
@@ -125,7 +139,7 @@ class FleetPrior(Estimator):
         ----------
         bridges : mapping or sequence
             Of each bridge's name a fitted `~skthermo.surrogate.DataInformedFEM`, or a pair (T, Y) of temperatures,
-            (n_samples, n_inputs), and positive quantities such as frequencies in Hz, (n_samples, n_outputs); NaN is
+            (n_samples, n_inputs), and quantities such as frequencies in Hz, (n_samples, n_outputs); NaN is
             allowed. A sequence is named 0, 1, ...; a `Fleet` counts as the mapping of its fitted chains.
         covariates : DataFrame, optional
             A row for each bridge's name: numbers (span) and categories (material).
@@ -143,12 +157,13 @@ class FleetPrior(Estimator):
         self._validate_params()
         read = {name: read_bridge(name, bridge) for name, bridge in bridges_of(bridges).items()}
         inputs = common_inputs(read)
-        records = [one.records(name, inputs) for name, one in read.items()]
-        of_bridge = {
-            bridge: families_by_name(self.families, one.names, bridge)
-            for bridge, one in zip(read, records, strict=True)
-        }
+        of_bridge = {bridge: families_by_name(self.families, one.names, bridge) for bridge, one in read.items()}
         families = [list(by_name.values()) for by_name in of_bridge.values()]
+        scales = linear_scales(read, of_bridge, self.link)
+        records = [
+            one.records(name, inputs, Link.of(self.link, own, one.values, scales))
+            for (name, one), own in zip(read.items(), families, strict=True)
+        ]
         basis = FleetBasis.of([one.inputs for one in records], self.n_knots, inputs)
         plain = OwnPrior(np.ones(basis.n_functions))
         found = [Information.of(basis, one, own, plain) for one, own in zip(records, families, strict=True)]
@@ -161,7 +176,7 @@ class FleetPrior(Estimator):
         names = sorted({family for of_output in families for family in of_output if family is not None}, key=str)
         compared = PoolingComparison.of(members, list(read), names, basis.covariance)
         noise = FleetNoise.of(found, families)
-        self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities)
+        self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities, scales)
         self.comparison_, self.bridges_ = compared.by_family, compared.by_bridge
         self.coefficients_, self.bridge_families_ = compared.coefficients, of_bridge
         self.parameter_names_ = list(dict.fromkeys(name for by_name in of_bridge.values() for name in by_name))
@@ -191,7 +206,7 @@ class FleetPrior(Estimator):
     def effects(
         self, temperatures: ArrayLike, family: Hashable = None, *, reference: float | None = None
     ) -> pd.DataFrame:
-        """How ln y changes from a reference temperature to others, where all inputs have been at one for long.
+        """How ln y (y, if linear) changes from a reference temperature to others, where inputs have been so for long.
 
         Parameters
         ----------
@@ -227,7 +242,8 @@ class FleetPrior(Estimator):
             rows = [i for i, of_output in enumerate(by_name.values()) if of_output == family]
             if rows:
                 columns[bridge] = d @ self.coefficients_[bridge][rows].mean(axis=0)
-        return pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
+        scale = self.knowledge_.scales.get(family, 1.0)
+        return scale * pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
 
     def summary(self) -> str:
         """What the comparison says, in sentences.
@@ -248,7 +264,7 @@ class FleetPrior(Estimator):
                 lines.append(f"{name}: not pooled, {n_bridges}; expected at least {LEAST_BRIDGES}")
             else:
                 lines.append(
-                    f"{name}: not pooled: what {n_bridges} say of each other cannot be told from chance (a gain of "
+                    f"{name}: not pooled: {n_bridges} predict each other no better than chance allows (a gain of "
                     f"{gain} in log likelihood); a new bridge learns it alone"
                 )
         return "\n".join(lines)

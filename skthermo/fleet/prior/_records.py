@@ -12,23 +12,73 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, as_columns, spread_evenly
-from skthermo._tables.frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import (
+    check_columns,
+    check_same_rows,
+    check_temperatures,
+    column_names,
+    frame_like,
+    has_stamps,
+    row_times,
+)
 from skthermo._validation import check_array, check_is_fitted
 
 MOST_ROWS = 20_000
+TYPICAL = 0.02  # standard deviation of the logarithm of a frequency, as which those of linear quantities count
 DAY = 86_400e9  # nanoseconds
 
 
 @dataclass(frozen=True)
+class Link:
+    """What is linear in functions of the weather: the logarithm of a quantity, or the quantity over a scale.
+
+    ``scales``, (n_outputs,), are in the units of the quantities, and NaN for logarithms.
+    """
+
+    scales: Array
+
+    @classmethod
+    def of(
+        cls,
+        link: str | Mapping[Hashable, str],
+        families: Sequence[Hashable],
+        values: Array,
+        known: Mapping[Hashable, float] | None = None,
+    ) -> Link:
+        """That of families, by name; scales are those of the fleet where known, else of the values."""
+        kinds = [link if isinstance(link, str) else link.get(family, "log") for family in families]
+        wrong = sorted({repr(kind) for kind in kinds} - {"'log'", "'linear'"})
+        if wrong:
+            raise ValueError(f"link is {', '.join(wrong)}; expected 'log' or 'linear', or one of them by family")
+        deviations = [np.std(column[~np.isnan(column)]) if (~np.isnan(column)).any() else 0.0 for column in values.T]
+        own = [deviation / TYPICAL if deviation > 0 else 1.0 for deviation in deviations]
+        scales = [(known or {}).get(family, scale) for family, scale in zip(families, own, strict=True)]
+        return cls(np.where([kind == "log" for kind in kinds], np.nan, scales))
+
+    def forward(self, values: Array) -> Array:
+        """What is linear, of quantities (n_rows, n_outputs)."""
+        is_log = np.isnan(self.scales)
+        return np.where(is_log, np.log(np.where(is_log, values, 1.0)), values / self.scales)
+
+    def inverse(self, linear: Array) -> Array:
+        """Quantities of what is linear."""
+        is_log = np.isnan(self.scales)
+        return np.where(is_log, np.exp(np.where(is_log, linear, 0.0)), linear * self.scales)
+
+    def slopes(self, values: Array) -> Array:
+        """Derivatives of quantities by what is linear."""
+        return np.where(np.isnan(self.scales), values, self.scales)
+
+
+@dataclass(frozen=True)
 class BridgeRecords:
-    """Inputs (n, d) and logarithms (n, q) of positive quantities; ``weights`` are relative precisions of the rows.
+    """Inputs (n, d) and what is linear in them (n, q); ``weights`` are relative precisions of the rows.
 
     ``step`` is the usual time from row to row, in days.
     """
 
     inputs: Array
-    logs: Array
+    linear: Array
     names: list[Hashable]
     weights: Array
     step: float = 1.0
@@ -39,6 +89,7 @@ class BridgeRecords:
         inputs: Array,
         values: Array,
         names: Sequence[Hashable],
+        link: Link,
         weights: Array | None = None,
         times: Array | None = None,
     ) -> BridgeRecords:
@@ -46,20 +97,23 @@ class BridgeRecords:
         weights = np.ones(len(inputs)) if weights is None else weights
         usable = usable_rows(inputs, values, weights)
         rows = spread_evenly(np.flatnonzero(usable), MOST_ROWS)
-        for name, column in zip(names, values[rows].T, strict=True):
+        for name, column, scale in zip(names, values[rows].T, link.scales, strict=True):
             if np.isnan(column).all():
                 raise ValueError(f"quantity {name!r} is NaN in all {len(rows)} rows that can be used; expected values")
-            if (column <= 0).any():
-                raise ValueError(f"quantity {name!r} falls to {np.nanmin(column):g}; expected positive numbers")
+            if np.isnan(scale) and (column <= 0).any():
+                raise ValueError(
+                    f"quantity {name!r} falls to {np.nanmin(column):g}; expected positive numbers, or "
+                    "link='linear' for quantities of any sign"
+                )
         steps = np.diff(np.arange(len(inputs)) if times is None else times)[: len(rows)]
         step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
         step *= usable.sum() / max(len(rows), 1)
-        return cls(inputs[rows], np.log(values[rows]), list(names), weights[rows], step)
+        return cls(inputs[rows], link.forward(values[rows]), list(names), weights[rows], step)
 
     @property
     def n_outputs(self) -> int:
         """Number of quantities, q."""
-        return self.logs.shape[1]
+        return self.linear.shape[1]
 
 
 def days_of(table: ArrayLike) -> Array | None:
@@ -84,13 +138,13 @@ class ReadBridge:
     weights: Array | None = None
     times: Array | None = None
 
-    def records(self, name: Hashable, order: Sequence[Hashable] | None) -> BridgeRecords:
+    def records(self, name: Hashable, order: Sequence[Hashable] | None, link: Link) -> BridgeRecords:
         """Its records, inputs in a common order; errors name the bridge."""
         inputs = self.inputs
         if order is not None and self.input_names is not None and self.inputs.shape[1] > 1:
             inputs = inputs[:, [self.input_names.index(name) for name in order]]
         with errors_of(name):
-            return BridgeRecords.of(inputs, self.values, self.names, self.weights, self.times)
+            return BridgeRecords.of(inputs, self.values, self.names, link, self.weights, self.times)
 
 
 @contextmanager
@@ -185,3 +239,18 @@ def families_by_name(
         families = families[bridge]
     known = {} if families is None else families
     return {name: known.get(name, name) for name in names}
+
+
+def linear_scales(
+    read: Mapping[Hashable, ReadBridge],
+    of_bridge: Mapping[Hashable, Mapping[Hashable, Hashable]],
+    link: str | Mapping[Hashable, str],
+) -> dict[Hashable, float]:
+    """Scale of each family that is linear itself: the median over its outputs on all bridges."""
+    found: dict[Hashable, list[float]] = {}
+    for bridge, one in read.items():
+        families = list(of_bridge[bridge].values())
+        for family, scale in zip(families, Link.of(link, families, one.values).scales, strict=True):
+            if family is not None and not np.isnan(scale):
+                found.setdefault(family, []).append(float(scale))
+    return {family: float(np.median(scales)) for family, scales in found.items()}

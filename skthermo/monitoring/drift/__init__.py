@@ -1,4 +1,4 @@
-"""Stiffness over years: drift of damage groups, told from weather and noise."""
+"""Stiffness over years: drift of damage groups, apart from weather and noise."""
 
 from skthermo.monitoring.drift._follower import DriftFollower
 from skthermo.monitoring.drift._history import ParameterHistory

@@ -10,48 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo.residuals.weather import weather_coordinates
-
-MOST_COORDINATES = 3  # of the weather
-LOW, HIGH = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
-
-
-@dataclass(frozen=True)
-class WeatherFunctions:
-    """What a chain may have mislearned depends on the weather as a sum of these functions.
-
-    A constant, principal coordinates of the standardised temperatures and their squares, two hinges of the first one,
-    and its mean of the day before.
-    """
-
-    mean: Array
-    directions: Array
-    ends: Array
-
-    @classmethod
-    def of(cls, temperatures: Array) -> WeatherFunctions:
-        """The basis for records, (n_records, n_sensors), without gaps in those that count."""
-        known = temperatures[~np.isnan(temperatures).any(axis=1)]
-        scaler, components = (step for _, step in weather_coordinates(known).steps)
-        directions = components.components_[:MOST_COORDINATES] / scaler.scale_
-        centre = scaler.mean_ + components.mean_ * scaler.scale_
-        places = (known - centre) @ directions.T
-        spread = places.std(axis=0)
-        directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
-        first = (known - centre) @ directions[0]
-        return cls(centre, directions, np.quantile(first, [LOW, HIGH]))
-
-    @property
-    def size(self) -> int:
-        """Number of functions."""
-        return 2 * len(self.directions) + 4
-
-    def values(self, temperatures: Array) -> Array:
-        """All functions but the last, which is that of the day before, (n_records, size - 1)."""
-        places = (temperatures - self.mean) @ self.directions.T
-        first, (low, high) = places[:, :1], self.ends
-        hinges = [np.maximum(low - first, 0.0), np.maximum(first - high, 0.0)]
-        return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
+from skthermo.residuals.weather import WeatherFunctions
 
 
 @dataclass(frozen=True)
@@ -59,7 +18,8 @@ class DailyMeans:
     """Daily means of the logarithm of measured over predicted frequencies.
 
     ``values`` and ``counts``, (n_days, n_modes), are means and numbers of records; ``basis``, (n_days, n_modes, size),
-    is the mean of the `WeatherFunctions` over the records of each mode.
+    is the mean of the `WeatherFunctions` over the records of each mode, and last the first weather coordinate of the
+    day before.
     """
 
     values: Array
@@ -88,12 +48,12 @@ class DailyMeans:
         earlier = np.append(before, usual[:-1])
         earlier = np.where(np.isnan(earlier), np.where(np.isnan(usual), 0.0, usual), earlier)
         values, counts = np.full((n_days, n_modes), np.nan), np.zeros((n_days, n_modes))
-        means = np.zeros((n_days, n_modes, basis.size))
+        means = np.zeros((n_days, n_modes, basis.size + 1))
         for mode in range(n_modes):
             rows = known & ~np.isnan(ratios[:, mode])
             counts[:, mode] = np.bincount(of_day[rows], minlength=n_days)
             values[:, mode] = _means(ratios[rows, mode], of_day[rows], n_days)
-            for column in range(basis.size - 1):
+            for column in range(basis.size):
                 means[:, mode, column] = _means(functions[rows, column], of_day[rows], n_days)
             means[:, mode, -1] = earlier
         return cls(values, counts, np.nan_to_num(means))

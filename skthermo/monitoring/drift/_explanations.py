@@ -19,10 +19,10 @@ RATE = 0.03  # standard deviation of a yearly change of ln stiffness of a group 
 PRIOR = {1: 0.8, 2: 0.2}
 """Prior probability that as many groups drift, if any does."""
 
-AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not told apart: a factor of 20
-NOTABLE = 0.05  # change of a group over the records that should be seen, and told from that of others
+AS_LIKELY = 3.0  # difference in log evidence up to which explanations are not distinguished: a factor of 20
+NOTABLE = 0.05  # change of a group over the records that should be seen, and distinguished from that of others
 DRAWS = 999
-SIGNIFICANT = 0.01  # probability with which a structure that does not age is said to drift
+SIGNIFICANT = 0.01  # probability with which a structure that does not age counts as drifting
 TINY = 1e-14  # variance of what cannot change
 
 
@@ -110,15 +110,15 @@ class Explanations:
     p_value: float
     widening: float
     lookalikes: dict[int, list[int]]
-    unseen: NDArray[np.bool_]
+    unobservable: NDArray[np.bool_]
 
     @classmethod
     def of(
         cls, trends: ModeTrends, freedom: float, random: np.random.RandomState, even: Sequence[int] = ()
     ) -> Explanations:
         """Weigh all sets of one or two groups, and ``even`` changes alone; draws give the probability by chance."""
-        unseen = _structure(trends)[1]
-        seen = np.flatnonzero(~unseen).tolist() or list(range(trends.n_groups))
+        unobservable = _structure(trends)[1]
+        seen = np.flatnonzero(~unobservable).tolist() or list(range(trends.n_groups))
         singles = [(group,) for group in seen]
         first = max(singles, key=lambda one: max(_evidences(trends, one)))
         widening = trends.widening(first)
@@ -134,9 +134,9 @@ class Explanations:
         order = np.argsort(-(evidence + prior), kind="stable")
         observed = table[: len(singles)].max()
         p_value = _chance(trends, singles, observed, freedom, random)
-        lookalikes, unseen = _structure(trends)
+        lookalikes, unobservable = _structure(trends)
         found = evidence + prior
-        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, lookalikes, unseen)
+        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, lookalikes, unobservable)
 
     @property
     def probabilities(self) -> Array:

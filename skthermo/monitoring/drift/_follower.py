@@ -11,11 +11,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from skthermo._effects.frequencies import ALL_GROUPS
+from skthermo._effects import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
@@ -34,7 +34,7 @@ from skthermo.monitoring.drift._observations import (
 DELAY = 30
 """Days that a day waits before drift is learned from it: a sudden change is seen by then."""
 
-SUDDEN = 1e-3  # probability that the mean of waiting days is as far from what was foretold by chance
+SUDDEN = 1e-3  # probability that the mean of waiting days is as far from what was predicted by chance
 CLEAR = 0.05  # probability that frequencies without drift would seem to drift as much, from which it is taken out
 ROUNDING = 1e-6  # share of the mean variance of the shifts by which directions that no group moves are known
 LIMIT = 0.05
@@ -51,7 +51,7 @@ class FollowerState(SavesFrames):
 
     ``known`` are levels and rates of the groups, constants and disturbances by all days up to the one that was
     ``learned`` last, ``waiting`` the days since. Drift is not learned from those that are ``sudden``: in a time that
-    departs from what was foretold; ``n_left_out`` of such in a row. ``weather`` is that of the last day; ``times``
+    departs from what was predicted; ``n_left_out`` of such in a row. ``weather`` is that of the last day; ``times``
     (nanoseconds) and ``temperatures`` are the latest records, as many as lags of the chain look back.
     """
 
@@ -76,9 +76,9 @@ class DriftFollower:
 
     A Kalman filter follows the stiffness of groups day by day, apart from weather and noise, relative to the mean of a
     baseline, a month behind: a day is learned from when it has waited `DELAY` days, and only if no time of this length
-    that holds it departs from what was foretold. So a sudden change is never learned as drift, however long it lasts; a
-    drift that is much faster than some percent a year is not either. A sudden change that the mean of a month does not
-    show is learned in time, and reported as the drift that it looks like.
+    that holds it departs from what was predicted. So a sudden change is never learned as drift, however long it lasts;
+    a drift that is much faster than some percent a year is not either. A sudden change that the mean of a month does
+    not show is learned in time, and reported as the drift that it looks like.
 
     What is taken out is the drift found, times a share that is 0 as long as it may be chance and goes to 1 as it
     becomes clear.
@@ -120,7 +120,7 @@ class DriftFollower:
         daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups).without_even()
         noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
         n_groups, n_modes, span = len(effects.names), F.shape[1], len(days) * A_DAY
-        sizes = [n_groups, n_groups, n_modes * records.basis.size, n_modes]
+        sizes = [n_groups, n_groups, n_modes * (records.basis.size + 1), n_modes]
         covariance = np.diag(np.repeat([0.0, RATE**2, MISLEARNED**2, 0.0], sizes))
         levels, slopes = np.arange(n_groups), n_groups + np.arange(n_groups)
         covariance[levels, levels] = (RATE * span / 2) ** 2
@@ -233,7 +233,7 @@ class DriftFollower:
         n = len(self.members)
         walk, turn = (deviation**2 * A_DAY * np.eye(n) for deviation in (WALK, TURN))
         predicted = DailySteps(A_DAY, walk, turn, self.noise.memory, self.noise.renewal).predict(known)
-        return predicted if shown is None else absorb(predicted, shown)[0]
+        return predicted if shown is None else absorb(predicted, shown)
 
     def estimate(self, known: State) -> pd.DataFrame:
         """Change of each group's ln stiffness since the baseline, and yearly, with standard errors."""
@@ -264,7 +264,7 @@ class DriftFollower:
 
     def _no_records(self) -> DailyMeans:
         """A day without any."""
-        n_modes, size = len(self.modes), self.records.basis.size
+        n_modes, size = len(self.modes), self.records.basis.size + 1
         none = np.zeros((1, n_modes))
         return DailyMeans(none + np.nan, none, np.zeros((1, n_modes, size)))
 
@@ -285,17 +285,17 @@ class DriftFollower:
         )
 
     def _departs(self, known: State, waiting: DailyMeans) -> bool:
-        """Whether the mean of the days that wait is too far from what was foretold."""
+        """Whether the mean of the days that wait is too far from what was predicted."""
         number = waiting.known.sum(axis=0)
         modes = np.flatnonzero(number)
         if not len(modes):
             return False
-        shift, spread = self._foretold(known, waiting)
+        shift, spread = self._predicted(known, waiting)
         difference = (np.nansum(waiting.values, axis=0)[modes] / number[modes]) - shift
         distance = float(difference @ np.linalg.solve(spread, difference))
         return distance > len(modes) * stats.f.isf(SUDDEN, len(modes), max(self.noise.freedom, 4.0))
 
-    def _foretold(self, known: State, waiting: DailyMeans) -> tuple[Array, Array]:
+    def _predicted(self, known: State, waiting: DailyMeans) -> tuple[Array, Array]:
         """Mean of ln ratios of each measured mode over the days that wait, and its covariance."""
         noise, slopes = self.noise, self.slopes
         known_days = waiting.known

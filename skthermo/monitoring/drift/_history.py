@@ -10,20 +10,19 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from skthermo._effects.frequencies import ALL_GROUPS
+from skthermo._effects import ALL_GROUPS
 from skthermo._tables.arrays import Array, as_floats, is_real
-from skthermo._tables.frames import frame_like
+from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
-from skthermo._tables.times import YEAR, has_stamps
 
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
 DRAWS = 4000
-FARTHEST = 100.0  # years ahead for which a date is told
-SHORT = 1.5  # years of records below which season and drift are hardly told apart
+FARTHEST = 100.0  # years ahead for which a date is given
+SHORT = 1.5  # years of records below which season and drift are hardly distinguished
 
 
-class GroupCourse(NamedTuple):
+class GroupTrajectory(NamedTuple):
     """Ln stiffness of a group on each day, its standard deviation, and its random walk's in a year.
 
     ``end`` and ``end_covariance`` are of the level on the last day and the steady rate a year.
@@ -35,8 +34,8 @@ class GroupCourse(NamedTuple):
     end_covariance: Array
     walk: float
 
-    def with_error_of_effects(self, share: float) -> GroupCourse:
-        """The same course, of which a share may be an error of the FE model's effects."""
+    def with_error_of_effects(self, share: float) -> GroupTrajectory:
+        """The same trajectory, of which a share may be an error of the FE model's effects."""
         return self._replace(
             deviation=np.hypot(self.deviation, share * self.mean),
             end_covariance=self.end_covariance + share**2 * np.outer(self.end, self.end),
@@ -53,9 +52,9 @@ class ParameterHistory:
     ----------
     days : DatetimeIndex
         Beginning of each day.
-    courses : mapping of str to GroupCourse
-        Ln stiffness of each group, and of each set of groups that cannot be told apart if all of them change alike; 0
-        on the first day.
+    trajectories : mapping of str to GroupTrajectory
+        Ln stiffness of each group, and of each set of indistinguishable groups if all of them change alike; 0 on the
+        first day.
     years : float
         Length of the records in years.
     p_value : float
@@ -65,13 +64,13 @@ class ParameterHistory:
     explanations : DataFrame
         Sets of one or two groups that may drift, the best first: ``groups``; ``probability``, if any of the sets
         drifts; ``log_evidence`` against no drift.
-    sets : list of tuple of str
-        Groups that cannot be told apart: in the drift that was found, or by their effects on the modes.
+    indistinguishable : list of tuple of str
+        Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes.
     rivals : mapping of str to list of str
         Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
     lookalikes : mapping of str to list of str
         Groups of which a drift of 5 % would look like a drift of others, with these.
-    unseen : list of str
+    unobservable : list of str
         Groups of which a loss of 5 % over the records would not be seen.
     noticed_from : Series
         Change a year, by group, from which a steady drift is found in 9 of 10 cases.
@@ -99,19 +98,19 @@ class ParameterHistory:
     >>> history.has_drift, history.explanations["groups"].iloc[0]
     (True, ('bottom',))
     >>> history.table["bottom"].columns.tolist()
-    ['estimate', 'lower', 'upper']
+    ['estimate', 'ci_low', 'ci_high']
     """
 
     days: pd.DatetimeIndex
-    courses: Mapping[str, GroupCourse] = field(repr=False)
+    trajectories: Mapping[str, GroupTrajectory] = field(repr=False)
     years: float
     p_value: float
     significance: float
     explanations: pd.DataFrame = field(repr=False)
-    sets: list[tuple[str, ...]]
+    indistinguishable: list[tuple[str, ...]]
     rivals: Mapping[str, list[str]]
     lookalikes: Mapping[str, list[str]]
-    unseen: list[str]
+    unobservable: list[str]
     noticed_from: pd.Series = field(repr=False)
     modes: pd.DataFrame = field(repr=False)
     misfit_p_value: float
@@ -131,11 +130,11 @@ class ParameterHistory:
 
     @property
     def table(self) -> pd.DataFrame:
-        """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "lower" | "upper"), bands of 95 %."""
+        """Relative stiffness by day, 1 on the first: columns (group, "estimate" | "ci_low" | "ci_high"), at 95 %."""
         columns = {}
-        for name, course in self.courses.items():
-            for what, side in (("estimate", 0.0), ("lower", -N_ERRORS), ("upper", N_ERRORS)):
-                columns[name, what] = np.exp(course.mean + side * course.deviation)
+        for name, trajectory in self.trajectories.items():
+            for what, side in (("estimate", 0.0), ("ci_low", -N_ERRORS), ("ci_high", N_ERRORS)):
+                columns[name, what] = np.exp(trajectory.mean + side * trajectory.deviation)
         return pd.DataFrame(columns, index=self.days)
 
     @property
@@ -144,11 +143,11 @@ class ParameterHistory:
 
         ``change`` over the records, relative, and ``change_error``; ``per_year`` and ``standard_error``; ``p_value`` of
         no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
-        another one of its set), "no sign", or "not seen"; ``noticed_from``.
+        another one of its set), "no sign", or "unobservable"; ``noticed_from``.
         """
-        levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.courses.values()]).T
+        levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.trajectories.values()]).T
         change, errors = np.expm1(levels), np.exp(levels) * deviations
-        names, weights = list(self.courses), self.explanations
+        names, weights = list(self.trajectories), self.explanations
         shares = [
             weights.loc[[name in groups for groups in weights["groups"]], "probability"].sum()
             if name in self.groups
@@ -180,7 +179,7 @@ class ParameterHistory:
         DataFrame
             One row a group or set: ``date``, before which it is reached with probability one half; ``earliest`` and
             ``latest``, between which it is reached with 95 %; ``probability`` that it is reached within 10 years of the
-            last day. NaT where that takes more than 100 years, and for groups that are not seen.
+            last day. NaT where that takes more than 100 years, and for groups that are unobservable.
 
         Raises
         ------
@@ -190,9 +189,9 @@ class ParameterHistory:
         if not is_real(limit) or not -1 < limit < 1 or limit == 0:
             raise ValueError(f"limit is {limit!r}; expected a relative change, such as -0.1 for a loss of 10 %")
         random, rows = np.random.RandomState(self.seed), {}
-        for name, course in self.courses.items():
-            years = self._first_passages(course, float(np.log1p(limit)), random)
-            if name in self.unseen:
+        for name, trajectory in self.trajectories.items():
+            years = self._first_passages(trajectory, float(np.log1p(limit)), random)
+            if name in self.unobservable:
                 rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
                 continue
             dates = [self._date(years, share) for share in (0.5, (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)]
@@ -238,7 +237,7 @@ class ParameterHistory:
         return list(self._answer())
 
     def limits(self) -> list[str]:
-        """What cannot be said.
+        """What is not known.
 
         Returns
         -------
@@ -248,7 +247,7 @@ class ParameterHistory:
         return list(self._limits())
 
     def summary(self) -> str:
-        """What was found, and what cannot be said.
+        """What was found, and what is not known.
 
         Returns
         -------
@@ -266,25 +265,27 @@ class ParameterHistory:
         return f"ParameterHistory({found or 'no drift'})"
 
     def _drifts(self, name: str) -> str:
-        if name in self.unseen:
-            return "not seen"
+        if name in self.unobservable:
+            return "unobservable"
         members = [others for others in self.rivals.values() if name in others]
         if members:
             return "yes" if len(members[0]) == 1 else "perhaps"
         is_set = any(" and ".join(others) == name for others in self.rivals.values())
         return "perhaps" if is_set else "no sign"
 
-    def _first_passages(self, course: GroupCourse, level: float, random: np.random.RandomState) -> Array:
+    def _first_passages(self, trajectory: GroupTrajectory, level: float, random: np.random.RandomState) -> Array:
         """Years after the last day at which ln stiffness first reaches a level, in draws; infinite if it never does."""
-        beyond = course.mean <= level if level < 0 else course.mean >= level
+        beyond = trajectory.mean <= level if level < 0 else trajectory.mean >= level
         if beyond[-1]:
             return np.full(DRAWS, (self.days[beyond.argmax()] - self.days[-1]) / YEAR)
-        start, rate = random.multivariate_normal(course.end, course.end_covariance, DRAWS, check_valid="ignore").T
+        start, rate = random.multivariate_normal(
+            trajectory.end, trajectory.end_covariance, DRAWS, check_valid="ignore"
+        ).T
         ahead, towards = np.abs(level - start), np.sign(level) * rate
         ahead = np.where(np.sign(level) * (level - start) > 0, ahead, 0.0)
         speed = np.maximum(towards, 1e-6)
-        if course.walk > 0:  # the first passage of a walk with a rate has an inverse Gaussian law
-            years = random.wald(np.maximum(ahead, 1e-12) / speed, np.maximum(ahead, 1e-12) ** 2 / course.walk**2)
+        if trajectory.walk > 0:  # the first passage of a walk with a rate has an inverse Gaussian law
+            years = random.wald(np.maximum(ahead, 1e-12) / speed, np.maximum(ahead, 1e-12) ** 2 / trajectory.walk**2)
         else:
             years = ahead / speed
         return np.where((towards <= 0) & (ahead > 0), np.inf, years)
@@ -310,15 +311,15 @@ class ParameterHistory:
             others = [other for other in others if other != group]
             if others:
                 each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
-                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot tell them apart."
+                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot distinguish them."
 
     def _limits(self) -> Iterator[str]:
-        known = [one for one in self.groups if one not in self.unseen]
+        known = [one for one in self.groups if one not in self.unobservable]
         if not self.has_drift and known:
             each = ", ".join(f"{group} {_share(self.noticed_from[group])}" for group in known)
             yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
-        if self.unseen:
-            yield f"These modes do not show {listed(self.unseen)}: a loss of 5{SPACE}% would not be seen."
+        if self.unobservable:
+            yield f"These modes do not show {listed(self.unobservable)}: a loss of 5{SPACE}% would not be seen."
         n_groups = sum(group != ALL_GROUPS for group in self.groups)
         if n_groups > len(self.modes):
             yield (
@@ -332,7 +333,7 @@ class ParameterHistory:
                 yield f"A drift of {group} would look like one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
-                f"The records are {self.years:.1f} years long: season and drift are hardly told apart, and "
+                f"The records are {self.years:.1f} years long: season and drift are hardly distinguished, and "
                 "the bands are wide."
             )
         if self.misfit_p_value < self.significance:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,10 +54,6 @@ class DailyNoise:
         """Covariance of the fresh part of the daily means of some modes, each of so many records."""
         deviations = np.maximum(self.fresh / np.sqrt(np.maximum(counts, 1)), SMALLEST)[present]
         return self.correlation[np.ix_(present, present)] * np.outer(deviations, deviations)
-
-    def widened(self, factor: float) -> DailyNoise:
-        """The same noise with so many times the variance."""
-        return replace(self, fading=np.sqrt(factor) * self.fading, fresh=np.sqrt(factor) * self.fresh)
 
     @classmethod
     def of(cls, values: Array, regressors: Array, counts: Array) -> DailyNoise:

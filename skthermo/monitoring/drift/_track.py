@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, is_real
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
-from skthermo.monitoring.drift._history import GroupCourse, ParameterHistory
+from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailySteps, State
 from skthermo.monitoring.drift._noise import DailyNoise
 from skthermo.monitoring.drift._observations import (
@@ -45,7 +46,7 @@ def track_parameters(
     significance: float = SIGNIFICANT,
     random_state: int | np.random.RandomState | None = None,
 ) -> ParameterHistory:
-    """Stiffness of damage groups over years, told from weather and noise.
+    """Stiffness of damage groups over years, apart from weather and noise.
 
     Parameters
     ----------
@@ -61,15 +62,15 @@ def track_parameters(
     freq : str, default="1D"
         Period over which records are averaged: a day or some days, such as "7D".
     significance : float, default=0.01
-        Probability with which a structure that does not age is said to drift.
+        Probability with which a structure that does not age counts as drifting.
     random_state : int, RandomState or None, default=None
         Seed of the draws behind ``p_value`` and `ParameterHistory.reaches`.
 
     Returns
     -------
     ParameterHistory
-        Relative stiffness of each group by day with bands, rates a year, groups that cannot be told apart, and when a
-        limit is reached.
+        Relative stiffness of each group by day with bands, rates a year, indistinguishable groups, and when a limit is
+        reached.
 
     Raises
     ------
@@ -95,14 +96,13 @@ def track_parameters(
 
     Bands allow for an error of 1 % of the FE model's effects; if it is less accurate than that, they are too narrow.
 
-    Each mode's trend is estimated first. Sets of one or two groups, and an even change of all groups, then
-    explain these trends, weighed by their evidence: most structures age in few places or everywhere alike, and
-    different changes in all groups at once are hardly ever determined. If no
-    set explains the trends within their errors, all errors are widened by Birge's ratio. The ``p_value`` of the drift
-    compares the evidence of the best group with that in draws of trends without drift. The best set is followed by a
-    Kalman smoother, with the effects of changes as large as theirs. Each other group is followed as one that changes
-    beside it, and a group that explains the trends about as well as one of the set in the place of that: the two are
-    named as a set.
+    Each mode's trend is estimated first. Sets of one or two groups, and an even change of all groups, then explain
+    these trends, weighed by their evidence: most structures age in few places or everywhere alike, and different
+    changes in all groups at once are hardly ever determined. If no set explains the trends within their errors, all
+    errors are widened by Birge's ratio. The ``p_value`` of the drift compares the evidence of the best group with
+    that in draws of trends without drift. The stiffness of the best set by day is a steady rate and slow waves,
+    with the effects of changes as large as theirs. Each other group is given as one that changes beside it, and a
+    group that explains the trends about as well as one of the set in the place of that: the two are named as a set.
 
     Examples
     --------
@@ -119,7 +119,8 @@ def track_parameters(
     check_records(fem, T, F)
     if not is_real(significance) or not 0 < significance < 1:
         raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
-    random, length = as_random_state(random_state), length_of(freq)
+    random = as_random_state(random_state)
+    length_of(freq)
     order = np.argsort(F.index, kind="stable")
     T, F = T.iloc[order], F.iloc[order]
     days = calendar(F.index, freq)
@@ -128,11 +129,11 @@ def track_parameters(
     noise = DailyNoise.of(daily.values, with_time(daily, N_SHAPES), daily.counts)
     trends = mode_trends(daily, noise, effects.slopes, freq)
     found = Explanations.of(trends, noise.freedom, random, effects.even)
-    followed = Followed(daily, noise.widened(found.widening), trends.widened(found.widening), found, length)
-    changes = {group: course.mean[-1] for group, course in zip(found.sets[0], followed.best(), strict=True)}
+    followed = Followed(trends.widened(found.widening), found, len(days))
+    changes = {group: trajectory.mean[-1] for group, trajectory in followed.best().items()}
     slopes = effects.of_changes(changes if found.p_value <= significance else {})
     followed = replace(followed, trends=replace(followed.trends, slopes=slopes))
-    return history_of(fem, days, effects, followed, significance, random)
+    return history_of(fem, days, effects, followed, daily.known.any(axis=0), significance, random)
 
 
 def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
@@ -165,41 +166,18 @@ def mode_trends(daily: DailyMeans, noise: DailyNoise, slopes: Array, freq: str) 
 
 @dataclass(frozen=True)
 class Followed:
-    """Daily means, their noise and trends, and what explains these; follows groups through all days.
+    """Trends of the modes over so many days, and what explains these; gives the stiffness of groups by day."""
 
-    ``length`` is the number of years between two means.
-    """
-
-    daily: DailyMeans
-    noise: DailyNoise
     trends: ModeTrends
     found: Explanations
-    length: float
+    n_days: int
 
-    def best(self) -> list[GroupCourse]:
-        """The groups of the best set, by a Kalman smoother."""
+    def best(self) -> dict[int, GroupTrajectory]:
+        """The groups of the best set."""
         groups, walk = self.found.sets[0], float(self.found.walk[0])
-        slopes, n = self.trends.slopes[:, list(groups)], len(groups)
-        n_modes, size = len(slopes), self.daily.basis.shape[2]
-        covariance = np.diag(np.repeat([0.0, ANY_RATE**2, MISLEARNED**2, 0.0], [n, n, n_modes * size, n_modes]))
-        covariance[-n_modes:, -n_modes:] = self.noise.stationary
-        days = [observation(self.daily, number, self.noise, slopes) for number in range(len(self.daily.values))]
-        steady, walks = np.zeros((n, n)), walk**2 * self.length * np.eye(n)
-        steps = DailySteps(self.length, walks, steady, self.noise.memory, self.noise.renewal)
-        means, covariances, end = steps.smoothed(State(np.zeros(len(covariance)), covariance), days)
-        deviations = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
-        return [
-            GroupCourse(
-                means[:, place],
-                deviations[:, place],
-                end.mean[[place, n + place]],
-                end.covariance[np.ix_([place, n + place], [place, n + place])],
-                walk,
-            )
-            for place in range(n)
-        ]
+        return {group: self.beside([group], [one for one in groups if one != group], walk) for group in groups}
 
-    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> GroupCourse:
+    def beside(self, joined: Sequence[int], others: Sequence[int], walk: float) -> GroupTrajectory:
         """Groups that all change alike, if only some others change beside them; from the trends of the modes."""
         trends, n = self.trends, self.trends.n_shapes
         both = replace(
@@ -207,10 +185,10 @@ class Followed:
         )
         means, covariance = both.coefficients(range(1 + len(others)), walk, ANY_RATE)
         mean, covariance = means[:n], covariance[:n, :n]
-        shapes = shapes_of_time(len(self.daily.values), n)
+        shapes = shapes_of_time(self.n_days, n)
         at_end = np.array([shapes[-1], np.append(1 / trends.years, np.zeros(n - 1))])
         deviations = np.sqrt(np.einsum("ti,ij,tj->t", shapes, covariance, shapes))
-        return GroupCourse(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
+        return GroupTrajectory(shapes @ mean, deviations, at_end @ mean, at_end @ covariance @ at_end.T, walk)
 
 
 def indistinguishable_sets(
@@ -227,17 +205,19 @@ def indistinguishable_sets(
     return sets
 
 
-def mode_table(names: Sequence[Any], followed: Followed, explained: Array) -> pd.DataFrame:
+def mode_table(
+    names: Sequence[Any], followed: Followed, explained: Array, is_measured: NDArray[np.bool_]
+) -> pd.DataFrame:
     """Measured and explained change of ln frequency over the records; NaN for a mode that was hardly measured."""
     trends = followed.trends
-    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(len(followed.daily.values), trends.n_shapes)[-1:])
+    at_end = np.kron(np.eye(len(trends.slopes)), shapes_of_time(followed.n_days, trends.n_shapes)[-1:])
     columns = {
         "measured": at_end @ trends.mean,
         "explained": explained,
         "standard_error": np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T)),
     }
     table = pd.DataFrame(columns, index=pd.Index(names, name="mode"))
-    table.loc[~followed.daily.known.any(axis=0)] = np.nan
+    table.loc[~is_measured] = np.nan
     return table
 
 
@@ -246,6 +226,7 @@ def history_of(
     days: pd.DatetimeIndex,
     effects: GroupEffects,
     followed: Followed,
+    is_measured: NDArray[np.bool_],
     significance: float,
     random: np.random.RandomState,
 ) -> ParameterHistory:
@@ -253,28 +234,28 @@ def history_of(
     found, names = followed.found, effects.names
     best, has_drift = found.sets[0], found.p_value <= significance
     rivals = {group: found.instead(group) for group in best} if has_drift else {}
-    courses = dict(zip(best, followed.best(), strict=True)) if has_drift else {}
+    trajectories = followed.best() if has_drift else {}
     for group in range(len(names)):
-        if group not in courses:
+        if group not in trajectories:
             replaced = {member for member, others in rivals.items() if group in others}
             others = [member for member in best if member not in replaced] if has_drift else []
-            courses[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
+            trajectories[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
     sets = indistinguishable_sets(found, rivals, effects.even)
-    named = {names[group]: courses[group] for group in range(len(names))}
+    named = {names[group]: trajectories[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []
         label = " and ".join(names[group] for group in one)
         named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
-    named = {name: course.with_error_of_effects(EFFECT_ERROR) for name, course in named.items()}
+    named = {name: trajectory.with_error_of_effects(EFFECT_ERROR) for name, trajectory in named.items()}
     information = np.diag(followed.trends.information())
     with np.errstate(divide="ignore"):
         alone = 1 / np.sqrt(information) / followed.trends.years
-    shifts = sum((np.outer(courses[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
+    shifts = sum((np.outer(trajectories[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
     trends = followed.trends
     misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
     return ParameterHistory(
         days=days,
-        courses=named,
+        trajectories=named,
         years=trends.years,
         p_value=found.p_value,
         significance=significance,
@@ -285,12 +266,14 @@ def history_of(
                 "log_evidence": found.evidence,
             }
         ),
-        sets=[tuple(names[group] for group in one) for one in sets],
+        indistinguishable=[tuple(names[group] for group in one) for one in sets],
         rivals={names[group]: [names[other] for other in others] for group, others in rivals.items()},
         lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
-        unseen=[names[group] for group in np.flatnonzero(found.unseen)],
+        unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
         noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
-        modes=mode_table(fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes))),
+        modes=mode_table(
+            fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes)), is_measured
+        ),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
         widening=found.widening,
         shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, days, fem.mode_names_),

@@ -13,18 +13,18 @@ from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.text import counted
-from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
 from skthermo.monitoring.retraining._shift import WEEK, ShiftsTried, WeatherFree, blocks_of
 
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun unseen
-FEWEST_WEEKS = 3  # of new records, from which standard errors of a comparison can be told
+FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors
 
 Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
-"""A detector that was fitted on some records, with the threshold that its monitor promises."""
+"""A detector that was fitted on some records, with the threshold of its monitor."""
 
 
 @dataclass(frozen=True)
@@ -152,12 +152,14 @@ def retrained(
     elif clearest.is_real:
         notes.append(f"there is a small change: {clearest.sentence()}")
     if np.isnan(clearest.p_value):
-        notes.append("there are too few weeks to tell whether the new records differ from the baseline, weather apart")
+        notes.append(
+            "there are too few weeks to say whether the new records differ from the baseline beyond the weather"
+        )
     elif changes.step.is_hidden:
         error = 100 * changes.step.standard_error.median()
         notes.append(
             "the new records have hardly any weather in common with the baseline: a change between the two of up to "
-            f"{2 * error:.2g} % of a frequency could not be told from weather"
+            f"{2 * error:.2g} % of a frequency could not be distinguished from weather"
         )
     years = (baseline.index[-1] - baseline.index[0]) / YEAR
     shift = pd.DataFrame(
@@ -308,8 +310,7 @@ class Harvest:
             kept &= ~inside
             rows.append((start, end, "all", int(inside.sum()), reason))
         masked = records.copy()
-        told = faults if faults is not None else pd.DataFrame()
-        for fault in told.itertuples():
+        for fault in (pd.DataFrame() if faults is None else faults).itertuples():
             is_kept = fault.kind == "disagree" or (are_put_back and fault.kind == "swapped")
             if is_kept or fault.column not in records:  # nothing is left out, or the sensor is a reference
                 continue
@@ -403,6 +404,6 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
     """Which weeks of old records have a time of the year that no new record has within half a week."""
     blocks = blocks_of(old)
     middle = pd.Series(old).groupby(blocks).agg(lambda some: some.iloc[len(some) // 2])
-    covered = np.unique(new.dayofyear)
-    distance = np.abs(middle.dt.dayofyear.to_numpy()[:, np.newaxis] - covered)
+    covered = np.unique(new.day_of_year)
+    distance = np.abs(middle.dt.day_of_year.to_numpy()[:, np.newaxis] - covered)
     return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2

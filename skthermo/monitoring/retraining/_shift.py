@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, clone
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import correlation_time
 from skthermo._tables.text import probability_text
-from skthermo._tables.times import correlation_time
 from skthermo.detection import TemperatureCompensator
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.surrogate import TemperatureMapper
@@ -62,12 +62,12 @@ class WeatherFree:
 
     @classmethod
     def of(cls, detector: BaseEstimator, records: pd.DataFrame, targets: list[Any]) -> WeatherFree:
-        """By the regression within a detector, by broken lines if it has none, by the mean if there is no weather."""
+        """By the regression within a detector, else by a piecewise-linear one, or the mean if there is no weather."""
         level, is_relative = records[targets].mean(), records[targets].min() > 0
         if len(records.columns) == len(targets):
             return cls((records[targets] - level) / level.where(is_relative, 1.0), level, is_relative, None, WEEK)
         within = [one for one in detector.get_params().values() if isinstance(one, TemperatureCompensator)]
-        plain = clone(within[0]).set_params(whiten=None) if within else _broken_lines(targets)
+        plain = clone(within[0]).set_params(whiten=None) if within else _piecewise_linear(targets)
         with without_warnings():
             left = np.asarray(plain.fit_transform(records))
         named = pd.DataFrame(left, records.index, list(plain.get_feature_names_out()))[targets]
@@ -96,8 +96,8 @@ def _relative(measured: pd.DataFrame, residuals: pd.DataFrame, is_relative: pd.S
     return residuals / np.where(is_relative, measured - residuals, 1.0)
 
 
-def _broken_lines(targets: list[Any]) -> TemperatureCompensator:
-    return TemperatureCompensator(TemperatureMapper(), targets=targets)
+def _piecewise_linear(targets: list[Any]) -> TemperatureCompensator:
+    return TemperatureCompensator(TemperatureMapper(), targets=targets, whiten=None)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class LevelShift:
 
     @property
     def is_hidden(self) -> bool:
-        """Whether the weather of the new records is so new that a change could hardly be told from it."""
+        """Whether the weather of the new records is so new that a change could hardly be distinguished from it."""
         return bool((self.standard_error / self.scatter).median() > HIDDEN)
 
     @classmethod
@@ -211,7 +211,7 @@ class ShiftsTried:
 def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Array, float]:
     """Covariance of weighted sums of residuals, and as how many independent blocks of time they count.
 
-    All blocks tell how much their mean residuals scatter, and for how long they stay alike: a change of late is told by
+    All blocks show how much their mean residuals scatter, and for how long they stay alike: a change of late is seen by
     few blocks, whose own scatter would say little.
     """
     n_blocks, n_modes = int(blocks.max()) + 1, rest.shape[1]
@@ -242,4 +242,4 @@ def _beside(weather: pd.DataFrame, courses: dict[str, Array]) -> Array:
     if not len(weather.columns):
         return (together - together.mean()).to_numpy()
     with without_warnings():
-        return np.asarray(_broken_lines(list(courses)).fit_transform(weather.join(1 + together)))
+        return np.asarray(_piecewise_linear(list(courses)).fit_transform(weather.join(1 + together)))

@@ -41,7 +41,7 @@ class Change(NamedTuple):
 
 
 class Departures(NamedTuple):
-    """A daily series: what a thermometer shows beside what the others foretell; NaN where nothing is known.
+    """A daily series: what a thermometer shows beside what the others predict; NaN where nothing is known.
 
     ``values`` are in ``deviations``, which are in degrees; ``errors`` are variances of the prediction in squares of
     these, and ``beyond`` is by how many degrees weather that the baseline does not have moves the prediction.
@@ -66,7 +66,7 @@ class Departures(NamedTuple):
 class ThermometerNoise:
     """Noise of a standardised daily series: its scale, its correlation from day to day and how far its level wanders.
 
-    ``limit`` is the statistic of a change that noise reaches as rarely as promised.
+    ``limit`` is the statistic of a change that noise reaches as rarely as asked for.
     """
 
     scale: float
@@ -106,7 +106,7 @@ class ThermometerNoise:
     def change(self, departures: Departures) -> Change | None:
         """The most likely offset or drift that still lasts on the last day; None with too few days.
 
-        The level before the change is unknown: by as much as it wanders, by the errors of what foretells it, as if days
+        The level before the change is unknown: by as much as it wanders, by the errors of what predicts it, as if days
         of the baseline were independent, by what seasons differ from year to year, and in new weather by as much as
         that moves the prediction.
         """

@@ -1,4 +1,4 @@
-"""What each thermometer shows beside what the others foretell, day by day."""
+"""What each thermometer shows beside what the others predict, day by day."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import DAY, DAY_NS, YEAR
+from skthermo._tables.frames import DAY, DAY_NS, YEAR
 from skthermo.monitoring.sensors._changes import Days, Departures, ThermometerNoise
 from skthermo.residuals.gaussian import Gaussian
 
-WHOLE_YEAR = 330  # days from which a baseline tells the season of each thermometer
+WHOLE_YEAR = 330  # days from which a baseline shows the season of each thermometer
 SEASONS = 2  # harmonics of the year, and of the day
 OFTEN = 4  # records a day from which the time of the day counts
 LEAST_OF_A_DAY = 0.3  # share of the usual number of records in a daily mean

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from skthermo._tables.text import counted
-from skthermo.reporting._html import Html, Section, element, joined, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
 from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, banner, first_section
 
@@ -23,6 +23,17 @@ COUNTED = {
     HEALTHY: "healthy",
 }
 """States in words, the worst first."""
+
+STEPS = {
+    ALARM: "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, "
+    "the records first.",
+    UNEXPLAINED: "Find out what the events were that have ended, and acknowledge them.",
+    ATTENTION: "Ask an engineer whether the bridges that lost stiffness slowly can bear it.",
+    NOT_EVALUATED: "Check loggers and sensors of the bridges that are not evaluated.",
+    FAILED: "Ask an engineer to look at the records and the models of the bridges that could not be fitted.",
+    UNWATCHED: "Have monitors fitted for the bridges without one.",
+}
+"""What to do where a bridge has a state or a place."""
 
 
 def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any, written: str) -> Section:
@@ -76,7 +87,7 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
     if not bridges:
         return Html()
     shown = [
-        joined([element("a", one.name, href=links[one.name]), Html(one.duration), _small(one.note)])
+        element("span", element("a", one.name, href=links[one.name]), one.duration, _small(one.note))
         for one in bridges[:MOST_NAMED]
     ]
     rest = f" and {len(bridges) - MOST_NAMED:,} more, in the table" if len(bridges) > MOST_NAMED else ""
@@ -85,28 +96,12 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
 
 
 def _small(note: str) -> Html:
-    return element("small", f"({note})") if note else Html()
+    return element("small", f" ({note})") if note else Html()
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:
-    states, places = {bridge.state for bridge in bridges}, {bridge.place for bridge in bridges}
-    steps = []
-    if ALARM in states:
-        steps.append(
-            "Inspect the bridges in alarm, from the top of the table down. Of those that are not significant, look at "
-            "the records first."
-        )
-    if UNEXPLAINED in places:
-        steps.append("Find out what the events were that have ended, and acknowledge them.")
-    if ATTENTION in states:
-        steps.append("Ask an engineer whether the bridges that lost stiffness slowly can bear it.")
-    if NOT_EVALUATED in states:
-        steps.append("Check loggers and sensors of the bridges that are not evaluated.")
-    if FAILED in states:
-        steps.append("Ask an engineer to look at the records and the models of the bridges that could not be fitted.")
-    if UNWATCHED in states:
-        steps.append("Have monitors fitted for the bridges without one.")
-    return steps or ["Nothing; look at the date of this page."]
+    present = {bridge.state for bridge in bridges} | {bridge.place for bridge in bridges}
+    return [text for what, text in STEPS.items() if what in present] or ["Nothing; look at the date of this page."]
 
 
 def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Section:

@@ -48,21 +48,6 @@ class Bridge:
         return self.place, -self.size
 
     @classmethod
-    def failed(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose records or model could not be used."""
-        return cls(name, FAILED, BROKEN, why=error or "no reason is given", n_warnings=n_warnings)
-
-    @classmethod
-    def unwatched(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose model was fitted, and whose new records are not evaluated."""
-        return cls(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings)
-
-    @classmethod
-    def unread(cls, name: Hashable, error: str, n_warnings: int = 0) -> Bridge:
-        """A bridge whose monitor cannot be read or asked."""
-        return cls(name, NOT_EVALUATED, SILENT, np.inf, why=error, n_warnings=n_warnings)
-
-    @classmethod
     def watched(
         cls,
         name: Hashable,
@@ -136,7 +121,7 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
         texts.append(f"New records could not be used: {standing.error}.")
     if unexplained:
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
-        texts.append(f"{number} would be significant, but ended before anybody explained what it was.")
+        texts.append(f"{number} would be significant, but ended before it was explained.")
     if len(standing.failed):
         texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
     return " ".join(text for text in texts if text)

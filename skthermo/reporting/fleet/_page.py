@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from skthermo._io import write_when_complete
@@ -17,7 +18,16 @@ from skthermo.reporting._html import Html, Section, bullets, element, joined, pa
 from skthermo.reporting._model import learned, stiffnesses
 from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.fleet._answer import answer, warnings_of_all
-from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo.reporting.fleet._bridge import (
+    BROKEN,
+    FAILED,
+    SILENT,
+    UNEXPLAINED,
+    UNKNOWN_STATES,
+    UNSEEN,
+    UNWATCHED,
+    Bridge,
+)
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.service import (
     ATTENTION,
@@ -129,10 +139,11 @@ class PageWriter:
         """A bridge that nobody watches, and its chain, if it has one."""
         chain, without_chain = _opened(self.fleet.chains, name)
         if unread:
-            return Bridge.unread(name, unread, n_warnings), chain
+            return Bridge(name, NOT_EVALUATED, SILENT, np.inf, why=unread, n_warnings=n_warnings), chain
         if chain is None:
-            return Bridge.failed(name, without_chain or error, n_warnings), None
-        return Bridge.unwatched(name, error, n_warnings), chain
+            why = without_chain or error or "no reason is given"
+            return Bridge(name, FAILED, BROKEN, why=why, n_warnings=n_warnings), None
+        return Bridge(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings), chain
 
 
 def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, written: str) -> list[Section]:

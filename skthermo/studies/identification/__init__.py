@@ -1,7 +1,7 @@
 """Which causes explain a shift of frequencies, and how probably."""
 
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior
-from skthermo.studies.identification._curves import Effects, ShiftComparison, cubic
+from skthermo.studies.identification._curves import Curves, Effects, ShiftComparison
 from skthermo.studies.identification._evidence import Observed
 from skthermo.studies.identification._explanations import Scale, screen
 from skthermo.studies.identification._identified import IdentifiedDamage
@@ -13,6 +13,7 @@ from skthermo.studies.identification._shift import FrequencyShift
 __all__ = [
     "SOMETHING_ELSE",
     "Cause",
+    "Curves",
     "ShiftComparison",
     "DamagePrior",
     "Effects",
@@ -22,7 +23,6 @@ __all__ = [
     "Scale",
     "FrequencyShift",
     "compared",
-    "cubic",
     "identify_damage",
     "observe",
     "screen",

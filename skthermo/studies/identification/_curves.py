@@ -15,6 +15,7 @@ from skthermo.studies.identification._evidence import Observed
 Effects = Callable[[Array], tuple[Array, Array]]
 
 SHARES = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6, 11 / 12, 1.0])  # of the bounds, where effects are tabulated
+LOGARITHMS = -np.log1p([0.0, -0.3, -0.6, -0.9])  # of 1 / (1 - severity), between which effects of damage are smooth
 N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them
 
 
@@ -62,22 +63,24 @@ class ShiftComparison:
 
 
 @dataclass(frozen=True)
-class CauseCurves:
-    """Effects of each cause at shares of its bound, in the coordinates of what was observed.
+class Curves:
+    """Effects of single causes, tabulated, in the coordinates of what was observed; those of several are added.
 
-    ``values`` and ``slopes``, by that share, have the shape (n_causes, n_nodes, n_observed); beyond a third of the
-    bound they are extrapolated unless ``is_whole``. ``first``, (n_observed, n_causes), are the derivatives of what was
-    observed itself, where nothing has changed.
+    ``values`` and ``slopes``, (n_causes, n_nodes, n_observed), are those at the ``nodes``: shares of the ``bounds``, or
+    logarithms of 1 / (1 - severity) where there are none. Beyond a third of the bound they are extrapolated unless
+    ``is_whole``. ``first``, (n_observed, n_causes), are the derivatives of what was observed itself, where nothing has
+    changed.
     """
 
-    bounds: Array
+    nodes: Array
+    bounds: Array | None
     values: Array
     slopes: Array
     first: Array
     is_whole: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, effects: Effects, causes: Sequence[Cause], observed: Observed) -> CauseCurves:
+    def of(cls, effects: Effects, causes: Sequence[Cause], observed: Observed) -> Curves:
         """Curves of exact effects of small amounts."""
         bounds = np.array([cause.highest if cause.highest > 0 else cause.lowest for cause in causes])
         columns = np.arange(len(causes))
@@ -91,9 +94,25 @@ class CauseCurves:
         values[:, N_SMALL:] = values[:, N_SMALL - 1 : N_SMALL] + beyond * last
         tangents[:, N_SMALL:] = last
         turned = (array @ observed.rotation.T for array in (values, tangents))
-        return cls(bounds, *turned, slopes[0], np.zeros(len(causes), dtype=bool))
+        return cls(SHARES, bounds, *turned, slopes[0], np.zeros(len(causes), dtype=bool))
 
-    def whole(self, effects: Effects, columns: Sequence[int], observed: Observed) -> CauseCurves:
+    @classmethod
+    def of_stretches(cls, effects: Effects, incidence: NDArray[np.bool_], rotation: Array) -> Curves:
+        """Of causes that each damage some groups by one severity; incidence is (n_causes, n_groups)."""
+        n_causes, n_groups = incidence.shape
+        severities = -np.expm1(-LOGARITHMS[1:, np.newaxis])
+        sets = (incidence[:, np.newaxis] * severities).reshape(-1, n_groups)
+        changes, slopes = effects(np.vstack([np.zeros((1, n_groups)), sets]))
+        first, by_logarithm = slopes[0] @ incidence.T, slopes[1:] * (1 - sets)[:, np.newaxis]
+        own = by_logarithm.reshape(n_causes, len(severities), -1, n_groups) * incidence[:, np.newaxis, np.newaxis]
+        values = np.zeros((n_causes, len(LOGARITHMS), len(first)))
+        tangents = np.zeros_like(values)
+        values[:, 1:] = changes[1:].reshape(n_causes, len(severities), -1)
+        tangents[:, 0], tangents[:, 1:] = first.T, own.sum(axis=-1)
+        turned = (array @ rotation.T for array in (values, tangents))
+        return cls(LOGARITHMS, None, *turned, first, np.ones(n_causes, dtype=bool))
+
+    def whole(self, effects: Effects, columns: Sequence[int], observed: Observed) -> Curves:
         """The same with exact effects of large amounts of some causes."""
         values, tangents, is_whole = self.values.copy(), self.slopes.copy(), self.is_whole.copy()
         found = _by_share(*effects(_alone(self.bounds, columns, SHARES[N_SMALL:])), self.bounds, columns)
@@ -110,9 +129,12 @@ class CauseCurves:
         shape = (*amounts.shape[:-1], self.values.shape[-1])
         change, slopes = np.zeros(shape), []
         for i in range(sets.shape[-1]):
-            column = sets[:, i, np.newaxis]
-            share = amounts[..., i] / self.bounds[column]
-            values, slope = cubic(SHARES, self.values, self.slopes, column, share, self.bounds[column])
+            column, amount = sets[:, i, np.newaxis], amounts[..., i]
+            if self.bounds is None:
+                places, units = -np.log1p(-amount), 1 - amount
+            else:
+                places, units = amount / self.bounds[column], self.bounds[column]
+            values, slope = cubic(self.nodes, self.values, self.slopes, column, places, units)
             change += values
             slopes.append(slope)
         return change, np.stack(slopes, axis=-1) if slopes else np.zeros((*shape, 0))

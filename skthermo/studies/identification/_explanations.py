@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from skthermo._tables.arrays import Array
 from skthermo.studies.identification._causes import Cause, DamagePrior
-from skthermo.studies.identification._curves import CauseCurves, Effects
+from skthermo.studies.identification._curves import Curves, Effects
 from skthermo.studies.identification._evidence import (
     ELSE_SIZES,
     ERROR_FACTORS,
@@ -75,18 +75,18 @@ class Correction:
 
 @dataclass(frozen=True)
 class Scale:
-    """Weighs sets of causes: observations, tabulated and exact effects, and the prior law of amounts."""
+    """Weighs sets of causes: observations, exact effects (None if tabulated ones do), and the law of amounts."""
 
     observed: Observed
-    effects: Effects
+    effects: Effects | None
     causes: Sequence[Cause]
     prior: DamagePrior
-    curves: CauseCurves = field(repr=False)
+    curves: Curves = field(repr=False)
 
     @classmethod
     def of(cls, observed: Observed, effects: Effects, causes: Sequence[Cause], prior: DamagePrior) -> Scale:
         """With effects tabulated."""
-        return cls(observed, effects, causes, prior, CauseCurves.of(effects, list(causes), observed))
+        return cls(observed, effects, causes, prior, Curves.of(effects, list(causes), observed))
 
     @property
     def log_errors(self) -> Array:

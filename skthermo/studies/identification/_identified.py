@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._effects.changes import HIGHEST_SEVERITY
+from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import SPACE, chance_text, listed, percent
 from skthermo.exceptions import ResultWarning, SkthermoWarning
@@ -18,21 +18,21 @@ from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, D
 from skthermo.studies.identification._observe import ComparedRecords
 from skthermo.studies.scenarios import UncertainDamage
 
-ALIKE = 0.95  # cosine between effects from which on causes that are confused are said together
-TOLD = {
+ALIKE = 0.95  # cosine between effects from which on indistinguishable causes are named together
+PHRASES = {
     "damage": ("a loss of {size}{of stiffness} in {name}", "of {size} in {name}", ""),
     "stiffening": ("a gain of {size}{of stiffness} in {name}", "of {size} in {name}", " stiffer"),
     "lower": ("a fall of {size} in {name}", "of {size} in {name}", " lower"),
     "higher": ("a rise of {size} in {name}", "of {size} in {name}", " higher"),
     "mass": ("added mass of {size} of {name}", "of {size} of {name}", ""),
 }
-"""What is said of a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
+"""Phrases for a cause: first, after another of the same kind, and the ending of its name that this leaves out."""
 
 NAMED, MOST_NAMED = 0.01, 4
 """Probability from which on another explanation is named, and the largest number of those that are."""
 SURE = 0.9  # probability from which on the most probable explanation is not followed by averages over all
 LIKELY = 0.1  # probability from which on a cause is named among the averages
-RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is told
+RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is given
 CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
 PILED_UP = 1.05  # standard errors between the mean of an exponential law and its bound, with some margin
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
@@ -66,13 +66,13 @@ class Amount:
 
     @property
     def saying(self) -> str:
-        """What is said of it: a key of ``TOLD``."""
+        """Which of ``PHRASES`` names it."""
         return self.kind if self.kind != "parameter" else "lower" if self.value < 0 else "higher"
 
     @property
     def subject(self) -> str:
         """The name of what changed, without the direction."""
-        return self.cause.removesuffix(TOLD[self.saying][2])
+        return self.cause.removesuffix(PHRASES[self.saying][2])
 
     def _number(self, value: float) -> str:
         width = abs(self.highest - self.lowest)
@@ -88,8 +88,8 @@ class Amount:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What may have changed, how much, and how probable that is, as it is told.
+class Statement:
+    """What may have changed, how much, and how probable that is, for a sentence or a table.
 
     Each of ``changes`` holds the amounts of causes of which one has changed, the most probable first.
     """
@@ -114,7 +114,7 @@ class Told:
         parts = [f"{either([one.cause for one in amounts])} {amounts[0].size}" for amounts in self.changes]
         return ", ".join(parts + [SOMETHING_ELSE] * self.has_else) or NO_DAMAGE
 
-    def beside(self, first: Told) -> str:
+    def beside(self, first: Statement) -> str:
         """The one thing that it holds beside another explanation, if the rest is about the same; else nothing."""
         known = {amounts[0].cause: amounts[0] for amounts in first.changes}
         own = [amounts for amounts in self.changes if amounts[0].cause not in known]
@@ -138,28 +138,28 @@ class Told:
 
 
 def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
-    """One cause, or several that cannot be told apart; those whose amounts agree share them."""
+    """One cause, or several that cannot be distinguished; those whose amounts agree share them."""
     first, texts = amounts[0], []
     shared = [one for one in amounts if first.agrees(one)]
     for one in [first, *(one for one in amounts if one not in shared)]:
-        saying = TOLD[one.saying][is_further or (one is not first and one.saying == first.saying)]
+        saying = PHRASES[one.saying][is_further or (one is not first and one.saying == first.saying)]
         names = either([other.subject for other in (shared if one is first else [one])])
         text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
         texts.append(text + (f" ({one.band})" if in_full else ""))
-    return " or ".join(texts) + (", which these modes cannot tell apart," if len(amounts) > 1 else "")
+    return " or ".join(texts) + (", which these modes cannot distinguish," if len(amounts) > 1 else "")
 
 
-def told(found: IdentifiedDamage) -> list[Told]:
-    """Explanations, the most probable first; those that these modes cannot tell apart are one.
+def statements(found: IdentifiedDamage) -> list[Statement]:
+    """Explanations, the most probable first; those that these modes cannot distinguish are one.
 
     They differ only in causes that look alike, or in causes that these modes do not show.
     """
-    sets = alike_sets(found.confused, found.similarity)
+    sets = alike_sets(found.indistinguishable, found.similarity)
     together: dict[frozenset[Any], list[tuple[float, tuple[str, ...]]]] = {}
     known: set[tuple[str, ...]] = set()
     for name, probability in found.explanations["probability"].items():
         causes = causes_of(found, str(name))
-        seen = tuple(cause for cause in causes if cause not in found.unseen)
+        seen = tuple(cause for cause in causes if cause not in found.unobservable)
         shown = seen if seen in known else causes
         known.add(causes)
         key = frozenset(next((group for group in sets if cause in group), cause) for cause in shown)
@@ -168,7 +168,9 @@ def told(found: IdentifiedDamage) -> list[Told]:
     return sorted(said, key=lambda one: -one.probability)
 
 
-def _joined(found: IdentifiedDamage, members: list[tuple[float, tuple[str, ...]]], sets: list[frozenset[str]]) -> Told:
+def _joined(
+    found: IdentifiedDamage, members: list[tuple[float, tuple[str, ...]]], sets: list[frozenset[str]]
+) -> Statement:
     """The most probable of the explanations with the fewest causes, and what its causes may be taken for."""
     fewest = min(len(causes) for _, causes in members)
     first, *others = (causes for _, causes in members if len(causes) == fewest)
@@ -183,7 +185,7 @@ def _joined(found: IdentifiedDamage, members: list[tuple[float, tuple[str, ...]]
                 if other in alike and other not in first:
                     amounts.setdefault(other, amount_of(found, causes, other))
         changes.append(tuple(amounts.values()))
-    return Told(tuple(changes), SOMETHING_ELSE in first, sum(probability for probability, _ in members))
+    return Statement(tuple(changes), SOMETHING_ELSE in first, sum(probability for probability, _ in members))
 
 
 def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
@@ -200,10 +202,10 @@ def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amo
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
 
 
-def alike_sets(confused: Sequence[Sequence[str]], similarity: pd.DataFrame) -> list[frozenset[str]]:
-    """Sets of causes whose effects are nearly the same, among those that are confused."""
+def alike_sets(indistinguishable: Sequence[Sequence[str]], similarity: pd.DataFrame) -> list[frozenset[str]]:
+    """Sets of causes whose effects are nearly the same, among those that are indistinguishable."""
     sets: list[frozenset[str]] = []
-    for members in confused:
+    for members in indistinguishable:
         for one, other in combinations(members, 2):
             if similarity.loc[one, other] >= ALIKE:
                 touched = [group for group in sets if one in group or other in group]
@@ -214,9 +216,9 @@ def alike_sets(confused: Sequence[Sequence[str]], similarity: pd.DataFrame) -> l
 
 def answer(found: IdentifiedDamage) -> Iterator[str]:
     """What is most probable, how probable, what else could be."""
-    explanations = told(found)
+    explanations = statements(found)
     first, *others = explanations
-    shown = " that these modes show" if found.unseen else ""
+    shown = " that these modes show" if found.unobservable else ""
     yield (
         f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
         f"{chance_text(first.probability)}."
@@ -228,7 +230,7 @@ def answer(found: IdentifiedDamage) -> Iterator[str]:
     yield from _others(first, others)
     if not first.is_healthy:
         unchanged = sum(one.probability for one in explanations if one.is_healthy)
-        nothing = "of no change that these modes show" if found.unseen else "that nothing has changed"
+        nothing = "of no change that these modes show" if found.unobservable else "that nothing has changed"
         yield f"The probability {nothing} is {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
         yield from _averages(found, first)
@@ -236,7 +238,7 @@ def answer(found: IdentifiedDamage) -> Iterator[str]:
         yield from _unnoticed(found)
 
 
-def _others(first: Told, others: Sequence[Told]) -> Iterator[str]:
+def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
     """What else could be: the most probable explanation with one thing more, then others."""
     probable = [one for one in others if not one.is_healthy and one.probability >= NAMED]
     more = {more: one for one in probable if (more := one.beside(first))}
@@ -248,9 +250,9 @@ def _others(first: Told, others: Sequence[Told]) -> Iterator[str]:
         yield f"It could also be: {'; '.join(texts)}."
 
 
-def _averages(found: IdentifiedDamage, first: Told) -> Iterator[str]:
+def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
     """Causes that are likely over all explanations together, unless they are those of the first and sure."""
-    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unseen)]
+    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unobservable)]
     told_first = {amounts[0].cause for amounts in first.changes}
     if told_first.issuperset(table.index) and (table["probability"] >= SURE).all():
         return
@@ -266,19 +268,19 @@ def _averages(found: IdentifiedDamage, first: Told) -> Iterator[str]:
 
 def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
     """What could be damaged all the same."""
-    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unseen)]
+    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unobservable)]
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
-        yield f"A loss of stiffness of up to {listed(losses)} could have gone unseen."
+        yield f"A loss of stiffness of up to {listed(losses)} could have gone unnoticed."
 
 
 def limits(found: IdentifiedDamage) -> Iterator[str]:
-    """What cannot be said of the place or the cause."""
-    best = told(found)[0]
-    for causes in found.confused:
-        yield f"{listed(causes)} cannot be told apart by these modes: only their common effect is known."
-    if found.unseen:
-        yield f"Damage in {either(found.unseen)} cannot be seen in these modes: nothing is known of it."
+    """What is not known of the place or the cause."""
+    best = statements(found)[0]
+    for causes in found.indistinguishable:
+        yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
+    if found.unobservable:
+        yield f"Damage in {either(found.unobservable)} cannot be seen in these modes: nothing is known of it."
     if best.is_healthy and found.p_value < RARE:
         yield f"Yet a healthy structure shows such shifts with a probability of only {chance_text(found.p_value)}."
     if np.isnan(found.misfit_p_value):
@@ -295,15 +297,18 @@ def limits(found: IdentifiedDamage) -> Iterator[str]:
 def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
     """What is doubtful."""
     yield from found.records.warnings()
-    best = told(found)[0]
-    if found.confused:
-        sets = "; ".join(" and ".join(causes) for causes in found.confused)
+    best = statements(found)[0]
+    if found.indistinguishable:
+        sets = "; ".join(" and ".join(causes) for causes in found.indistinguishable)
         yield ResultWarning(
-            f"groups that these modes cannot tell apart: {sets}. Only their common effect is known", "confused groups"
+            f"groups that these modes cannot distinguish: {sets}. Only their common effect is known",
+            "indistinguishable groups",
         )
-    if found.unseen:
-        names = ", ".join(found.unseen)
-        yield ResultWarning(f"groups that these modes do not show, of which nothing is known: {names}", "unseen groups")
+    if found.unobservable:
+        names = ", ".join(found.unobservable)
+        yield ResultWarning(
+            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable groups"
+        )
     highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
         yield ResultWarning(
@@ -415,9 +420,9 @@ class IdentifiedDamage:
         mass: "all groups" in ``explanations``, which nobody has to ask for. In ``table`` it is damage of each group.
     similarity : DataFrame
         Cosines between the effects of the causes, in standard errors of the shifts.
-    confused : list of tuple of str
+    indistinguishable : list of tuple of str
         Sets of causes of which one looks like the others in these modes.
-    unseen : list of str
+    unobservable : list of str
         Causes whose severity alone would have a standard error above 10 %. Their probability hardly differs from what
         the prior says.
     members : mapping of str to list of str
@@ -465,8 +470,8 @@ class IdentifiedDamage:
     probability_other: float
     probability_even: float
     similarity: pd.DataFrame
-    confused: list[tuple[str, ...]]
-    unseen: list[str]
+    indistinguishable: list[tuple[str, ...]]
+    unobservable: list[str]
     members: Mapping[str, list[str]]
     draws: pd.DataFrame = field(repr=False)
     precision: pd.DataFrame
@@ -502,12 +507,12 @@ class IdentifiedDamage:
         return ((shifts["measured"] - shifts["explained"]) / shifts["standard_error"]).to_numpy(dtype=float)
 
     @property
-    def told(self) -> pd.DataFrame:
-        """Explanations as they are told, those that these modes cannot tell apart as one, the most probable first.
+    def summary_table(self) -> pd.DataFrame:
+        """Explanations as statements, those that these modes cannot distinguish as one, the most probable first.
 
         By ``label``, such as "pier 1 or pier 2 12 %": ``probability``; ``text``, part of a sentence with 90 % bands.
         """
-        rows = [(one.label, one.probability, one.phrase(in_full=True)) for one in told(self)]
+        rows = [(one.label, one.probability, one.phrase(in_full=True)) for one in statements(self)]
         return pd.DataFrame(rows, columns=["label", "probability", "text"]).set_index("label")
 
     @property
@@ -541,24 +546,23 @@ class IdentifiedDamage:
         Returns
         -------
         list of str
-            Sentences. The first names the most probable explanation; those that these modes cannot tell apart are told
-            together.
+            Sentences. The first names the most probable explanation; those that these modes cannot distinguish are one.
         """
         return list(answer(self))
 
     def limits(self) -> list[str]:
-        """What cannot be told: causes that look alike or cannot be seen, and what no explanation explains.
+        """What is not known: causes that look alike or cannot be seen, and what no explanation explains.
 
         Returns
         -------
         list of str
-            Sentences; none if the most probable explanation explains all shifts, and all causes can be seen and told
-            apart.
+            Sentences; none if the most probable explanation explains all shifts, and all causes can be seen and
+            distinguished.
         """
         return list(limits(self))
 
     def summary(self) -> str:
-        """What is most probable and what else could be, what cannot be told, and which records were left out.
+        """What is most probable and what else could be, what is not known, and which records were left out.
 
         Returns
         -------

@@ -12,12 +12,10 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects
-from skthermo._estimators.arguments import check_jobs
+from skthermo._effects import FrequencyEffects, StructuralChanges
 from skthermo._estimators.warnings import warn_each, without_warnings
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state
+from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior, read_causes
 from skthermo.studies.identification._curves import Part, ShiftComparison
 from skthermo.studies.identification._evidence import Observed
@@ -25,7 +23,13 @@ from skthermo.studies.identification._explanations import Scale, explanations
 from skthermo.studies.identification._identified import IdentifiedDamage, explanation_text
 from skthermo.studies.identification._observe import ComparedRecords, observe
 from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._separability import VISIBLE, confused_groups, cosines, errors_alone, precision
+from skthermo.studies.identification._separability import (
+    VISIBLE,
+    cosines,
+    errors_alone,
+    indistinguishable_groups,
+    precision,
+)
 from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
 from skthermo.studies.identification._shift import FrequencyShift
 from skthermo.studies.replicates import checked_models
@@ -103,7 +107,7 @@ def identify_damage(
     -------
     IdentifiedDamage
         Explanations with their probabilities, probability and severity of each cause, explained shifts, causes that
-        cannot be told apart, and the draws that ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
+        cannot be distinguished, and the draws that ``scenario()`` turns into a scenario of a `DetectabilityStudy`.
 
     Raises
     ------
@@ -119,20 +123,20 @@ def identify_damage(
     UserWarning
         Once for each kind: if records cannot be compared or are far from the others, with their number and the reasons,
         and if these are the last ones, because the structure may have just changed; if the records, or the training
-        records, are worth few independent ones; if temperatures have other names than in fit, causes cannot be told
-        apart or cannot be seen, a severity is at its bound, or the causes do not explain the shifts.
+        records, are worth few independent ones; if temperatures have other names than in fit, causes cannot be
+        distinguished or cannot be seen, a severity is at its bound, or the causes do not explain the shifts.
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in
-    similar weather. It is a difference of two means, and its covariance counts that of both: of the new records, and
-    of the training records that have weather like theirs. Records are correlated with those before, so that a mean of
-    n of them scatters more than that of n independent ones. Correlations are learned from the residuals of the
-    training records, as those of an independent part and of one that fades exponentially with time; 30 new records
-    would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between records counts, else
-    their number. Modes that scatter clearly more than in training count as scattering so. The covariance is known
-    from few independent records, so that errors follow Student's law of several dimensions. Records that are more than
-    six standard deviations from the median of the others in a mode are left out and counted.
+    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
+    weather. It is a difference of two means, and its covariance counts that of both: of the new records, and of the
+    healthy prediction, which errs alike for a season as least squares on the weather would. Records are correlated with
+    those before, so that a mean of n of them scatters more than that of n independent ones. Correlations are learned
+    from the residuals of the training records, as those of an independent part and of one that fades exponentially with
+    time; 30 new records would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between
+    records counts, else their number. Modes that scatter clearly more than in training count as scattering so. The
+    covariance is known from few independent records, so that errors follow Student's law of several dimensions. Records
+    that are more than six standard deviations from the median of the others in a mode are left out and counted.
 
     An explanation is a set of at most three causes, each with one unknown amount, or the loss of one share of stiffness
     in all groups, as where a whole structure ages. Its probability is proportional to
@@ -152,8 +156,8 @@ def identify_damage(
 
     Averages over explanations count causes outside an explanation as 0, so that a band which begins at 0 says that the
     cause may not be there at all. Causes that these modes do not show keep about their prior probability. What causes
-    have in common is judged at the model's nominal state, too, because a chain may have drifted out of the symmetry of
-    its structure.
+    have in common is also assessed at the model's nominal state, because a chain may have drifted out of the symmetry
+    of its structure.
 
     Examples
     --------
@@ -245,7 +249,7 @@ def findings(
     """Tables of a posterior, and what the causes' effects have in common.
 
     ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
-    what the causes have in common is judged at the model's nominal state, too.
+    what the causes have in common is assessed at the model's nominal state, too.
     """
     every, observed = [cause.name for cause in causes], nominal.observed()
     signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
@@ -256,7 +260,7 @@ def findings(
     factor = two_errors(shift.freedom)
     alone = factor * errors_alone(slopes)
     seen = np.flatnonzero(alone <= VISIBLE)
-    groups = confused_groups(at_nominal[:, seen]) + confused_groups(slopes[:, seen])
+    groups = indistinguishable_groups(at_nominal[:, seen]) + indistinguishable_groups(slopes[:, seen])
     table = posterior.table(asked)
     table["error_alone"], table["kind"] = alone, [cause.kind for cause in asked]
     first, factors = changes.n_parameters, changes.factors(posterior.drawn(every, N_DRAWS, random))
@@ -280,8 +284,8 @@ def findings(
         probability_other=posterior.probability_of(SOMETHING_ELSE),
         probability_even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),
-        confused=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
-        unseen=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
+        indistinguishable=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
+        unobservable=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
         members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
         draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
         precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), asked, prior.severity),

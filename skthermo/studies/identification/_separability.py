@@ -1,4 +1,4 @@
-"""Which damage groups can be told apart by their effects."""
+"""Which damage groups can be distinguished by their effects."""
 
 from collections.abc import Sequence
 
@@ -47,7 +47,7 @@ def precision(slopes: Array, n_frequencies: int, causes: Sequence[Cause], severi
     return pd.DataFrame(columns, index=[cause.name for cause in causes])
 
 
-def confused_groups(slopes: Array) -> list[tuple[int, ...]]:
+def indistinguishable_groups(slopes: Array) -> list[tuple[int, ...]]:
     """Sets of two or three groups of which one looks like the other or the other two together, most similar first.
 
     Only the part of an effect that no non-negative combination of the others reproduces is informative.

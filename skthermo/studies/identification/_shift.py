@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from skthermo._effects.frequencies import healthy_frequencies
-from skthermo._estimators.arguments import check_noise
-from skthermo._tables.arrays import Array
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._effects import healthy_frequencies
+from skthermo._tables.arrays import Array, check_noise
+from skthermo._tables.frames import has_stamps, row_times
 
-FEWEST_TO_JUDGE = 8  # records among which one may be called far from the others
+FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
 FAR = 6.0  # standard deviations beyond which a record is far from the others
 MAD_TO_DEVIATION = 1.4826
@@ -23,7 +22,7 @@ WIDER = 0.01  # probability by chance below which new records count as scatterin
 
 @dataclass(frozen=True)
 class FrequencyShift:
-    """Mean relative shift of each mode, and what it stands on; NaN for a mode that was not measured or is not known.
+    """Mean relative shift of each mode, and what it is based on; NaN for a mode that was not measured or is not known.
 
     It is the mean of ln(measured / predicted), less what the training records in similar weather show. Its errors have
     the given covariance, and Student's t law with the degrees of ``freedom``. ``n_records`` is the number of records
@@ -53,7 +52,7 @@ def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
 
     None are if there are too few to tell, or if more than half of them would be.
     """
-    if len(shifts) < FEWEST_TO_JUDGE or np.isnan(shifts).all():
+    if len(shifts) < FEWEST_TO_COMPARE or np.isnan(shifts).all():
         return np.zeros(len(shifts), dtype=bool)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of modes that were not measured
@@ -75,7 +74,7 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
     inputs = fem.weather(T).inputs[(~np.isnan(shifts)).any(axis=1)]
-    trained, judged, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
+    trained, measured, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
@@ -84,10 +83,10 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     parts = new + scatter.of_sums(trained, np.arange(len(trained)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        n_evaluated, of_correlations = judged.sum(), freedom + scatter.n_pseudo
+        n_evaluated, of_correlations = measured.sum(), freedom + scatter.n_pseudo
         factor = of_correlations / max(of_correlations - n_evaluated + 1, 1.0)
         freedom = max(freedom - n_evaluated + 1, 1.0)
-    covariance = np.where(np.outer(judged, judged), factor * parts.sum(axis=0), np.eye(len(mean)))
+    covariance = np.where(np.outer(measured, measured), factor * parts.sum(axis=0), np.eye(len(mean)))
     return FrequencyShift(
         mean, covariance, freedom, n_records, n_independent, wider, scatter.n_trained, fem.mode_names_
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._effects.frequencies import read_groups
+from skthermo._effects import read_groups
 from skthermo._estimators.warnings import told_around, warn_user, without_warnings
 from skthermo._tables.arrays import as_random_state
 from skthermo.exceptions import ResultWarning
@@ -28,7 +28,7 @@ WORTH_DIVIDING = 0.05  # probability of a group, and of a piece of a damaged gro
 CANNOT_TELL = 0.75  # share of a group's pieces that may be worth it before dividing them would tell nothing
 WORTH_ASKING = 0.02  # probability of a whole group from which on it is divided at all
 MOSTLY_ELSE = 0.5  # probability of something else from which on a warning says so
-OF_WHOLE_GROUPS = ("unexplained shifts", "confused groups")
+OF_WHOLE_GROUPS = ("unexplained shifts", "indistinguishable groups")
 """Warnings that hold for whole groups, and may not hold for parts of them."""
 
 SOME_ELSE = 0.1  # probability of something else from which on every group is divided: a part of one may be behind it
@@ -81,7 +81,7 @@ def locate_damage(
     Returns
     -------
     LocatedDamage
-        Probability of damage and severity by member, which places cannot be told apart, and what was asked.
+        Probability of damage and severity by member, which places cannot be distinguished, and what was asked.
 
     Raises
     ------

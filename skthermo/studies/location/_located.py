@@ -103,7 +103,7 @@ class LocatedDamage:
     probability_other : float
         Probability that something else shifted the frequencies, beside damage or alone.
     alike : list of str
-        Two probable places, in words, that these modes cannot tell apart; empty if there are none.
+        Two probable places, in words, that these modes cannot distinguish; empty if there are none.
     explained : sequence of explanations
         Those of the finest division, each with its ``probability``, and the damaged ``members`` and the ``severities``
         by group.
@@ -177,7 +177,7 @@ class LocatedDamage:
         return list(self._answer())
 
     def summary(self) -> str:
-        """What was found, where in each group, and what cannot be told apart.
+        """What was found, where in each group, and what cannot be distinguished.
 
         Returns
         -------
@@ -190,10 +190,10 @@ class LocatedDamage:
         """Sets of damaged members and their probabilities."""
         if group is not None:
             return [(e.members[group], e.probability) for e in self.explained if group in e.members]
-        return visible_sets(self.explained, self.found.unseen)
+        return visible_sets(self.explained, self.found.unobservable)
 
     def _answer(self) -> Iterator[str]:
-        is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unseen)
+        is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unobservable)
         probable = self.groups[is_told]
         if probable.empty:
             yield (
@@ -208,8 +208,8 @@ class LocatedDamage:
             yield f"These modes cannot tell {' from '.join(self.alike)}."
         if self.probability_other >= WORTH_TELLING:
             yield f"Something else may have shifted the frequencies ({_share(self.probability_other)})."
-        if self.found.unseen:
-            yield f"Damage in {listed(self.found.unseen)} would hardly show in these modes."
+        if self.found.unobservable:
+            yield f"Damage in {listed(self.found.unobservable)} would hardly show in these modes."
 
     def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
         damaged = f"{group} is damaged with a probability of {_share(row['probability'])}"
@@ -259,7 +259,7 @@ def located_damage(
     """From the explanations of the finest division, and the number of pieces of each group that was divided."""
     explained = answer.explained
     total = sum(one.probability for one in explained)
-    likely, rows = set(fewest(visible_sets(explained, found.unseen), LIKELY)[0]), {}
+    likely, rows = set(fewest(visible_sets(explained, found.unobservable), LIKELY)[0]), {}
     for group, where in places.items():
         for member, number in where.numbers.items():
             if member not in rows:
@@ -301,11 +301,13 @@ def located_damage(
     )
 
 
-def visible_sets(explained: Sequence[Explained], unseen: Sequence[str]) -> list[tuple[frozenset[Hashable], float]]:
+def visible_sets(
+    explained: Sequence[Explained], unobservable: Sequence[str]
+) -> list[tuple[frozenset[Hashable], float]]:
     """Sets of damaged members and their probabilities, less groups of which the modes show nothing."""
     found = []
     for one in explained:
-        members = [inside for group, inside in one.members.items() if group not in unseen]
+        members = [inside for group, inside in one.members.items() if group not in unobservable]
         if members:
             found.append((frozenset().union(*members), one.probability))
     return found

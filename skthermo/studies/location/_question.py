@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects
+from skthermo._effects import FrequencyEffects, StructuralChanges
 from skthermo._estimators.warnings import told_around
 from skthermo._tables.arrays import Array
 from skthermo.fem import Structure
 from skthermo.studies.identification import (
     SOMETHING_ELSE,
     Cause,
+    Curves,
     DamagePrior,
     FrequencyShift,
     Observed,
@@ -27,13 +27,12 @@ from skthermo.studies.identification import (
     compared,
     screen,
 )
-from skthermo.studies.location._curves import StretchCurves
 from skthermo.studies.location._division import Division
 
 PLAUSIBLE = 0.01  # probability of several groups together from which on each of them is divided in turn
 
 ALIKE = 0.98  # cosine between the effects of two stretches from which on modes cannot tell one from the other
-AS_PROBABLE = 0.2  # and the ratio of their probabilities from which on that is said
+AS_PROBABLE = 0.2  # and the ratio of their probabilities from which on both are named
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ class MeasuredShift:
         observed, curves = self._curves(question)
         labels = [f"{stretch.group} [{number}]" for number, stretch in enumerate(question.stretches)]
         causes = [Cause(label, scale=stretch.scale) for label, stretch in zip(labels, question.stretches, strict=True)]
-        scale = Scale(observed, curves, causes, self.prior, curves)
+        scale = Scale(observed, None, causes, self.prior, curves)
         sets, logs = zip(*question.explanations(self.prior, self.together), strict=True)
         posterior = Posterior.of(scale, screen(scale, sets, logs), np.array(logs), random)
         stretch_of = dict(zip(labels, question.stretches, strict=True))
@@ -195,7 +194,7 @@ class MeasuredShift:
         probable = np.array([posterior.probability_of(label) for label in labels])
         return Answer(explained, alike(question, curves, probable))
 
-    def _curves(self, question: Question) -> tuple[Observed, StretchCurves]:
+    def _curves(self, question: Question) -> tuple[Observed, Curves]:
         """What was measured, and the effects of all stretches on it."""
         twin = on_pieces(self.fem, self.structure, question.parts)
         changes = StructuralChanges.of_damage(twin.model, question.names)
@@ -204,12 +203,12 @@ class MeasuredShift:
         with told_around(["foreign mode shapes"]):
             comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)
-        return observed, StretchCurves.of(comparison.effects, question.incidence, observed.rotation)
+        return observed, Curves.of_stretches(comparison.effects, question.incidence, observed.rotation)
 
 
-def alike(question: Question, curves: StretchCurves, probable: NDArray) -> tuple[Stretch, ...]:
+def alike(question: Question, curves: Curves, probable: NDArray) -> tuple[Stretch, ...]:
     """The most probable part of a group and, if damage elsewhere looks the same, the most probable such place."""
-    slopes = curves.slopes[:, 0] @ curves.rotation.T
+    slopes = curves.slopes[:, 0]
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), np.finfo(float).tiny)
     is_part = np.array([stretch.is_part for stretch in question.stretches])
     best = int(np.where(is_part, probable, -1.0).argmax())

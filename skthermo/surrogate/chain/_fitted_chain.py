@@ -14,7 +14,7 @@ from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._simulator import Box, Simulator
 from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
-from skthermo.surrogate.chain._thermal_model import Discrepancy, ThermalModel, Weather
+from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather
 
 
 class FittedChain(Protocol):

@@ -16,30 +16,28 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.arguments import check_noise
-from skthermo._estimators.regressors import fit_weighted, offers, predicted_covariance, reach_of
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import (
     Array,
     as_columns,
     as_floats,
     as_random_state,
+    check_noise,
     is_real,
     median,
     patterns,
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like
+from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like, row_times
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import row_times
-from skthermo._validation import last_step
+from skthermo._validation import fit_weighted, last_step, offers, predicted_covariance, reach_of
 from skthermo.fem import FEModel
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
 from skthermo.residuals.weather import SensorRegression, warn_of_unseen
-from skthermo.surrogate.chain._thermal_model import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
+from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
 
 MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
 MOST_FOR_NOISE = 3000  # records, spread evenly, that the noise is estimated from

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._estimators.arguments import check_model, check_noise, check_theta
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, as_floats
+from skthermo._tables.arrays import Array, Bounds, as_floats, check_model, check_noise, check_theta
 from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     CallbackSupport,
@@ -32,8 +31,8 @@ from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse._refinement import Refinement, unconverged
 from skthermo.surrogate.inverse._training import InverseColumns, Inversions, ShapeScores, SimulatedTraining, held_out
-from skthermo.surrogate.refinement import Refinement, unconverged
 
 DEFAULT_STEPS = 100
 MANY_UNCONVERGED = 0.01  # share of rows that have not converged above which a warning is given

@@ -15,16 +15,15 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import Bunch
 
-from skthermo._estimators.arguments import is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.arrays import Array, as_floats, is_auto, tolerance
 from skthermo._tables.frames import Table, column_names
 from skthermo._validation import validate_data
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample, share_reordered
-from skthermo.surrogate._memory import content_of, folder_of, remembered
+from skthermo.surrogate._regression import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
-from skthermo.surrogate.refinement import Refinement, ResponseSurface, ShapeInputs
+from skthermo.surrogate.inverse._refinement import Refinement, ResponseSurface, ShapeInputs
 
 
 @dataclass(frozen=True)

@@ -97,8 +97,8 @@ def test_a_mixture_averages_over_what_is_followed():
     for a in (True, False):
         for b in (True, False):
             rows = np.array([a, b])[:, np.newaxis]
-            usual, alien = (0.9 if a else 0.1) * (0.6 if b else 0.4), (0.2 if a else 0.8) * (0.2 if b else 0.8)
-            chance = 0.95 * usual + 0.05 * alien
+            usual, atypical = (0.9 if a else 0.1) * (0.6 if b else 0.4), (0.2 if a else 0.8) * (0.2 if b else 0.8)
+            chance = 0.95 * usual + 0.05 * atypical
             mean = np.where(rows, fleet.mean, own.mean)
             state = posterior(J, h, mean, np.where(rows[..., np.newaxis], fleet.root, own.root))
             parts.append((chance * np.exp(state.evidence - found.evidence), state, a))
@@ -150,7 +150,7 @@ def test_other_bridges_of_the_family_are_within_its_bands(n_bridges):
     assert 0.85 <= np.mean(inside) <= 0.97
 
 
-def test_a_fleet_of_aliens_by_weight_is_left_out():
+def test_a_fleet_of_atypical_bridges_by_weight_is_left_out():
     random = np.random.default_rng(5)
     members = simulated(random, 40, np.zeros(FUNCTIONS), 0.1 * np.eye(FUNCTIONS))
     atypical = simulated(random, 5, np.full(FUNCTIONS, 50.0), np.eye(FUNCTIONS))

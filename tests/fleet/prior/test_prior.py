@@ -14,7 +14,7 @@ from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.preprocessing import LagFeatures
 from tests.fleet.prior.fleets import LAW, records
 
-ALIEN = np.array([[2.0, -4.0, -3.0], [3.0, 2.0, 5.0]]) * 1e-3
+ATYPICAL = np.array([[2.0, -4.0, -3.0], [3.0, 2.0, 5.0]]) * 1e-3
 FLEET = {f"bridge {seed}": records(seed)[:2] for seed in range(12)}
 
 
@@ -36,7 +36,7 @@ def error(mapper, seed, **options):
 
 def test_a_fleet_of_one_law_is_pooled(prior):
     assert prior.comparison_["is_pooled"].all()
-    assert (prior.bridges_["follows"] > 0.9).all()
+    assert (prior.bridges_["pooling_probability"] > 0.9).all()
     assert "f1: pooled over 12" in prior.summary()
     assert_allclose(prior.comparison_["gain"], prior.bridges_["gain"].groupby("family").sum())
 
@@ -53,7 +53,7 @@ def test_few_records_and_the_fleet_are_better_than_either(prior):
     assert both < 0.5 * alone
 
 
-def test_bands_hold_what_they_promise(prior):
+def test_intervals_have_their_confidence(prior):
     inside = []
     for seed in range(30, 60):
         T, F, _ = records(seed, 30)
@@ -94,20 +94,20 @@ def test_order_and_names_of_bridges_change_nothing(prior):
     assert_allclose(other.comparison_["gain"], prior.comparison_["gain"], rtol=1e-3)
 
 
-def test_an_alien_is_told_from_the_fleet_and_loses_little(prior):
+def test_an_atypical_bridge_is_distinguished_from_the_fleet_and_loses_little(prior):
     ratios = []
     for seed in range(80, 86):
-        T, F, _ = records(seed, 60, law=ALIEN)
+        T, F, _ = records(seed, 60, law=ATYPICAL)
         mapper = prior.mapper().fit(T, F)
         assert max(mapper.pooling_probability_.values()) < 0.5
-        ratios.append(error(mapper, seed, law=ALIEN) / error(FleetMapper().fit(T, F), seed, law=ALIEN))
+        ratios.append(error(mapper, seed, law=ATYPICAL) / error(FleetMapper().fit(T, F), seed, law=ATYPICAL))
     assert np.mean(ratios) < 1.05
 
 
-def test_aliens_in_a_fleet_are_found_and_do_not_widen_it(prior):
-    atypical = {f"alien {seed}": records(seed, law=ALIEN)[:2] for seed in (90, 91)}
+def test_atypicals_in_a_fleet_are_found_and_do_not_widen_it(prior):
+    atypical = {f"atypical {seed}": records(seed, law=ATYPICAL)[:2] for seed in (90, 91)}
     found = FleetPrior().fit(FLEET | atypical)
-    follows = found.bridges_["follows"].unstack()
+    follows = found.bridges_["pooling_probability"].unstack()
     assert (follows.loc[list(atypical)] < 0.1).all(axis=None)
     assert (follows.loc[list(FLEET)] > 0.5).all(axis=None)
     T, F, _ = records(50, 30)
@@ -263,3 +263,34 @@ def test_a_quantity_without_any_value_is_refused(prior):
     T, F, _ = records(50, 20)
     with pytest.raises(ValueError, match="quantity 'f2' is NaN in all 20 rows that can be used; expected values"):
         prior.mapper().fit(T, F.assign(f2=np.nan))
+
+
+def signed(seed, days=365):
+    """Temperatures and a displacement in mm about 0, with the law of its family and scatter of its own."""
+    random = np.random.default_rng(seed)
+    stamps = pd.date_range("2025-01-01", periods=days)
+    warm = 10 - 12 * np.cos(2 * np.pi * np.arange(days) / 365) + random.normal(0, 3, days)
+    d = random.normal(0, 3) + random.normal(0.4, 0.03) * (warm - 10) + random.normal(0, 0.5, days)
+    f = 3 * np.exp(random.normal(-0.001, 1e-4) * warm + random.normal(0, 0.002, days))
+    return pd.DataFrame({"T": warm}, stamps), pd.DataFrame({"d": d, "f1": f}, stamps)
+
+
+def test_quantities_of_any_sign_have_a_linear_link_whatever_their_unit():
+    with pytest.raises(ValueError, match="link='linear'"):
+        FleetPrior().fit({seed: signed(seed) for seed in range(3)})
+    winter, warm = signed(20, 40), pd.DataFrame({"T": [10.0, 30.0]})
+    predicted, errors = [], []
+    for unit in (1.0, 1e-3):
+        bridges = {seed: signed(seed) for seed in range(8)}
+        bridges = {seed: (T, Y.assign(d=unit * Y["d"])) for seed, (T, Y) in bridges.items()}
+        fleet = FleetPrior(link={"d": "linear"}).fit(bridges)
+        assert fleet.comparison_.loc["d", "is_pooled"]
+        T, Y = winter
+        mapper = fleet.mapper().fit(T, Y.assign(d=unit * Y["d"]))
+        mean, std = (table.to_numpy() / [unit, 1] for table in mapper.predict(warm, return_std=True))
+        change = (fleet.effects([10.0, 30.0], "d", reference=10.0)["mean"] / unit).to_numpy()
+        predicted.append(np.concatenate([mean, std, change[:, np.newaxis] * [1, 1]]))
+        errors.append(abs(mean[1, 0] - mean[0, 0] - 0.4 * 20))
+    assert_allclose(predicted[0], predicted[1], rtol=1e-6, atol=1e-9)
+    assert errors[0] < 2.0
+    assert predicted[0][-1, 0] == pytest.approx(0.4 * 20, rel=0.1)

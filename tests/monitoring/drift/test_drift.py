@@ -89,18 +89,13 @@ def dense(steps, start, days):
     return mean + gain @ (values - design @ mean), covariance - gain @ design @ covariance
 
 
-def test_smoother_and_filter_equal_the_dense_conditional():
+def test_the_filter_equals_the_dense_conditional():
     steps, start, days = small_case()
     mean, covariance = dense(steps, start, days)
-    means, covariances, end = steps.smoothed(start, days)
     n = len(start.mean)
-    for day in range(len(days)):
-        place = slice(n * day, n * day + 2)
-        assert_allclose(means[day], mean[place], atol=1e-9)
-        assert_allclose(covariances[day], covariance[place, place], atol=1e-9)
-    for state in (end, steps.filtered(start, days)):
-        assert_allclose(state.mean, mean[-n:], atol=1e-9)
-        assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
+    state = steps.filtered(start, days)
+    assert_allclose(state.mean, mean[-n:], atol=1e-9)
+    assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
 
 
 def test_memory_and_variances_of_noise_are_recovered():
@@ -137,7 +132,7 @@ def test_a_known_drift_is_recovered(history):
     assert history.has_drift
     assert history.explanations["groups"].iloc[0] == ("bottom",)
     assert abs(table["estimate"].iloc[-1] - truth[-1]) < 2.5 * rate["change_error"]
-    assert ((table["lower"] <= truth) & (truth <= table["upper"])).mean() > 0.9
+    assert ((table["ci_low"] <= truth) & (truth <= table["ci_high"])).mean() > 0.9
     assert history.rates["drifts"].to_dict() == {"bottom": "yes", "top": "no sign", "diagonal": "no sign"} | {
         "all groups": "no sign"
     }
@@ -155,7 +150,7 @@ def test_without_drift_none_is_claimed(healthy):
     assert found.summary().startswith("No drift")
     pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
     bands = found.table.iloc[-1].unstack()
-    assert ((bands["lower"] < 1) & (bands["upper"] > 1)).all()
+    assert ((bands["ci_low"] < 1) & (bands["ci_high"] > 1)).all()
 
 
 def test_one_year_is_told_with_wide_bands(ageing):
@@ -163,7 +158,7 @@ def test_one_year_is_told_with_wide_bands(ageing):
     T, F = campaign.temperatures[:365], campaign.frequencies[:365]
     found = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
     bottom = found.table["bottom"].iloc[-1]
-    assert bottom["lower"] < 0.98 < bottom["upper"]
+    assert bottom["ci_low"] < 0.98 < bottom["ci_high"]
     assert "1.0 years long" in found.summary()
 
 
@@ -206,7 +201,7 @@ def test_days_and_modes_may_be_missing(ageing, history):
     table = found.table["bottom"]
     assert found.has_drift
     assert found.explanations["groups"].iloc[0] == ("bottom",)
-    assert table["lower"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["upper"].iloc[-1]
+    assert table["ci_low"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["ci_high"].iloc[-1]
 
 
 def test_filled_temperatures_are_told_once(healthy):
@@ -270,6 +265,28 @@ def test_the_filter_follows_a_drift(ageing):
     assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * np.sqrt(np.diag(covariance))).all()
     rates = slice(len(GROUPS), 2 * len(GROUPS))
     assert np.array_equal(follower.next_day(known, None).mean[rates], known.mean[rates])
+
+
+@pytest.mark.parametrize(
+    "drift", [{"bottom": 0.02}, dict.fromkeys(("bottom", "top", "diagonal", "vertical"), 0.01), {}]
+)
+def test_a_monitors_drift_and_the_history_tell_one_story(drift):
+    campaign = make_truss_campaign(3, drift=drift or None, random_state=3)
+    fem, T, F = trained(campaign), campaign.temperatures, campaign.frequencies
+    history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
+    follower = DriftFollower.of(fem, T[:365], F[:365])
+    daily, start = follower.records.means(T[365:], F[365:], F.index[365:]), follower.start()
+    known = start.known
+    for day in range(len(F) - 365):
+        known = follower.next_day(known, observation(daily, day, follower.noise, follower.slopes))
+    report = follower.report(replace(start, known=known, learned=F.index[-1]))
+    expected = ["all groups"] if len(drift) > 1 else list(drift)
+    assert report.index[report["significant"]].tolist() == expected
+    assert (report["p_value"].max() <= 0.01) == history.has_drift == bool(drift)
+    assert history.rates.index[history.rates["drifts"] == "yes"].tolist() == expected
+    for group in expected:
+        together = np.hypot(report.loc[group, "per_year_error"], history.rates.loc[group, "standard_error"])
+        assert abs(report.loc[group, "per_year"] - history.rates.loc[group, "per_year"]) < 3 * together
 
 
 def test_days_are_those_of_the_calendar_where_clocks_change(healthy):
@@ -347,7 +364,7 @@ def test_mirror_images_are_named_together():
         warnings.simplefilter("ignore", UserWarning)  # four modes do not determine six parameters
         fem = DataInformedFEM(model, random_state=0).fit(T[:365], F[:365])
         history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
-    assert history.sets == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
+    assert history.indistinguishable == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
     assert_allclose(*history.rates.loc[["k1", "k6"], "probability"])
     assert (history.rates.loc[["k1", "k6"], "drifts"] == "perhaps").all()
     assert_allclose(history.rates.loc["k1", "per_year"], -0.02, atol=3 * history.rates.loc["k1", "standard_error"])

@@ -1,0 +1,427 @@
+"""A fleet of synthetic bridges that share their kinds of structure and thermal laws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from skthermo._tables.arrays import Array, as_random_state, check_noise, is_real, positive_integer
+from skthermo.datasets._fleet_site import (
+    ALIENS,
+    Law,
+    SiteClimate,
+    Thermometer,
+    columns_for,
+    draw_law,
+    draw_thermometers,
+    drawn_by_hour,
+    measured,
+    readings,
+    stream,
+)
+from skthermo.datasets._fleet_structures import KINDS, Design, Kind
+from skthermo.datasets._results import FleetRecords
+from skthermo.fem import AffineModel
+
+DRAWN = ("who", "design", "error", "laws", "zones", "climate", "thermometers", "noise")
+WEATHER, FREQUENCIES, TEMPERATURES = 100, 101, 102  # streams that depend on the seed of the records, too
+APART, ATTEMPTS = 0.07, 100  # of neighbouring frequencies, so that modes keep their order; tries until they are
+STIFFNESS_ERROR, MASS_ERROR = (0.02, 0.05), 0.01
+MOST = 0.5  # share of records that are missing or wrong
+ZONE_OFFSET = 0.8  # C
+NOISE, NOISE_LIMITS = 0.004, (0.002, 0.01)
+TEMPERATURE_GAPS = 0.2  # share of missing temperatures over that of frequencies
+HOURS_A_DAY = 24
+
+
+@dataclass(frozen=True)
+class FleetBridge:
+    """One bridge of `make_fleet`, drawn from its seed. It pickles in a few hundred bytes.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    kind : {"truss", "girder", "arch"}
+        Its kind.
+    seed : tuple of int
+        What everything about it is drawn from.
+    alien : {"reversed", "doubled", "knee elsewhere"}, optional
+        How its thermal laws differ from those of its family.
+
+    See Also
+    --------
+    make_fleet : Many of them, with a description of what is drawn.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_fleet
+    >>> bridge = make_fleet(3, random_state=0)["bridge 001"]
+    >>> bridge.kind, bridge.model.parameter_names, bridge.groups
+    ('girder', ('deck', 'torsion', 'bearings', 'soil'), ('girder', 'first span', 'bearings', 'soil'))
+    >>> bridge.records(60, damage={"soil": 0.2}).frequencies.shape
+    (60, 5)
+    """
+
+    name: str
+    kind: str
+    seed: tuple[int, ...]
+    alien: str | None = None
+
+    def __reduce__(self):
+        """Leave out what can be built again."""
+        return FleetBridge, (self.name, self.kind, self.seed, self.alien)
+
+    @property
+    def is_atypical(self) -> bool:
+        """Whether its thermal laws are not those of its family."""
+        return self.alien is not None
+
+    @cached_property
+    def covariates(self) -> dict[str, str | float]:
+        """What its owner knows: "kind", "material", "span" in m, "latitude" in degrees."""
+        random, kind = self._random("who"), KINDS[self.kind]
+        return {
+            "kind": self.kind,
+            "material": kind.materials[random.randint(len(kind.materials))],
+            "span": round(random.uniform(*kind.spans), 1),
+            "latitude": round(self.climate.latitude, 2),
+        }
+
+    @cached_property
+    def climate(self) -> SiteClimate:
+        """Climate of its place: latitude, mean, seasonal and daily cycle in C, and how its weather varies."""
+        return SiteClimate.draw(self._random("climate"))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What damage can hit, by the names of ``model.groups``."""
+        return KINDS[self.kind].groups
+
+    @cached_property
+    def roles(self) -> dict[str, str]:
+        """Name of each thermometer's column and its role, "air" or "deck"."""
+        return {thermometer.name: thermometer.role for thermometer in self._thermometers}
+
+    @cached_property
+    def noise(self) -> Array:
+        """Relative standard deviation of the noise of each frequency, of shape (n_modes,)."""
+        random = self._random("noise")
+        of_modes = 0.2 * random.standard_normal(KINDS[self.kind].n_modes)
+        return np.clip(NOISE * np.exp(0.3 * random.standard_normal() + of_modes), *NOISE_LIMITS)
+
+    @cached_property
+    def model(self) -> AffineModel:
+        """The user's FE model: a coarser mesh, stiffnesses 2 to 5 % off, parameters across the thermal zones."""
+        random, kind = self._random("error"), KINDS[self.kind]
+        off = random.uniform(*STIFFNESS_ERROR)
+        wrong = {
+            name: value * np.exp(relative_error(name, off) * random.standard_normal())
+            for name, value in self._design.items()
+        }
+        structure = kind.build(wrong, False)
+        return structure.assemble(kind.parameters, groups=kind.groups, n_modes=kind.n_modes)
+
+    @cached_property
+    def truth(self) -> AffineModel:
+        """How the bridge behaves: its thermal zones are the parameters; damage groups as in ``model``."""
+        return assemble_truth(KINDS[self.kind], self._design)
+
+    @cached_property
+    def laws(self) -> dict[str, Law]:
+        """Thermal law of each zone of ``truth``. Zones of one material share the law, but not the temperature."""
+        zones = {
+            zone: self.covariates["material"] if what == "own" else what
+            for zone, what in KINDS[self.kind].zones.items()
+        }
+        random = self._random("laws")
+        by_material = {what: draw_law(what, self.alien, random) for what in dict.fromkeys(zones.values())}
+        return {zone: by_material[what] for zone, what in zones.items()}
+
+    def records(
+        self,
+        days: int,
+        start: str | datetime = "2025-01-01",
+        *,
+        samples_per_day: int = 1,
+        damage: Mapping[str, float] | None = None,
+        noise: ArrayLike | None = None,
+        gaps: float = 0.05,
+        outliers: float = 0.002,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> FleetRecords:
+        """Temperatures and frequencies from a date on.
+
+        Weather, noise, gaps and outliers of a record depend on its date and the seeds alone: a longer campaign begins
+        with a shorter one, one that begins later goes on with its weather, and damaged records have the weather of
+        healthy ones.
+
+        Parameters
+        ----------
+        days : int
+            Number of days.
+        start : str, Timestamp or datetime, default="2025-01-01"
+            First record, at a full hour.
+        samples_per_day : int, default=1
+            Records a day, a divisor of 24. Temperatures are means of the time from a record to the next one, and so are
+            the temperatures inside the bridge, which follow with thermal inertia.
+        damage : mapping of str to float, optional
+            Severity by damage group, as in ``model.damaged``: 0.2 takes 20 % of its stiffness.
+        noise : float or array-like of shape (n_modes,), optional
+            Relative standard deviation of the noise of frequencies, by default the bridge's own ``noise``. Of its
+            variance 40 % lasts for two days.
+        gaps : float, default=0.05
+            Share of frequencies that are missing, for most of a day at a time; a fifth of that share of temperatures is
+            missing, too.
+        outliers : float, default=0.002
+            Share of frequencies that are wrong by 3 to 10 %.
+        random_state : int, RandomState or None, default=None
+            Seed of another history of the same bridge. None is its own history: every call gives the same records.
+
+        Returns
+        -------
+        Bunch
+            With these attributes:
+
+            temperatures : DataFrame of shape (n_records, n_thermometers)
+                In degrees Celsius, with offsets, noise and gaps; the columns are those of ``roles``.
+            frequencies : DataFrame of shape (n_records, n_modes)
+                ``f1``, ``f2``, ... in Hz, with noise, gaps and outliers.
+            clean_frequencies : DataFrame of shape (n_records, n_modes)
+                Without these.
+            theta : DataFrame of shape (n_records, n_zones)
+                What the weather does: multipliers of the stiffness of the zones of ``truth``.
+
+        Raises
+        ------
+        ValueError
+            If the samples a day do not divide 24, the start is no full hour or has a time zone, or a share is not
+            between 0 and 0.5.
+        """
+        index = record_times(start, days, samples_per_day)
+        gaps, outliers = check_share(gaps, "gaps"), check_share(outliers, "outliers")
+        modes = [f"f{i + 1}" for i in range(KINDS[self.kind].n_modes)]
+        level = self.noise if noise is None else check_noise(noise, len(modes))
+        model = self.truth.damaged({} if damage is None else damage)
+        own = 0 if random_state is None else 1 + as_random_state(random_state).randint(2**31 - 1)
+
+        def key(what: int) -> tuple[int, ...]:
+            return (*self.seed, what, own)
+
+        hours = HOURS_A_DAY // samples_per_day
+        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), key(WEATHER))
+        years, rows = weather.index.year.unique(), weather.index.get_indexer(index)
+
+        def means(hourly: Array) -> Array:
+            return hourly[rows[0] : rows[-1] + hours].reshape(len(index), hours).mean(axis=1)
+
+        offsets = ZONE_OFFSET * self._random("zones").standard_normal(len(self.laws))
+        theta = {
+            zone: np.exp(law.log_multiplier(means(law.temperature(weather)) + offset))
+            for (zone, law), offset in zip(self.laws.items(), offsets, strict=True)
+        }
+        clean = model.frequencies(np.column_stack(list(theta.values())))
+        disturbed = measured(
+            clean, level, gaps, outliers, rows, drawn_by_hour(years, columns_for(len(modes)), key(FREQUENCIES))
+        )
+        reader = drawn_by_hour(years, 2 * len(self.roles), key(TEMPERATURES))
+        read = readings(self._thermometers, weather, means, TEMPERATURE_GAPS * gaps, rows, reader)
+        return FleetRecords(
+            temperatures=pd.DataFrame(read, index),
+            frequencies=pd.DataFrame(disturbed, index, modes),
+            clean_frequencies=pd.DataFrame(clean, index, modes),
+            theta=pd.DataFrame(theta, index),
+        )
+
+    @cached_property
+    def _thermometers(self) -> list[Thermometer]:
+        return draw_thermometers(self._random("thermometers"))
+
+    @cached_property
+    def _design(self) -> Design:
+        """Stiffnesses and masses, drawn until the frequencies are so far apart that modes keep their order."""
+        random, kind = self._random("design"), KINDS[self.kind]
+        for _ in range(ATTEMPTS):
+            design = kind.design(self.covariates["span"], self.covariates["material"], random)
+            nominal = assemble_truth(kind, design, further_modes=1).frequencies(np.ones((1, len(kind.zones))))[0]
+            if (np.diff(nominal) > APART * nominal[:-1]).all():
+                break
+        return design
+
+    def _random(self, what: str) -> np.random.RandomState:
+        """Random numbers for one thing that is drawn, whatever else is drawn."""
+        return stream(*self.seed, DRAWN.index(what))
+
+
+def assemble_truth(kind: Kind, design: Design, further_modes: int = 0) -> AffineModel:
+    """The model whose parameters are the thermal zones."""
+    zones, n_modes = list(kind.zones), kind.n_modes + further_modes
+    return kind.build(design, True).assemble(zones, groups=kind.groups, n_modes=n_modes)
+
+
+def relative_error(name: str, of_stiffness: float) -> float:
+    """Standard deviation of the logarithm of a quantity of the design in the user's model."""
+    if name.startswith(("EI", "EA", "GJ", "k_")):
+        return of_stiffness
+    return MASS_ERROR if name.startswith("mass") else 0.0
+
+
+def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:
+    """Times of the records."""
+    days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
+    if HOURS_A_DAY % samples_per_day:
+        raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
+    try:
+        first = pd.Timestamp(start)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"start is {start!r}; expected a time such as '2025-01-01' ({error})") from error
+    if first is pd.NaT or first.tz is not None or first != first.floor("h"):
+        raise ValueError(f"start is {start!r}; expected a full hour without time zone, such as '2025-01-01'")
+    step = pd.Timedelta(hours=HOURS_A_DAY // samples_per_day)
+    return pd.date_range(first, periods=days * samples_per_day, freq=step, name="time")
+
+
+def check_share(value: float, what: str) -> float:
+    """A share of records."""
+    if not is_real(value) or not 0 <= value <= MOST:
+        raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")
+    return float(value)
+
+
+class BridgeFleet(Mapping[str, FleetBridge]):
+    """The bridges of `make_fleet` by name.
+
+    Parameters
+    ----------
+    bridges : sequence of FleetBridge
+        In order.
+
+    Attributes
+    ----------
+    covariates : DataFrame
+        A row for each bridge: "kind", "material", "span" in m and "latitude" in degrees.
+
+    See Also
+    --------
+    make_fleet : How to make one.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_fleet
+    >>> [name for name, bridge in make_fleet(20, random_state=0).items() if bridge.is_atypical]
+    ['bridge 007']
+    """
+
+    def __init__(self, bridges: Sequence[FleetBridge]):
+        self._bridges = {bridge.name: bridge for bridge in bridges}
+
+    def __getitem__(self, name: str) -> FleetBridge:
+        return self._bridges[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._bridges)
+
+    def __len__(self) -> int:
+        return len(self._bridges)
+
+    def __repr__(self) -> str:
+        kinds = pd.Series([bridge.kind for bridge in self.values()]).value_counts(sort=False)
+        counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        atypical = sum(bridge.is_atypical for bridge in self.values())
+        return f"BridgeFleet({counts}; {atypical} with thermal laws of their own)"
+
+    @cached_property
+    def covariates(self) -> pd.DataFrame:
+        """What the owner knows of each bridge, a row for each name."""
+        return pd.DataFrame.from_dict({name: bridge.covariates for name, bridge in self.items()}, orient="index")
+
+
+def make_fleet(
+    n_bridges: int = 20,
+    *,
+    kinds: Sequence[str] = ("truss", "girder", "arch"),
+    atypical: float = 0.05,
+    random_state: int | np.random.RandomState | None = None,
+) -> BridgeFleet:
+    """Synthetic fleet of bridges with known truth: trusses, girders and tied arches under their own climates.
+
+    Every bridge has its own span, material, climate, thermometers, noise and stiffnesses. Those of one material share
+    their thermal laws, but for coefficients that scatter about the material's. The FE model that comes with a bridge is
+    a little wrong, as users' models are.
+
+    Parameters
+    ----------
+    n_bridges : int, default=20
+        Number of bridges.
+    kinds : sequence of {"truss", "girder", "arch"}, default=("truss", "girder", "arch")
+        Kinds, in turn.
+    atypical : float, default=0.05
+        Share of bridges with thermal laws of their own, spread evenly over each kind: "reversed", "doubled" or with the
+        "knee elsewhere".
+    random_state : int, RandomState or None, default=None
+        Seed. With the same integer and the same kinds and share, a larger fleet begins with the bridges of a smaller
+        one.
+
+    Returns
+    -------
+    BridgeFleet
+        A mapping of names ("bridge 000", ...) to `FleetBridge`; its ``covariates`` are a table. Bridges are small until
+        their models and records are asked for, so that workers make these themselves.
+
+    Raises
+    ------
+    ValueError
+        If a kind is unknown, or the share is not between 0 and 1.
+
+    Notes
+    -----
+    Kinds, with five modes, mostly between 1 and 30 Hz:
+
+    - truss: the 28-bar truss scaled to spans of 26 to 58 m, with a floor and pavement on its bottom chord; parameters
+      ``deck``, ``top``, ``diagonals`` and ``bearings``;
+    - girder: continuous over two or three spans of at most 20 to 45 m, of concrete or composite, in bending and
+      torsion, its piers on soil; parameters ``deck``, ``torsion``, ``bearings`` and ``soil``;
+    - arch: a tied arch of 50 to 120 m in its plane, with a steel or composite deck; parameters ``deck``, ``arch``,
+      ``hangers`` and ``bearings``.
+
+    The user's model has a coarser mesh (but for the truss), stiffnesses that are 2 to 5 % off, masses that are 1 % off,
+    and parameters that cut across the thermal zones of the truth.
+
+    Climates lie between 43 and 60 degrees of latitude, maritime to continental. Parts follow the air with thermal
+    inertia (steel 2 h, concrete 15 h, soil four days) and are warmed by the sun. The logarithm of the stiffness of a
+    part changes in proportion to its temperature, and rises below a knee near 0 C, up to a limit, where water freezes
+    or elastomers stiffen. The coefficients scatter by 10 to 30 % about those of the material, the knee by 0.5 C.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_fleet
+    >>> fleet = make_fleet(20, random_state=0)
+    >>> fleet
+    BridgeFleet(7 truss, 7 girder, 6 arch; 1 with thermal laws of their own)
+    >>> fleet.covariates.head(3)
+                  kind  material  span  latitude
+    bridge 000   truss     steel  41.5     47.52
+    bridge 001  girder  concrete  28.4     51.71
+    bridge 002    arch     steel  90.6     53.14
+    """
+    n_bridges = positive_integer(n_bridges, "n_bridges")
+    if isinstance(kinds, str) or not kinds or not set(kinds) <= set(KINDS):
+        raise ValueError(f"kinds is {kinds!r:.200}; expected some of {tuple(KINDS)}")
+    if not is_real(atypical) or not 0 <= atypical <= 1:
+        raise ValueError(f"atypical is {atypical!r}; expected a share from 0 to 1")
+    root = int(as_random_state(random_state).randint(2**31 - 1))
+    first = stream(root).uniform()
+    bridges = []
+    for k in range(n_bridges):
+        round_, turn = divmod(k, len(kinds))
+        phase = first + turn / len(kinds)
+        is_atypical = np.floor((round_ + 1) * atypical + phase) > np.floor(round_ * atypical + phase)
+        alien = ALIENS[stream(root, k).randint(len(ALIENS))] if is_atypical else None
+        bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), alien))
+    return BridgeFleet(bridges)

@@ -1,0 +1,475 @@
+"""Frequencies of many rows of theta, given or drawn at random, with mode shapes, derivatives and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+
+import numpy as np
+import scipy  # which loads scipy.signal once it is used
+from joblib import delayed, effective_n_jobs
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import qmc
+
+from skthermo._estimators.threads import map_on_blas_threads, single_blas_thread
+from skthermo._io import as_they_come, with_progress
+from skthermo._tables.arrays import (
+    Array,
+    Bounds,
+    RandomState,
+    as_random_state,
+    central_differences,
+    check_bounds,
+    check_dofs,
+    check_flag,
+    check_jobs,
+    check_model,
+    check_noise,
+    check_size,
+    check_theta,
+    is_real,
+    positive_integer,
+    real_array,
+)
+from skthermo.fem._protocol import FEModel, ModalModel
+from skthermo.fem._terms import ROWS_PER_CHUNK, warn_of_failures
+
+if TYPE_CHECKING:
+    from skthermo.fem._samples import Samples
+
+
+Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
+
+
+def checked_rows(model: FEModel, theta: ArrayLike, n_jobs: int | None) -> Array:
+    """Rows of theta, in which NaN is allowed, after checks of the model and the number of jobs."""
+    check_model(model)
+    check_jobs(n_jobs)
+    return check_theta(theta, model.parameter_names, allow_nan=True)
+
+
+def solve_rows(
+    model: FEModel,
+    solve: Solve,
+    rows: Array,
+    shapes: Mapping[str, tuple[int, ...]],
+    n_jobs: int | None,
+    progress: bool | None = False,
+) -> list[Array]:
+    """What ``solve(model, chunk)`` gives for every row, NaN where theta has NaN; failures are one warning.
+
+    ``shapes`` names the results and gives the shape of each for one row; frequencies are the first.
+    """
+    results = [np.full((len(rows), *shape), np.nan) for shape in shapes.values()]
+    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    if not known.size:
+        return results
+    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+    places = [known[i : i + size] for i in range(0, len(known), size)]
+    with closing(_solved(model, solve, [rows[place] for place in places], n_jobs)) as parts:
+        shown = with_progress(parts, len(known), progress, count=lambda part: len(part[0]))
+        for place, part in zip(places, shown, strict=True):
+            for result, array, what in zip(results, part, shapes, strict=True):
+                expected = (len(place), *shapes[what])
+                if np.shape(array) != expected:
+                    raise ValueError(
+                        f"the model's {what} have shape {np.shape(array)}; expected {expected}, the first for the rows "
+                        "of theta"
+                    )
+                result[place] = array
+    getattr(model, "warn_of", warn_of_failures)(rows, results[0])
+    return results
+
+
+def _solved(
+    model: Any, solve: Solve, chunks: list[Array], n_jobs: int | None
+) -> Generator[tuple[Array, ...], None, None]:
+    """Results of each chunk, in order; closing the generator stops the work."""
+    thread_safe = getattr(model, "thread_safe", False)
+    task = partial(solve, model.quiet() if thread_safe else model)
+    if thread_safe and effective_n_jobs(n_jobs) == 1:
+        yield from map_on_blas_threads(task, chunks)
+    else:
+        parallel = as_they_come(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        job = _Job(task)
+        yield from parallel(delayed(_on_one_thread)(job, chunk) for chunk in chunks)
+
+
+class _Job:
+    """What is done with every chunk; Dask sends it to a worker once, because it says that it is large."""
+
+    def __init__(self, task: Callable[[Array], tuple[Array, ...]]):
+        self.task = task
+
+    def __sizeof__(self) -> int:
+        return 2**20
+
+
+def _on_one_thread(job: _Job, chunk: Array) -> tuple[Array, ...]:
+    with single_blas_thread():
+        return job.task(chunk)
+
+
+def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
+    """Frequencies of many rows of parameters.
+
+    Parameters
+    ----------
+    model : FE model
+        Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+    progress : bool, optional
+        Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If ``model`` is not an FE model or returns another shape, or theta has the wrong width, or a value that is
+        neither NaN nor finite and positive.
+
+    Notes
+    -----
+    Rows without a solution give one warning. The chunks, of ``model.rows_per_chunk`` rows where it has that attribute,
+    do not depend on ``n_jobs``, so that results are the same to the last bit. With one job, a model that is
+    ``thread_safe`` runs on as many threads as BLAS may use.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import evaluate
+    >>> evaluate(make_truss(), [[1.0, 1.0, 1.0, 1.0], [0.9, float("nan"), 1.0, 1.0]])[:, :2].round(2)
+    array([[ 7.48, 27.5 ],
+           [  nan,   nan]])
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    return solve_rows(model, _frequencies, rows, {"frequencies": (model.n_modes,)}, n_jobs, progress)[0]
+
+
+def evaluate_modes(
+    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, n_jobs: int | None = None
+) -> tuple[Array, Array]:
+    """Frequencies and mode shapes of many rows of parameters, at some degrees of freedom.
+
+    Parameters
+    ----------
+    model : FE model
+        With a method ``modes``.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    dofs : array-like of int of shape (n_dofs,)
+        Degrees of freedom, such as those of sensors; the first is 0.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+    shapes : ndarray of shape (n_samples, n_dofs, n_modes)
+        As the model scales them; signs are arbitrary. NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If the model has no method ``modes``, theta is refused as by `evaluate`, or ``dofs`` are not different degrees
+        of freedom of the model.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import evaluate_modes
+    >>> frequencies, shapes = evaluate_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3])
+    >>> frequencies.shape, shapes.shape
+    ((1, 6), (1, 2, 6))
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    if not hasattr(model, "modes"):
+        raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
+    places = check_dofs(dofs, np.shape(model.modes(np.ones((1, rows.shape[1])))[1])[1])
+    expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
+    frequencies, shapes = solve_rows(model, partial(_modes, dofs=places), rows, expected, n_jobs)
+    return frequencies, shapes
+
+
+def _frequencies(model: FEModel, theta: Array) -> tuple[Array]:
+    return (model.frequencies(theta),)
+
+
+def _modes(model: ModalModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
+    frequencies, shapes = model.modes(theta)
+    return frequencies, np.asarray(shapes)[:, dofs]
+
+
+def linearise(
+    model: FEModel, theta: ArrayLike, *, relative: bool = False, step: float = 0.001, n_jobs: int | None = None
+) -> tuple[Array, Array]:
+    """Frequencies of many rows of parameters, and their derivatives.
+
+    Parameters
+    ----------
+    model : FE model
+        Exact derivatives come from its method ``linearised`` or ``jacobian``, if it has one; else from central
+        differences.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    relative : bool, default=False
+        Whether to return d ln f / d ln theta in place of d f / d theta.
+    step : float, default=0.001
+        Relative step of central differences.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN.
+    jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+        Derivatives d f / d theta in Hz or, if ``relative``, d ln f / d ln theta; NaN in rows with NaN.
+
+    Raises
+    ------
+    ValueError
+        If theta is refused as by `evaluate`, or the step is not between 0 and 1.
+
+    Examples
+    --------
+    The frequency of a mass on a spring is proportional to the square root of the stiffness:
+
+    >>> from skthermo.fem import AffineModel, linearise
+    >>> model = AffineModel({("k",): [[400.0]]}, [[1.0]], n_modes=1)
+    >>> frequencies, jacobian = linearise(model, [[1.0], [4.0]], relative=True)
+    >>> jacobian[:, 0, 0].round(6)
+    array([0.5, 0.5])
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    _check_step(step)
+    if hasattr(model, "linearised") or hasattr(model, "jacobian"):
+        expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, rows.shape[1])}
+        frequencies, jacobian = solve_rows(model, _linearised, rows, expected, n_jobs)
+    else:
+        frequencies = evaluate(model, rows, n_jobs=n_jobs)
+        jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, step)
+    if check_flag(relative, "relative"):
+        jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
+    return frequencies, jacobian
+
+
+def linearise_modes(
+    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, step: float = 0.001, n_jobs: int | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Frequencies and mode shapes of many rows of parameters, and their derivatives.
+
+    Parameters
+    ----------
+    model : FE model
+        Exact derivatives come from its method ``linearised_modes``, if it has one; else those of the shapes are
+        central differences of its method ``modes``, and those of the frequencies as from `linearise`.
+    theta : array-like or DataFrame of shape (n_samples, n_parameters)
+        Multipliers of the nominal parameters. NaN is allowed.
+    dofs : array-like of int of shape (n_dofs,)
+        Degrees of freedom, such as those of sensors; the first is 0.
+    step : float, default=0.001
+        Relative step of central differences.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+
+    Returns
+    -------
+    frequencies : ndarray of shape (n_samples, n_modes)
+        In Hz; NaN in rows with NaN, as are the others.
+    jacobian : ndarray of shape (n_samples, n_modes, n_parameters)
+        Derivatives d f / d theta in Hz.
+    shapes : ndarray of shape (n_samples, n_dofs, n_modes)
+        As the model scales them; signs are arbitrary.
+    derivatives : ndarray of shape (n_samples, n_dofs, n_modes, n_parameters)
+        Derivatives d phi / d theta of these shapes.
+
+    Raises
+    ------
+    ValueError
+        If the model has neither method, ``dofs`` are not different degrees of freedom of the model, theta is refused
+        as by `evaluate`, or the step is not between 0 and 1.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import linearise_modes
+    >>> [array.shape for array in linearise_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3, 8])]
+    [(1, 6), (1, 6, 4), (1, 3, 6), (1, 3, 6, 4)]
+    """
+    rows = checked_rows(model, theta, n_jobs)
+    _check_step(step)
+    if hasattr(model, "linearised_modes"):
+        n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], np.size(dofs)
+        expected = {
+            "frequencies": (n_modes,),
+            "derivatives": (n_modes, n_parameters),
+            "shapes": (n_dofs, n_modes),
+            "derivatives of shapes": (n_dofs, n_modes, n_parameters),
+        }
+        solve = partial(_linearised_modes, dofs=dofs)
+        return tuple(solve_rows(model, solve, rows, expected, n_jobs))  # type: ignore[return-value]
+    frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
+    shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
+
+    def with_the_same_signs(moved: Array) -> Array:
+        there = evaluate_modes(model, moved, dofs, n_jobs=n_jobs)[1]
+        reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
+        return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
+
+    return frequencies, jacobian, shapes, central_differences(with_the_same_signs, rows, shapes, step)
+
+
+def _linearised(model: Any, theta: Array) -> tuple[Array, Array]:
+    if hasattr(model, "linearised"):
+        return model.linearised(theta)
+    return model.frequencies(theta), model.jacobian(theta)
+
+
+def _linearised_modes(model: Any, theta: Array, dofs: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    return model.linearised_modes(theta, dofs)
+
+
+def _check_step(step: float) -> None:
+    if not is_real(step) or not 0 < step < 1:
+        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
+
+
+def add_noise(
+    frequencies: ArrayLike, noise: ArrayLike, *, correlation: float = 0.0, random_state: RandomState = None
+) -> NDArray[np.float64]:
+    """Frequencies times (1 + noise * standard Gaussian).
+
+    Parameters
+    ----------
+    frequencies : array-like of shape (n_samples, n_modes)
+        In Hz.
+    noise : float or array-like of shape (n_modes,)
+        Relative standard deviation; 0 leaves the frequencies as they are.
+    correlation : float, default=0.0
+        Correlation of the noise of neighbouring rows, above -1 and below 1. Noise k rows apart is correlated by its
+        k-th power: a stationary autoregressive process of first order.
+    random_state : int, RandomState or None, default=None
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (n_samples, n_modes)
+        In Hz.
+
+    Raises
+    ------
+    ValueError
+        If the noise is negative, 1 or more, or of another length, the correlation is not between -1 and 1, or a number
+        is not real.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.fem import add_noise
+    >>> noisy = add_noise(np.full((10_000, 2), 4.0), [0.0, 0.01], random_state=0)
+    >>> noisy.std(axis=0).round(2)
+    array([0.  , 0.04])
+    """
+    clean, names = real_array(frequencies, "frequencies"), getattr(frequencies, "columns", None)
+    if np.isinf(clean).any():
+        raise ValueError("frequencies hold infinite values; expected finite ones, or NaN")
+    if clean.ndim != 2:
+        raise ValueError(f"frequencies have shape {clean.shape}; expected (n_samples, n_modes)")
+    deviation = check_noise(noise, clean.shape[1], names)
+    memory = check_size(correlation, "correlation", -1, 1, "a number between -1 and 1, such as 0.9")
+    relative = as_random_state(random_state).standard_normal(clean.shape)
+    if memory:
+        relative[1:] *= np.sqrt(1 - memory**2)
+        relative = scipy.signal.lfilter([1.0], [1.0, -memory], relative, axis=0)
+    return clean * (1 + deviation * relative)
+
+
+def sample(
+    model: FEModel,
+    bounds: Bounds = 0.3,
+    n_samples: int = 1000,
+    *,
+    method: Literal["uniform", "lhs", "sobol"] = "uniform",
+    dofs: ArrayLike | None = None,
+    n_jobs: int | None = None,
+    progress: bool | None = None,
+    random_state: RandomState = None,
+) -> Samples:
+    """Frequencies of an FE model at random parameters.
+
+    Parameters
+    ----------
+    model : FE model
+        Anything with ``parameter_names``, ``n_modes`` and ``frequencies``.
+    bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
+        A half-width (0.2 means 1 +- 20 %), lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to its half-width or to (lowest, highest).
+    n_samples : int, default=1000
+        Number of rows.
+    method : {"uniform", "lhs", "sobol"}, default="uniform"
+        Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (balanced if ``n_samples`` is a
+        power of 2).
+    dofs : array-like of int of shape (n_dofs,), optional
+        Degrees of freedom where mode shapes are wanted too; the model needs a method ``modes``.
+    n_jobs : int, optional
+        Number of parallel jobs (joblib); each takes chunks of rows.
+    progress : bool, optional
+        Whether to show a progress bar on stderr. By default it appears on a terminal after one second.
+    random_state : int, RandomState or None, default=None
+        Seed. The same seed gives the same bits whatever ``n_jobs`` is.
+
+    Returns
+    -------
+    Bunch
+        ``theta`` (n_samples, n_parameters) and ``frequencies`` (n_samples, n_modes) in Hz; with ``dofs`` also
+        ``shapes`` (n_samples, n_dofs, n_modes), as `evaluate_modes` gives them.
+
+    Raises
+    ------
+    ValueError
+        If ``model`` is not an FE model, the bounds are infeasible, ``n_samples`` is not a positive integer, the method
+        is unknown, or ``dofs``, ``random_state`` or ``n_jobs`` are invalid.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import sample
+    >>> drawn = sample(make_truss(), bounds=0.2, n_samples=100, random_state=0)
+    >>> drawn.theta.shape, drawn.frequencies.shape
+    ((100, 4), (100, 6))
+    """
+    from skthermo.fem._samples import Samples  # imported here because scikit-learn imports pandas
+
+    check_model(model)
+    lowest, highest = check_bounds(bounds, model.parameter_names).T
+    n_samples = positive_integer(n_samples, "n_samples")
+    if progress is not None:
+        check_flag(progress, "progress")
+    theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
+    theta *= highest - lowest
+    theta += lowest
+    if dofs is not None:
+        frequencies, shapes = evaluate_modes(cast(ModalModel, model), theta, dofs, n_jobs=n_jobs)
+        return Samples(theta=theta, frequencies=frequencies, shapes=shapes)
+    return Samples(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
+
+
+def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.random.RandomState) -> Array:
+    if method == "uniform":
+        return random_state.uniform(size=(n_samples, n_parameters))
+    engines = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}
+    if method not in list(engines):  # a list, because a method that cannot be hashed would fail in a dictionary
+        raise ValueError(f"method is {method!r}; expected one of {['uniform', *engines]}")
+    generator = np.random.default_rng(random_state.randint(np.iinfo(np.int32).max))
+    return engines[method](n_parameters, rng=generator).random(n_samples)

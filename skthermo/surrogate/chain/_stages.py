@@ -1,0 +1,548 @@
+"""The two stages of a chain: M1, which finds parameters of records, and M2 with all that predicts from temperatures."""
+
+from __future__ import annotations
+
+import re
+import sys
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from joblib import Memory
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+
+from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
+from skthermo._tables.arrays import (
+    HUGE,
+    Array,
+    MatrixLike,
+    Reduce,
+    as_columns,
+    as_floats,
+    as_mapping,
+    is_auto,
+    is_real,
+    median,
+    patterns,
+    real_array,
+    robust_deviation,
+    spread_evenly,
+)
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo._validation import (
+    fit_outputs,
+    inputs_of_last_step,
+    last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+    warn_of_fleet,
+)
+from skthermo.exceptions import (
+    FewRecordsWarning,
+    ModelWarning,
+    RecordsWarning,
+    ResultWarning,
+    SkthermoWarning,
+    UnevaluatedRowsWarning,
+    WeatherWarning,
+)
+from skthermo.fem import FEModel, shape_components
+from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.surrogate._regression import TemperatureMapper, default_lines
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse import InverseSurrogate, ShapeInputs, unconverged
+
+SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
+FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
+UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What M1 finds for each training record: parameters and, where it refines, how the steps ended, and how often the
+    full model was solved because they left the box of the reduced one."""
+
+    theta: Array
+    n_unconverged: int | None = None
+    full_solves: NDArray[np.intp] | None = None
+
+
+@dataclass(frozen=True)
+class ChainInverse:
+    """M1 of a chain: an `InverseSurrogate`, a pipeline that ends with one, or any other transformer."""
+
+    estimator: BaseEstimator
+
+    @property
+    def surrogates(self) -> list[InverseSurrogate]:
+        """Every `InverseSurrogate` that it is or holds."""
+        parts = (self.estimator, *self.estimator.get_params().values())
+        return [part for part in parts if isinstance(part, InverseSurrogate)]
+
+    @property
+    def refining(self) -> InverseSurrogate | None:
+        """The fitted `InverseSurrogate` that it is or ends with, if that refines its estimates."""
+        last = last_step(self.estimator)
+        return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+
+    @property
+    def shape_inputs(self) -> ShapeInputs | None:
+        """How shapes are read; None without ``dofs``."""
+        part = next((part for part in self.surrogates if part.dofs is not None), None)
+        return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
+
+    def prepare(self, model: FEModel, memory: str | Memory | None, reduce: Reduce) -> None:
+        """Give every surrogate inside what it has not: the chain's model, memory and choice of a reduced model."""
+        names = list(model.parameter_names)
+        for part in self.surrogates:
+            if part.model is None:
+                part.set_params(model=model)
+            if part.memory is None:
+                part.set_params(memory=memory)
+            if list(part.model.parameter_names) != names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                    f"{model!r} has"
+                )
+            if is_auto(part.reduce) and (not reduce or hasattr(part.model, "reduced")):
+                part.set_params(reduce=reduce)
+
+    def estimates(self, aligned: Table, parameter_names: list[str]) -> Estimates:
+        """What the fitted inverse finds for aligned records, with warnings where they determine little."""
+        last = self.refining
+        if last is None:
+            theta = as_floats(self.estimator.transform(aligned))
+            if theta.shape[1] != len(parameter_names):
+                raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {parameter_names}")
+            return Estimates(theta)
+        found = last.invert(inputs_of_last_step(self.estimator, aligned))
+        last.warn_of(found)
+        weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
+        if weight < SCARCE:
+            warn_user(
+                f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
+                "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
+                "imputer=KNNGapImputer()",
+                FewRecordsWarning,
+                "scarce modes",
+            )
+        return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
+
+    def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Table:
+        """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
+        inputs = self.shape_inputs
+        if inputs is None:
+            if shapes is not None:
+                raise ValueError("shapes are given, but the inverse has no dofs; expected InverseSurrogate(dofs=...)")
+            return F
+        components = np.full((len(F), inputs.n_columns - inputs.n_modes), np.nan)
+        if shapes is not None:
+            components = shape_components(shapes, inputs.reference)
+            if len(components) != len(F):
+                raise ValueError(
+                    f"shapes have {len(components)} rows and frequencies {len(F)}; expected the same number"
+                )
+        modes = [str(name) for name in column_names(F, "f")]
+        if hasattr(F, "columns"):
+            F = F.set_axis(modes, axis=1)
+        names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
+        return frame_like(F, np.hstack([as_floats(F), components]), names)
+
+    def shape_warnings(self, aligned: Table) -> Iterator[SkthermoWarning]:
+        """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+        inverse = self.refining
+        if inverse is None:
+            return
+        inputs, values = inverse.shape_inputs_, as_floats(aligned)
+        n_modes, n_sensors = inputs.n_modes, inputs.n_sensors
+        components = values[:, n_modes:].reshape(len(values), n_modes, n_sensors)
+        found = ~np.isnan(values[:, :n_modes])
+        n_shapes = (found & ~np.isnan(components).any(axis=2)).sum()
+        names = column_names(aligned, "f")[:n_modes]
+        if n_shapes < FEW_SHAPES * found.sum():
+            yield RecordsWarning(
+                f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the "
+                f"{n_sensors} sensors; the other shapes are not used: expected dofs without sensors that failed",
+                "few shapes",
+            )
+        if not n_shapes or "shapes" not in inverse.samples_:
+            return
+        possible = shape_components(inverse.samples_.shapes.swapaxes(1, 2), inputs.reference).reshape(
+            -1, n_modes, n_sensors
+        )
+        lowest, highest = possible.min(axis=0), possible.max(axis=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a mode without any shape
+            median = np.nanmedian(components, axis=0)
+        excess = np.nan_to_num(np.maximum(lowest - median, median - highest) / inputs.noise[:, np.newaxis])
+        mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
+        if excess[mode, sensor] > UNLIKE:
+            yield ModelWarning(
+                f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
+                f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} "
+                f"to {highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, "
+                "with the signs and gains of the model's axes, or a shape_noise that covers the model's error",
+                "shapes unlike the model's",
+            )
+
+    def warn_of_inert(self, model: FEModel, names: Iterable[str]) -> None:
+        """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
+        frame = sys._getframe(2)
+        while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
+            frame = frame.f_back  # past the estimators around the chain
+        if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
+            return
+        params = self.estimator.get_params().items()
+        parts = {"inverse": self.estimator} | {f"inverse__{name}": part for name, part in params}
+        for name, part in parts.items():
+            searched = [
+                one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)
+            ]
+            if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
+                warn_user(
+                    f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
+                    "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
+                    "search over the InverseSurrogate itself, whose score is that of its regressor",
+                    ResultWarning,
+                    "inert settings searched",
+                )
+
+
+PENALTIES = np.logspace(-1, 5, 7)  # few, because it is fitted often; below them, rounding errors would show
+FEWEST = 30  # records of a mode, below which its discrepancy counts as 0
+TINY = 1e-300
+FAR = 5.0  # robust deviations of ln(measured / model) from the median, beyond which a record does not count
+MOST = 20_000  # records, spread evenly, that a discrepancy is learned from
+
+
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
+    """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
+
+    ``learned`` holds the fitted regressors of the ratios, from inputs of the ``mapper``; modes with few records have
+    none. The changes that they add to the ``levels`` of the modes count by ``shares``, the slopes of the ratios over
+    what is predicted out of fold.
+    """
+
+    regressor: BaseEstimator
+    learned: tuple[Ratios, ...]
+    levels: Array
+    shares: Array
+    sensors: SensorRegression | None = None
+    mapper: Any = None
+
+    @classmethod
+    def of(
+        cls,
+        regressor: BaseEstimator,
+        inputs: Array,
+        ratios: Array,
+        weights: Array | None,
+        folds: NDArray[np.intp],
+        **chain: Any,
+    ) -> Discrepancy:
+        """Learn from inputs of M2, ratios of measured over modelled frequencies, weights and the folds of the rows."""
+        n_modes = ratios.shape[1]
+        learned = () if regressor is None else ratios_of(regressor, inputs, ratios, weights)
+        found = cls(regressor, learned, np.zeros(n_modes), np.zeros(n_modes), **chain)
+        for one in learned:
+            logs = np.log(ratios[np.ix_(one.rows, one.modes)])
+            level = np.average(logs, axis=0, weights=None if weights is None else weights[one.rows])
+            change = np.zeros_like(logs)
+            for fold in np.unique(folds[one.rows]):
+                test = folds[one.rows] == fold
+                other = one.refitted(regressor, inputs, ratios, weights, one.rows[~test])
+                if other.regressor is not None:
+                    change[test] = other.logs(inputs[one.rows[test]]) - level
+            slopes = (change * (logs - level)).sum(axis=0) / np.maximum((change**2).sum(axis=0), TINY)
+            found.levels[one.modes], found.shares[one.modes] = level, np.clip(slopes, 0, 1)
+        return found
+
+    def relearned(self, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.bool_]) -> Discrepancy:
+        """The same with regressors that have learned some of the rows only."""
+        some = (
+            ratios_of(self.regressor, inputs, np.where(rows[:, np.newaxis], ratios, np.nan), weights)
+            if self.learned
+            else ()
+        )
+        return replace(self, learned=some)
+
+    def __call__(self, X: Table) -> Array:
+        """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
+        T = frame_like(X, self.sensors.fill(as_floats(X))[0])
+        with without_warnings():
+            return self.at(as_floats(inputs_of_last_step(self.mapper, T)))
+
+    def at(self, inputs: Array) -> Array:
+        """delta at inputs of M2; NaN in rows in which one is missing."""
+        known = ~np.isnan(inputs).any(axis=1)
+        delta = np.where(known[:, np.newaxis], self.levels, np.nan)
+        for one in self.learned if known.any() else ():
+            change = one.logs(inputs[known]) - self.levels[one.modes]
+            delta[np.ix_(known, one.modes)] += self.shares[one.modes] * change
+        return delta
+
+
+@dataclass(frozen=True, eq=False)
+class Ratios:
+    """A regressor of ratios, fitted to some ``modes`` that are there in the same rows; None where these are too few."""
+
+    modes: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    regressor: BaseEstimator
+
+    def refitted(
+        self, regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.intp]
+    ) -> Ratios:
+        """The same modes learned from other rows."""
+        if len(rows) < FEWEST or not np.ptp(inputs[rows], axis=0).all():
+            return replace(self, rows=rows, regressor=None)
+        values = ratios[np.ix_(rows, self.modes)]
+        values = values[:, 0] if len(self.modes) == 1 else values
+        fitted = fit_outputs(regressor, inputs[rows], values, None if weights is None else weights[rows])
+        return replace(self, rows=rows, regressor=fitted)
+
+    def logs(self, inputs: Array) -> Array:
+        """Logarithms of the ratios at complete inputs, (n_samples, n_modes)."""
+        return np.log(as_columns(self.regressor.predict(inputs)))
+
+
+def ratios_of(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> tuple[Ratios, ...]:
+    """Regressors of the modes, of which those that are there in the same rows are learned together.
+
+    Rows in which a mode is far from its median are left out.
+    """
+    usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
+    logs = np.log(np.where(usable[:, np.newaxis], ratios, np.nan))
+    with np.errstate(invalid="ignore"):
+        far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
+    present, of_mode = patterns(~np.isnan(logs).T)
+    learned = []
+    for number, mask in enumerate(present):
+        modes = np.flatnonzero(of_mode == number)
+        rows = spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
+        learned.append(Ratios(modes, rows, None).refitted(regressor, inputs, ratios, weights, rows))
+    return tuple(one for one in learned if one.regressor is not None)
+
+
+def ratio_regressor() -> TemperatureMapper:
+    """What learns ratios and the noise by default, with a penalty for each mode."""
+    return TemperatureMapper(default_lines(PENALTIES, alpha_per_target=True))
+
+
+LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
+ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
+POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Weather:
+    """Temperatures as they were ``given``, and ``filled`` from the other sensors, with the deviations of the fills.
+
+    ``mapper`` is the fitted M2 whose last step sees them as ``inputs``, lags included.
+    """
+
+    given: Table
+    filled: Table
+    deviations: Array
+    mapper: BaseEstimator
+
+    def __len__(self) -> int:
+        return len(self.filled)
+
+    @cached_property
+    def columns(self) -> Table:
+        """Inputs of the last step of M2, a frame as a frame."""
+        return inputs_of_last_step(self.mapper, self.filled)
+
+    @cached_property
+    def inputs(self) -> Array:
+        """Inputs of the last step of M2."""
+        return as_floats(self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalModel(SavesFrames):
+    """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
+
+    ``sensors`` and ``training_range`` detect unusual weather.
+    """
+
+    mapper: BaseEstimator
+    simulator: Simulator
+    aligner: BaseEstimator
+    discrepancy: Discrepancy
+    sensors: SensorRegression
+    training_range: TrainingRange
+    parameter_names: Sequence[str]
+    mode_names: Sequence[Any]
+    n_jobs: int | None
+
+    def parameters(self, weather: Weather) -> Array:
+        """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
+        warn_each(self._warnings(weather))
+        theta, impossible = possible(self.mapper.predict(weather.filled))
+        if impossible.any():
+            row = np.flatnonzero(impossible)[0]
+            warn_user(
+                f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                ModelWarning,
+                "impossible parameters",
+            )
+        return theta
+
+    def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
+        """Warnings about what is unusual about weather."""
+        filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
+        consequence = "standard deviations and intervals of predictions are widened by what that costs"
+        message = told_fills(weather.deviations, column_names(filled, "T"), consequence)
+        if message:
+            yield RecordsWarning(message, "filled temperatures")
+        message = told_unpredicted(unknown, as_floats(filled))
+        if message:
+            yield UnevaluatedRowsWarning(message, "rows that cannot be predicted")
+        learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
+        message = learned.warning(inputs)
+        if message:
+            yield WeatherWarning(message, "weather outside the training range")
+        consequence = "standard deviations and intervals say how uncertain that is"
+        warn_of_fleet(told_by_fleet(self.mapper, filled), consequence)
+        message = self.sensors.warning(weather.given)
+        if message:
+            yield RecordsWarning(message, "sensor apart from others")
+
+    def frequencies(self, theta: Array) -> Array:
+        """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
+        return frequencies_of(self.simulator, self.aligner, theta, self.n_jobs)
+
+    def predicted(self, weather: Weather) -> Array:
+        """Frequencies of the healthy structure, without warnings."""
+        theta = as_columns(self.mapper.predict(weather.filled))
+        return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
+
+    def simulated(
+        self,
+        weather: Weather,
+        modes: Sequence[int] | None = None,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        simulator = self.simulator if modes is None else self.simulator.changed("with_modes", modes)
+        if stiffness is not None or mass is not None:
+            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
+        theta = self.parameters(weather) * factors_of(parameters, self.parameter_names)
+        fixed, growing = split_damage(damage, weather.given)
+        simulator = simulator.damaged(fixed)
+        if growing:
+            severities = np.column_stack(list(growing.values()))
+            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+            theta = np.hstack([theta, 1 - severities])
+        frequencies = simulator.frequencies(theta, self.n_jobs)
+        if modes is not None:
+            return frequencies
+        return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(self.discrepancy.at(weather.inputs))
+
+    def propagated(self, theta: Array, covariances: Array) -> Array:
+        """Covariances of ln f in the measured domain, G C G' with G = d ln f / d theta, (n, n_modes, n_modes)."""
+        frequencies, jacobian = self.simulator.linearise(possible(theta)[0], self.n_jobs)
+        sides = [as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-ALIGNED, ALIGNED)]
+        slopes = np.log(sides[1] / sides[0]) / (2 * ALIGNED * frequencies)
+        effects = slopes[:, :, np.newaxis] * jacobian
+        return effects @ covariances @ effects.swapaxes(1, 2)
+
+    def known_deviations(self, weather: Weather) -> Array:
+        """Relative standard deviations because temperatures were filled and the mapper states errors of its own."""
+        covariances = self.covariances_of_fills(weather), self.covariances_of_mapper(weather)
+        return np.hypot(*(np.sqrt(np.einsum("ijj->ij", part)) for part in covariances))
+
+    def covariances_of_fills(self, weather: Weather) -> Array:
+        """Covariances of ln f because temperatures were filled, (n_rows, n_modes, n_modes)."""
+        n_parameters = len(self.parameter_names)
+
+        def predict(filled: Table) -> Array:
+            return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
+
+        def log_frequencies(both: Array) -> Array:
+            return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
+
+        cost = PredictionError.of_fills(self.sensors, weather.given, weather.filled, predict, log_frequencies)
+        return cost.of_all(len(weather), len(self.mode_names))
+
+    def covariances_of_mapper(self, weather: Weather) -> Array:
+        """Covariances of ln f as the mapper states them; zero where it does not."""
+        if not offers(self.mapper, "predict_covariance"):
+            return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
+        theta = as_columns(self.mapper.predict(weather.filled))
+        return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
+
+
+def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
+    """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
+    return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
+
+
+def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
+    theta = as_columns(theta).copy()
+    impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+    theta[impossible] = np.nan
+    return theta, impossible
+
+
+def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:
+    """The factor of every parameter, 1 where none is given."""
+    factors = dict.fromkeys(names, 1.0)
+    parameters = {} if parameters is None else as_mapping(parameters)
+    if not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    for name, factor in parameters.items():
+        if name not in factors:
+            raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
+        if not is_real(factor) or not 0 < factor < HUGE:
+            raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
+        if factor > LARGE_FACTOR:
+            warn_user(
+                f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
+                "and not percent",
+                ModelWarning,
+                "large factor",
+            )
+        factors[name] = float(factor)
+    return np.array(list(factors.values()))
+
+
+def split_damage(
+    damage: Mapping[str, float | ArrayLike] | None, X: ArrayLike
+) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    """Severities that are the same in all rows, and those with a value for each row."""
+    damage = as_mapping(damage)
+    if damage is not None and not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    fixed: dict[str, Any] = {}
+    growing: dict[str, NDArray[np.float64]] = {}
+    n_rows = np.shape(X)[0]
+    for group, severity in (damage or {}).items():
+        if np.ndim(severity) == 0:
+            fixed[group] = severity
+            continue
+        values = real_array(severity, f"damage of group {group!r}")
+        if values.shape != (n_rows,) or not (values < 1).all() or not np.isfinite(values).all():
+            raise ValueError(
+                f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
+                f"expected one severity or {n_rows}, one for each row, finite and below 1"
+            )
+        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
+        growing[group] = values
+    return fixed, growing
