@@ -146,7 +146,7 @@ def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp])
     return totals[stop] - totals[first]
 
 
-def broken_lines(values: Array, knots: Array) -> Array:
+def piecewise_linear(values: Array, knots: Array) -> Array:
     """Columns, then max(column - knot, 0) of all columns for each row of knots."""
     return np.hstack([values, *(np.maximum(values - row, 0.0) for row in knots)])
 

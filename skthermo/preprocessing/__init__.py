@@ -1,4 +1,4 @@
-"""Preparing temperatures and frequencies: faults, outliers, lags, gaps, broken lines, offsets, tracked modes, folds."""
+"""Preparing temperatures and frequencies: faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds."""
 
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import HampelFilter

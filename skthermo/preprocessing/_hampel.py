@@ -55,7 +55,7 @@ class HampelFilter(RecordTransformer):
     targets_ : ndarray of int
         Positions of the columns that are filtered.
     regression_ : object or None
-        What the weather explains of the targets, as broken lines.
+        What the weather explains of the targets, piecewise-linear in it.
     n_features_in_ : int
         Number of columns.
     feature_names_in_ : ndarray of str

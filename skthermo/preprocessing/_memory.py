@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, broken_lines, means_of_known, median, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
 from skthermo._tables.frames import (
     DAY_NS,
     Table,
@@ -550,7 +550,7 @@ class _Candidates:
 def lines_of(column: Array) -> Array:
     """Piecewise-linear functions of a standardised column."""
     standard = ((column - column.mean()) / column.std())[:, np.newaxis]
-    return broken_lines(standard, np.quantile(standard, KNOTS, axis=0))
+    return piecewise_linear(standard, np.quantile(standard, KNOTS, axis=0))
 
 
 def _time_shapes(left: Array) -> Array:

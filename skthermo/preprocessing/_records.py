@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import explain_rows
-from skthermo._tables.arrays import as_floats, broken_lines, by_mode, is_model, means_of_known, real_array
+from skthermo._tables.arrays import as_floats, by_mode, is_model, means_of_known, piecewise_linear, real_array
 from skthermo._tables.frames import Table, as_stamps, check_columns, frame_like, row_weights, warn_of_markers
 from skthermo._validation import (
     Estimator,
@@ -187,9 +187,9 @@ def _time_zone(stamps: pd.DatetimeIndex) -> str | None:
 
 
 class HingeFeatures(RecordTransformer):
-    """Append max(x - knot, 0) for some knots of every column, so that linear regression fits broken lines.
+    """Append max(x - knot, 0) for some knots of every column, so that linear regression is piecewise-linear.
 
-    Frequencies over temperature are broken lines: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
+    Frequencies are piecewise-linear in temperature: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
     go on straight. By linear regression, scikit-learn's ``SplineTransformer(degree=1, extrapolation="linear")`` gives
     the same lines. Hinges do what it cannot: missing values pass through, and ridge regression penalises changes of
     slope rather than values.
@@ -277,7 +277,7 @@ class HingeFeatures(RecordTransformer):
             self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        return frame_like(X, broken_lines(as_floats(values), self.knots_), self.get_feature_names_out())
+        return frame_like(X, piecewise_linear(as_floats(values), self.knots_), self.get_feature_names_out())
 
     def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         return [*columns, *(f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in columns)]

@@ -14,7 +14,7 @@ fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the 
 fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
              one that foretells the fleet's own bridges best after as many days. It does not know how uncertain it is.
 ridge        of all temperatures, on the bridge's own records
-lines        broken lines of all temperatures, the library's default, on the bridge's own records
+lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
 neighbours   distance to the 20th nearest of the raw frequencies of the baseline
 fleet chain  with --chains: a ``DataInformedFEM`` whose mapper is the fleet's prior on the parameters of FE models
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, broken_lines, real_array, spread_evenly
+from skthermo._tables.arrays import Array, piecewise_linear, real_array, spread_evenly
 from skthermo.residuals.weather import TrainingRange
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
@@ -77,7 +77,7 @@ class FleetBasis:
         """The functions at rows of complete inputs, (n_samples, n_functions)."""
         places = (inputs - self.middle) @ self.components.T
         n_breaking = self.knots.shape[1]
-        lines = broken_lines(places[:, :n_breaking], self.knots)[:, n_breaking:]
+        lines = piecewise_linear(places[:, :n_breaking], self.knots)[:, n_breaking:]
         return (np.hstack([places, lines]) - self.centre) / self.scale
 
 

@@ -157,8 +157,9 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
       times as long as all but three runs of the column are. Nearly all other periods of its length must vary by at
       least three steps of rounding, and its value must not be one at which the column rests again and again, as rain
       does at zero.
-    - What the *weather* explains: broken lines in up to three principal components of the temperatures, predicted out
-      of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every mode.
+    - What the *weather* explains: piecewise-linear regression in up to three principal components of the temperatures,
+      predicted out of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every
+      mode.
     - *Time shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
       less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
       Temperatures of up to a day before (24 rows without a ``DatetimeIndex``) are no finding: that may be inertia.
