@@ -92,7 +92,7 @@ class WindowedAlarm(DamageDetector):
     >>> single, week = MahalanobisDetector().fit(healthy), WindowedAlarm(7).fit(healthy)
     >>> shares = [(one.damage_index(damaged) > one.threshold_).mean() for one in (single, week)]
     >>> print("{:.0%} alarms by records, {:.0%} by weeks".format(*shares))
-    11% alarms by records, 70% by weeks
+    11% alarms by records, 66% by weeks
     """
 
     _parameter_constraints: dict = {
