@@ -293,11 +293,6 @@ def correlation_times(columns: Array) -> Array:
     return np.array([correlation_time(column) for column in columns.T])
 
 
-def independent_records(columns: Array) -> Array:
-    """As many independent records as tell the mean of each column equally well, (n_columns,)."""
-    return (~np.isnan(columns)).sum(axis=0) / correlation_times(columns)
-
-
 def _products(values: Array) -> Array:
     """Sums of the products of values 1, 2, ... places apart, up to half of their number."""
     size = next_fast_len(2 * len(values), real=True)

@@ -44,6 +44,7 @@ TRUTH = {
     "K_bea": "bearings",
     "M_b": ("mass", "ballast"),
 }
+"""Parameters of the healthy bridge, as `Structure.assemble` binds them."""
 BOX: dict[str, float | tuple[float, float]] = {
     **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
     "E_con": 0.035,
@@ -52,6 +53,7 @@ BOX: dict[str, float | tuple[float, float]] = {
     "K_bea": (0.6, 1.6),
     "M_b": 0.015,
 }
+"""What weather does to them stays within these bounds."""
 STEEL, CONNECTIONS, BALLAST, COMPOSITE, BEARINGS = 3.6e-4, 8e-4, 1.5e-3, 1.5e-3, 0.012  # softer by 1/K
 FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.5, 1.0, 2.0  # stiffer by (ratios), K
 MOISTURE = 0.0018  # standard deviation of the ballast's mass
@@ -152,10 +154,6 @@ def memory(values: Array, hours: float) -> Array:
         return values
     decay = np.exp(-1 / hours)
     return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=decay * values[:1])[0]
-
-
-"""Parameters of the healthy bridge, as `Structure.assemble` binds them."""
-"""What weather does to them stays within these bounds."""
 
 
 def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:

@@ -32,16 +32,19 @@ LINES = ("-", "--", "-.", ":")
 LONGEST_NAME = 30  # number of letters above which a name is shortened
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 HANDLE, LETTER = 0.5, 0.085
+"""Inches that the symbol and a letter of a legend take."""
 FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
 FEWEST = 10  # points of a line from which on it may have outliers
 MARGIN = 0.05  # empty share of the axis next to its edges
 BEYOND = "beyond"
+"""Name (gid) of the marks at the edges."""
 EDGES: dict[tuple[str, bool], tuple[str, float, dict[str, object]]] = {
     ("y", False): ("v", 0.0, {"x": 0.99, "y": 0.03, "ha": "right", "va": "bottom"}),
     ("y", True): ("^", 1.0, {"x": 0.99, "y": 0.96, "ha": "right", "va": "top"}),
     ("x", False): ("<", 0.0, {"x": 0.02, "y": 0.5, "ha": "left", "va": "center", "rotation": 90}),
     ("x", True): (">", 1.0, {"x": 0.98, "y": 0.5, "ha": "right", "va": "center", "rotation": 90}),
 }
+"""Marker of an edge, its coordinate in shares of the axes, and how its text stands."""
 
 
 def drawing(module: str) -> ModuleType:
@@ -105,9 +108,6 @@ def marker_style(number: int, n_points: int) -> dict[str, object]:
 def line_style(number: int, dashes: int = 0) -> dict[str, object]:
     """Options of plot for lines: colour, and dashes that tell them apart in greyscale too."""
     return {"linestyle": LINES[dashes % len(LINES)], "color": COLOURS[number % len(COLOURS)], "linewidth": 1.0}
-
-
-"""Inches that the symbol and a letter of a legend take."""
 
 
 def panels(
@@ -215,10 +215,6 @@ def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
     if time.tz is not None and index.tz is not None:
         time = time.tz_convert(index.tz)
     return time.tz_localize(None).to_datetime64()
-
-
-"""Name (gid) of the marks at the edges."""
-"""Marker of an edge, its coordinate in shares of the axes, and how its text stands."""
 
 
 def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = (), direction: str = "y") -> None:

@@ -57,7 +57,7 @@ def test_with_noise_all_inverses_end_at_the_same_estimate(models):
     assert table["error"].std() > 0.1
 
 
-def test_broken_lines_are_the_default_of_the_mapper(campaign):
+def test_piecewise_linear_regression_is_the_default_of_the_mapper(campaign):
     T, later = campaign.train[0], campaign.test[0]
     lines = EXAMPLE.fitted_chain(campaign, EXAMPLE.regressors("truss")["piecewise-linear"], seed=0)
     default = clone(lines).set_params(mapper=TemperatureMapper()).fit(*campaign.train)
