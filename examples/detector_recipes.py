@@ -93,7 +93,7 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
         "cointegration": Cointegration(),
     }
     regressors = {
-        "broken lines": TemperatureMapper(),
+        "piecewise-linear": TemperatureMapper(),
         "boosted trees": MultiOutputRegressor(GradientBoostingRegressor(random_state=random_state)),
         "linear regression": LinearRegression(),
     }
@@ -112,7 +112,7 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
     for name, regressor in regressors.items():
         detectors |= {name: compensated(regressor), f"{name}, whitened": compensated(regressor, "local")}
     for name in ("isolation forest", "20 neighbours"):
-        detectors[f"broken lines, {name}"] = compensated(regressors["broken lines"], detector=outlier(name))
+        detectors[f"piecewise-linear, {name}"] = compensated(regressors["piecewise-linear"], detector=outlier(name))
     nearby = make_pipeline(StandardScaler(), KNeighborsRegressor(50))
     detectors["conditional covariance"] = compensated(nearby, "local")
     return detectors

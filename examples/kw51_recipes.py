@@ -85,7 +85,7 @@ RECIPES = {  # each but the last changes one more of the paper's choices
     "the paper's": NETWORK,
     "narrower bounds": NETWORK | {"inverse": network_inverse(narrow_bounds=True)},
     "M1 refined": NETWORK | {"inverse": REFINED},
-    "broken lines as M2": NETWORK | {"inverse": REFINED, "mapper": TemperatureMapper()},
+    "piecewise-linear M2": NETWORK | {"inverse": REFINED, "mapper": TemperatureMapper()},
     "nothing imputed": {"inverse": REFINED, "mapper": TemperatureMapper()},
     "the paper's networks, nothing imputed": NETWORK | {"impute": False},
 }

@@ -44,7 +44,7 @@ SETTINGS = {  # Tables 4 and 6
         "here",
     ): "64 ReLU units as a first guess, then steps on the FE model to the posterior mode; noise as measured",
     ("M2", "the paper's"): "256-128-64-32 ReLU, dropout 0.2 (here: L2 penalty 1), 1000 epochs of batches of 256",
-    ("M2", "here"): "broken lines with four knots a lag, ridge penalty chosen by leave-one-out",
+    ("M2", "here"): "piecewise-linear with four knots a lag, ridge penalty chosen by leave-one-out",
 }
 
 

@@ -96,8 +96,8 @@ print(f"rank correlation of damage found: {true['pod'].corr(ranking['pod'], meth
 # -----------------------------------
 # Some of them in a year that is 10 °C colder. Neighbours and forests find frequencies there that no record of the
 # baseline had, and call them damage. Principal components left out and cointegration hold as long as frequencies move
-# together as before. The simulation predicts that, before the cold year comes. It favours broken lines, however: the
-# chain, too, continues by broken lines where it has no records, and so cannot know that they err there.
+# together as before. The simulation predicts that, before the cold year comes. It favours piecewise-linear regression,
+# however: the chain, too, is piecewise-linear where it has no records, and so cannot know that they err there.
 
 cold = later.temperatures - 10
 clean_cold = later.model.frequencies(steel_modulus(cold))

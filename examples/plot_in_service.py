@@ -51,7 +51,7 @@ baseline, later = records[:"2025"], records["2026":]
 # %%
 # A detector, an FE model, a promise
 # ----------------------------------
-# The detector is any of ``skthermo.detection``: here residuals of broken lines in the temperatures, evaluated by the
+# The detector is any of ``skthermo.detection``: here residuals of piecewise-linear regression, evaluated by the
 # mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
 # share of the records, but what an owner asks for: one false alarm a year.
 

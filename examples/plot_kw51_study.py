@@ -89,8 +89,8 @@ PredictionDisplay.from_predictions(both["measured"], both["imputed"], labels=lab
 # Two chains
 # ----------
 # One makes the paper's choices: imputed records, and networks for both surrogates. The other imputes nothing, refines
-# the estimates of M1 on the FE model and maps temperatures with broken lines. Both see the temperatures of the last
-# day.
+# the estimates of M1 on the FE model and maps temperatures with piecewise-linear regression. Both see the temperatures
+# of the last day.
 #
 # .. literalinclude:: kw51_recipes.py
 #    :pyobject: Fitted.by

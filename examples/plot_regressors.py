@@ -4,8 +4,8 @@ Which regressor for the two surrogates?
 
 Any scikit-learn regressor can be the inverse surrogate M1, from frequencies to the parameters of the FE model, and the
 temperature mapper M2, from temperatures to these parameters. Seven kinds are compared here: the paper's deep networks,
-a small network, a random forest, a quadratic polynomial, broken lines, a Gaussian process and gradient boosting. The
-small network is M1's default, and broken lines are M2's.
+a small network, a random forest, a quadratic polynomial, piecewise-linear regression, a Gaussian process and gradient
+boosting. The small network is M1's default, and piecewise-linear regression is M2's.
 
 Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
 its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
@@ -124,7 +124,7 @@ for name, campaign in campaigns.items():
 # %%
 # On the truss the regressors hardly differ. On KW51 all errors are below the noise of the records, 0.15 %, and come
 # from how a regressor follows the knee at 0 °C. Beyond the weather that they have learned, they do differ: trees stay
-# at their last value, and broken lines go on straight. The frequency that frost moves most shows it:
+# at their last value, and piecewise-linear regression goes on straight. The frequency that frost moves most shows it:
 
 campaign = campaigns["KW51"](0)
 T, F = campaign.train

@@ -149,7 +149,7 @@ for ax, group in zip(axes, GROUPS, strict=True):
 # (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
 
 several = field_detectors(list(year.frequencies))
-chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "broken lines"]
+chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "piecewise-linear"]
 tenth = [{}, *({group: 0.1} for group in GROUPS)]
 bench = DetectabilityStudy(
     fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0, uncertainty="noise"

@@ -69,8 +69,8 @@ print(f"{moved.mean():.1%} one of them has another rank than at the nominal stat
 #
 # Learn the effect of frost
 # -------------------------
-# The chain with its defaults: broken lines, which can have a knee at 0 °C, map seven temperatures to the parameters.
-# The model is a reduced one already, so that the chain does not reduce it again.
+# The chain with its defaults: piecewise-linear regression, which can have a knee at 0 °C, maps seven temperatures to
+# the parameters. The model is a reduced one already, so that the chain does not reduce it again.
 
 T, F, T_test, F_test = bridge.split()
 fem = chain(model).fit(T, F)
@@ -166,17 +166,17 @@ print(hold_out_table(bridge).to_string())
 # %%
 # .. code-block:: none
 #
-#                                                  f1     f2     f3     f4   mean  ratio
-#    broken lines, T to F                       0.431  0.548  0.604  0.791  0.594  1.000
-#    broken lines, chain, tracked, bounds 0.3   0.431  0.540  0.631  0.788  0.597  1.006
-#    broken lines, chain, tracked, bounds 0.5   0.440  0.542  0.632  0.792  0.601  1.013
-#    broken lines, chain, sorted, bounds 0.3    0.429  0.540  0.632  0.794  0.599  1.009
-#    broken lines, chain, sorted, bounds 0.5    0.454  0.542  0.603  0.967  0.641  1.080
-#    boosted trees, T to F                      0.402  0.847  0.789  0.858  0.724  1.000
-#    boosted trees, chain, tracked, bounds 0.3  0.452  0.655  0.841  0.954  0.726  1.002
-#    boosted trees, chain, tracked, bounds 0.5  0.507  0.630  0.918  0.899  0.738  1.020
-#    boosted trees, chain, sorted, bounds 0.3   0.439  0.646  0.826  0.933  0.711  0.982
-#    boosted trees, chain, sorted, bounds 0.5   0.430  0.652  0.940  0.880  0.725  1.002
+#                                                     f1     f2     f3     f4   mean  ratio
+#    piecewise-linear, T to F                      0.431  0.548  0.604  0.791  0.594  1.000
+#    piecewise-linear, chain, tracked, bounds 0.3  0.431  0.540  0.631  0.788  0.597  1.006
+#    piecewise-linear, chain, tracked, bounds 0.5  0.440  0.542  0.632  0.792  0.601  1.013
+#    piecewise-linear, chain, sorted, bounds 0.3   0.429  0.540  0.632  0.794  0.599  1.009
+#    piecewise-linear, chain, sorted, bounds 0.5   0.454  0.542  0.603  0.967  0.641  1.080
+#    boosted trees, T to F                         0.402  0.847  0.789  0.858  0.724  1.000
+#    boosted trees, chain, tracked, bounds 0.3     0.452  0.655  0.841  0.954  0.726  1.002
+#    boosted trees, chain, tracked, bounds 0.5     0.507  0.630  0.918  0.899  0.738  1.020
+#    boosted trees, chain, sorted, bounds 0.3      0.439  0.646  0.826  0.933  0.711  0.982
+#    boosted trees, chain, sorted, bounds 0.5      0.430  0.652  0.940  0.880  0.725  1.002
 #
 # Intervals of 90 % widen where the weather is unknown:
 

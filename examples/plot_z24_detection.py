@@ -83,29 +83,29 @@ print(measured_table(records, candidates).round(1).to_string())
 # %%
 # .. code-block:: none
 #
-#                                    false alarms  found of 130  alarms in the first 12  found of the other 118
-#    raw, Mahalanobis                         0.0           0.0                     0.0                     0.0
-#    raw, isolation forest                    0.4          89.2                     8.3                    97.5
-#    raw, 20 neighbours                       1.2          91.5                     8.3                   100.0
-#    raw, local outlier factor               16.6          96.2                    58.3                   100.0
-#    raw, one-class SVM                       0.0          61.5                     0.0                    67.8
-#    raw, less 1 component                    0.4           4.6                     0.0                     5.1
-#    raw, less 2 components                   0.4           4.6                     0.0                     5.1
-#    raw, less 3 components                   1.1           7.7                     0.0                     8.5
-#    raw, factor analysis                     0.2           5.4                     0.0                     5.9
-#    raw, Gaussian mixture                    3.0          83.8                     0.0                    92.4
-#    raw, cointegration                       0.9           4.6                     0.0                     5.1
-#    broken lines                             0.0          89.2                     0.0                    98.3
-#    broken lines, whitened                   0.9          90.8                     0.0                   100.0
-#    boosted trees                            0.2          20.8                     0.0                    22.9
-#    boosted trees, whitened                  1.1          82.3                     8.3                    89.8
-#    linear regression                       12.1          93.1                    25.0                   100.0
-#    linear regression, whitened             22.9          98.5                    83.3                   100.0
-#    chain                                    0.0          87.7                     0.0                    96.6
-#    chain, whitened                          0.7          90.8                     0.0                   100.0
-#    broken lines, isolation forest           0.0          12.3                     0.0                    13.6
-#    broken lines, 20 neighbours              0.0          88.5                     0.0                    97.5
-#    conditional covariance                   1.2          87.7                     8.3                    95.8
+#                                        false alarms  found of 130  alarms in the first 12  found of the other 118
+#    raw, Mahalanobis                             0.0           0.0                     0.0                     0.0
+#    raw, isolation forest                        0.4          89.2                     8.3                    97.5
+#    raw, 20 neighbours                           1.2          91.5                     8.3                   100.0
+#    raw, local outlier factor                   16.6          96.2                    58.3                   100.0
+#    raw, one-class SVM                           0.0          61.5                     0.0                    67.8
+#    raw, less 1 component                        0.4           4.6                     0.0                     5.1
+#    raw, less 2 components                       0.4           4.6                     0.0                     5.1
+#    raw, less 3 components                       1.1           7.7                     0.0                     8.5
+#    raw, factor analysis                         0.2           5.4                     0.0                     5.9
+#    raw, Gaussian mixture                        3.0          83.8                     0.0                    92.4
+#    raw, cointegration                           0.9           4.6                     0.0                     5.1
+#    piecewise-linear                             0.0          89.2                     0.0                    98.3
+#    piecewise-linear, whitened                   0.9          90.8                     0.0                   100.0
+#    boosted trees                                0.2          20.8                     0.0                    22.9
+#    boosted trees, whitened                      1.1          82.3                     8.3                    89.8
+#    linear regression                           12.1          93.1                    25.0                   100.0
+#    linear regression, whitened                 22.9          98.5                    83.3                   100.0
+#    chain                                        0.0          87.7                     0.0                    96.6
+#    chain, whitened                              0.7          90.8                     0.0                   100.0
+#    piecewise-linear, isolation forest           0.0          12.3                     0.0                    13.6
+#    piecewise-linear, 20 neighbours              0.0          88.5                     0.0                    97.5
+#    conditional covariance                       1.2          87.7                     8.3                    95.8
 #
 # This damage can be seen without thermometers: an isolation forest and the distance to the 20th nearest neighbour, on
 # raw frequencies, find as many records as residuals, whitened or not, at 0.4 and 1.2 % false alarms. The paper's
@@ -119,13 +119,13 @@ print(measured_table(records, candidates).round(1).to_string())
 # and too large on all other days, when damage hides in it. Residuals of the second mode:
 
 inputs = {("none", "raw frequencies"): records.each(lambda frame: frame[FREQUENCIES])}
-for name, estimator in (("broken lines", TemperatureMapper()), ("boosted trees", boosting())):
+for name, estimator in (("piecewise-linear", TemperatureMapper()), ("boosted trees", boosting())):
     for label, whiten in WHITENINGS.items():
         inputs[name, label] = compensate(records, estimator, whiten)[0]
 
 fig, ax = plt.subplots(figsize=(10, 4.6), layout="constrained")
 pavement = records.each(lambda frame: frame[PAVEMENT])
-plot_kinds(ax, pavement, inputs["broken lines", PLAIN].each(lambda frame: frame["f2"]), ms=3)
+plot_kinds(ax, pavement, inputs["piecewise-linear", PLAIN].each(lambda frame: frame["f2"]), ms=3)
 for whiten, style, label in (("global", "--", "2 deviations, all weather"), ("local", "-", "2 deviations, by weather")):
     compensator = compensate(records, TemperatureMapper(), whiten)[1]
     weather = records.baseline.drop(columns=FREQUENCIES)
@@ -162,8 +162,8 @@ plot_indices(
     {
         "raw frequencies": (MahalanobisDetector(), inputs["none", "raw frequencies"]),
         "raw frequencies, 20 neighbours": (candidates["raw, 20 neighbours"], inputs["none", "raw frequencies"]),
-        "residuals of broken lines": (MahalanobisDetector(), inputs["broken lines", PLAIN]),
-        "the same, whitened by weather": (MahalanobisDetector(), inputs["broken lines", WHITENED]),
+        "piecewise-linear residuals": (MahalanobisDetector(), inputs["piecewise-linear", PLAIN]),
+        "the same, whitened by weather": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
     },
     label="damage index",
 )
@@ -181,7 +181,7 @@ plot_indices(
 # other detectors than the Mahalanobis distance. Quantiles of the baseline's own scores leave nothing out.
 
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, local outlier factor"]
-chosen += ["broken lines", "broken lines, whitened"]
+chosen += ["piecewise-linear", "piecewise-linear, whitened"]
 changed = {
     "blocks of a day": {"block": "1D"},
     "correlation times": {"block": None},
@@ -199,14 +199,14 @@ print(pd.concat(tables, axis=1).round(1).to_string())
 # %%
 # .. code-block:: none
 #
-#                              blocks of a day              correlation times                  quantile
-#                                 false alarms found of 130      false alarms found of 130 false alarms found of 130
-#    raw, Mahalanobis                      0.0          0.0               0.0          0.0          0.2          5.4
-#    raw, isolation forest                 0.4         89.2               0.0         20.8          1.4         91.5
-#    raw, 20 neighbours                    1.2         91.5               0.0          0.0          2.0         91.5
-#    raw, local outlier factor            16.6         96.2               0.0         36.9         22.0         97.7
-#    broken lines                          0.0         89.2               0.0         89.2          0.0         90.8
-#    broken lines, whitened                0.9         90.8               0.9         90.8          1.4         90.8
+#                               blocks of a day              correlation times                  quantile
+#                                  false alarms found of 130      false alarms found of 130 false alarms found of 130
+#    raw, Mahalanobis                       0.0          0.0               0.0          0.0          0.2          5.4
+#    raw, isolation forest                  0.4         89.2               0.0         20.8          1.4         91.5
+#    raw, 20 neighbours                     1.2         91.5               0.0          0.0          2.0         91.5
+#    raw, local outlier factor             16.6         96.2               0.0         36.9         22.0         97.7
+#    piecewise-linear                       0.0         89.2               0.0         89.2          0.0         90.8
+#    piecewise-linear, whitened             0.9         90.8               0.9         90.8          1.4         90.8
 #
 # Residuals forget faster, and their rates hardly depend on the rule.
 #
@@ -219,7 +219,7 @@ edges = [-np.inf, *pavement.quantile([0.2, 0.4, 0.6, 0.8, 1.0]), np.inf]
 classes = records.each(lambda frame: pd.cut(frame[PAVEMENT].to_numpy(), edges, precision=1))
 columns = {("records", kind): pd.Series(getattr(classes, kind)).value_counts(sort=False) for kind in KINDS}
 for label in WHITENINGS:
-    residuals = inputs["broken lines", label]
+    residuals = inputs["piecewise-linear", label]
     detector = MahalanobisDetector().fit(residuals.baseline)
     for kind in KINDS:
         alarm = pd.Series(detector.predict(getattr(residuals, kind)) == -1)
@@ -245,8 +245,8 @@ print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 # comparison, one of the compensators has learned forward in time, from the past alone.
 
 forward = compensate(records, TemperatureMapper(), "local", TimeSeriesSplit(5))[0]
-seen = {name: inputs[name, WHITENED] for name in ("broken lines", "boosted trees")}
-seen["broken lines, forward in time"] = forward
+seen = {name: inputs[name, WHITENED] for name in ("piecewise-linear", "boosted trees")}
+seen["piecewise-linear, forward in time"] = forward
 windows = {f"{width}, {rule}": WindowedAlarm(width, rule=rule) for width in ("24h", 24) for rule in ("mean", "m-of-n")}
 rows = {}
 for name, residuals in seen.items():
@@ -265,26 +265,26 @@ print(pd.DataFrame(rows).T.to_string())
 # %%
 # .. code-block:: none
 #
-#                                                 false days damaged days found hours to detection
-#    broken lines                  single records    0 of 32            9 of 10               38.0
-#                                  24h, mean         0 of 32            8 of 10               52.0
-#                                  24h, m-of-n       0 of 32            8 of 10               52.0
-#                                  24, mean          0 of 32            7 of 10               82.0
-#                                  24, m-of-n        0 of 32            7 of 10               70.0
-#    boosted trees                 single records    0 of 32            9 of 10               14.0
-#                                  24h, mean         0 of 32            7 of 10               86.0
-#                                  24h, m-of-n       0 of 32            3 of 10               86.0
-#                                  24, mean          0 of 32            6 of 10               99.0
-#                                  24, m-of-n        0 of 32            4 of 10               91.0
-#    broken lines, forward in time single records    0 of 32            7 of 10               38.0
-#                                  24h, mean         0 of 32            8 of 10               52.0
-#                                  24h, m-of-n       0 of 32            8 of 10               52.0
-#                                  24, mean          0 of 32            1 of 10               88.0
-#                                  24, m-of-n        0 of 32            4 of 10               77.0
+#                                                     false days damaged days found hours to detection
+#    piecewise-linear                  single records    0 of 32            9 of 10               38.0
+#                                      24h, mean         0 of 32            8 of 10               52.0
+#                                      24h, m-of-n       0 of 32            8 of 10               52.0
+#                                      24, mean          0 of 32            7 of 10               82.0
+#                                      24, m-of-n        0 of 32            7 of 10               70.0
+#    boosted trees                     single records    0 of 32            9 of 10               14.0
+#                                      24h, mean         0 of 32            7 of 10               86.0
+#                                      24h, m-of-n       0 of 32            3 of 10               86.0
+#                                      24, mean          0 of 32            6 of 10               99.0
+#                                      24, m-of-n        0 of 32            4 of 10               91.0
+#    piecewise-linear, forward in time single records    0 of 32            7 of 10               38.0
+#                                      24h, mean         0 of 32            8 of 10               52.0
+#                                      24h, m-of-n       0 of 32            8 of 10               52.0
+#                                      24, mean          0 of 32            1 of 10               88.0
+#                                      24, m-of-n        0 of 32            4 of 10               77.0
 
 plot_indices(
     {
-        title: (WindowedAlarm("24h", rule=rule), inputs["broken lines", WHITENED])
+        title: (WindowedAlarm("24h", rule=rule), inputs["piecewise-linear", WHITENED])
         for rule, title in (("mean", "mean of a day's records"), ("m-of-n", "half of a day's records"))
     },
     label="damage index of a day",
@@ -311,23 +311,23 @@ print(found_by_day(inputs).round(1).to_string())
 # What if monitoring had ended earlier? Baselines of the first part of the healthy records, false alarms on the fifth of
 # them that follows, and damage found, for the residuals and their strongest simple competitors:
 
-chosen = ["raw, isolation forest", "raw, 20 neighbours", "broken lines", "broken lines, whitened"]
+chosen = ["raw, isolation forest", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, whitened"]
 print(short_baselines(records, {name: candidates[name] for name in chosen}).round(1).to_string())
 
 # %%
 # .. code-block:: none
 #
-#                           false alarms                               damage found
-#                              first 40% first 50% first 60% first 80%    first 40% first 50% first 60% first 80%
-#    raw, isolation forest          26.4      10.5       0.2       0.4         90.8      90.8      90.8      89.2
-#    raw, 20 neighbours             35.0      14.1       0.2       1.2         92.3      93.1      92.3      91.5
-#    broken lines                   22.1       8.9       0.2       0.0         95.4      93.1      93.8      89.2
-#    broken lines, whitened         24.8      10.5       0.5       0.9         96.9      96.2      97.7      90.8
+#                               false alarms                               damage found
+#                                  first 40% first 50% first 60% first 80%    first 40% first 50% first 60% first 80%
+#    raw, isolation forest              26.4      10.5       0.2       0.4         90.8      90.8      90.8      89.2
+#    raw, 20 neighbours                 35.0      14.1       0.2       1.2         92.3      93.1      92.3      91.5
+#    piecewise-linear                   22.1       8.9       0.2       0.0         95.4      93.1      93.8      89.2
+#    piecewise-linear, whitened         24.8      10.5       0.5       0.9         96.9      96.2      97.7      90.8
 #
 # The first two baselines end before the longest frost, and all of these detectors misfire in it, the 20 neighbours
-# most, plain broken lines least: whitening is no remedy for weather that is missing. Where the baseline has the frost,
-# whitening finds 2 to 4 points more than plain residuals and raises up to 0.9 points more false alarms. Boosted trees
-# need it: of their plain residuals, 21 % of the damage is found, and of whitened ones 82 %.
+# most, plain piecewise-linear residuals least: whitening is no remedy for weather that is missing. Where the baseline
+# has the frost, whitening finds 2 to 4 points more than plain residuals and raises up to 0.9 points more false alarms.
+# Boosted trees need it: of their plain residuals, 21 % of the damage is found, and of whitened ones 82 %.
 #
 # The compensator says beforehand which records lie in weather that it does not know, in percent of that fifth, and how
 # many of these more than a quarter of the known range beyond it:

@@ -32,7 +32,7 @@ STYLES = {
     "small network": ("#56B4E9", "s"),
     "random forest": ("#009E73", "^"),
     "quadratic": ("#D55E00", "D"),
-    "broken lines": ("#CC79A7", "v"),
+    "piecewise-linear": ("#CC79A7", "v"),
     "Gaussian process": ("#E69F00", "P"),
     "boosting": ("#777777", "X"),
 }
@@ -62,7 +62,7 @@ def regressors(network):
         "small network": MLPRegressor(hidden_layer_sizes=(64,), **small),
         "random forest": RandomForestRegressor(),
         "quadratic": quadratic(),
-        "broken lines": make_pipeline(HingeFeatures(), RidgeCV(np.logspace(-3, 5, 33))),
+        "piecewise-linear": make_pipeline(HingeFeatures(), RidgeCV(np.logspace(-3, 5, 33))),
         "Gaussian process": FewRows(kernel),
         "boosting": MultiOutputRegressor(GradientBoostingRegressor()),
     }

@@ -90,7 +90,7 @@ def hold_out_table(bridge, kinds=((True, 0.3), (True, 0.5), (False, 0.3), (False
     """
     T, F, T_test, F_test = bridge.split()
     rows = {}
-    for name, regressor in (("broken lines", None), ("boosted trees", boosting())):
+    for name, regressor in (("piecewise-linear", None), ("boosted trees", boosting())):
         direct = mape(F_test, TemperatureMapper(regressor).fit(T, F).predict(T_test))
         rows[f"{name}, T to F"] = [*direct, direct.mean(), 1.0]
         for track, bounds in kinds:
@@ -155,7 +155,7 @@ def alarm_table(inputs, detector=None):
 
 def found_by_day(inputs):
     """Number of records on each damaged day, and share of them that raise an alarm, in percent."""
-    baseline, _, damaged = inputs["broken lines", WHITENED]
+    baseline, _, damaged = inputs["piecewise-linear", WHITENED]
     alarm = pd.Series(MahalanobisDetector().fit(baseline).predict(damaged) == -1)
     days = alarm.groupby(damaged.index.floor("D").strftime("%m-%d"))
     return pd.DataFrame({"records": days.size(), "found": 100 * days.mean()}).T

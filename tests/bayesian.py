@@ -14,7 +14,7 @@ EVERYWHERE = (-40.0, 60.0)
 
 
 def basis(X, knots=(5.0, 15.0)):
-    """A constant and broken lines of the mean temperature, in units of ten degrees."""
+    """A constant and piecewise-linear functions of the mean temperature, in units of ten degrees."""
     mean = np.asarray(X, dtype=float).mean(axis=1)
     return np.column_stack([np.ones(len(mean)), mean / 10, *(np.maximum(mean - knot, 0) / 10 for knot in knots)])
 

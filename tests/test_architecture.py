@@ -41,8 +41,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fem.assembly": {"fem.elements", "fem.affine"},
     "fem.external": {"fem.affine"},
     "preprocessing.checks": set(),
-    "preprocessing.tracking": set(),
-    "datasets.fleet": set(),
     "surrogate.inverse": set(),
     "surrogate.chain": {"surrogate.inverse"},
     "plotting.structures": set(),

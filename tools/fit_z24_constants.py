@@ -13,7 +13,7 @@ from copy import deepcopy
 import numpy as np
 
 from skthermo.datasets import load_z24
-from skthermo.datasets._z24_model import CONSTANTS, PARAMETERS, z24_structure
+from skthermo.datasets._z24 import CONSTANTS, PARAMETERS, z24_structure
 from skthermo.fem import Spring, Structure
 from skthermo.updating import ModelUpdater, sensitivity
 

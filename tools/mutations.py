@@ -39,13 +39,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fleet/prior/_comparison.py", "fleet/prior/test_posterior.py"): [
         ("a bridge that predicts itself", " if i not in group]", "]"),
     ],
-    ("datasets/fleet/_climate.py", "datasets/test_fleet.py"): [
+    ("datasets/_fleet_site.py", "datasets/test_fleet.py"): [
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
-    ],
-    ("datasets/fleet/_laws.py", "datasets/test_fleet.py"): [
         ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
     ],
-    ("preprocessing/_sensors.py", "preprocessing/test_sensors.py"): [
+    ("preprocessing/_records.py", "preprocessing/test_sensors.py"): [
         (
             "a failing sensor that moves the mean",
             "level = as_floats(values) - self.offsets_",
@@ -208,7 +206,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_tables/frames.py", "surrogate/test_sample_weight.py"): [
         ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
     ],
-    ("_estimators/regressors.py", "surrogate/test_sample_weight.py"): [
+    ("_validation.py", "surrogate/test_sample_weight.py"): [
         ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
@@ -255,7 +253,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
-    ("_tables/times.py", "surrogate/test_uncertainty.py"): [
+    ("_tables/frames.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
     ],
     ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [
@@ -268,29 +266,25 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_io/_child.py", "fem/test_triplets.py"): [
         ("entries on both sides in a file", "(rows < columns).any() and (rows > columns).any()", "False"),
     ],
-    ("preprocessing/tracking/_assignment.py", "preprocessing/test_mode_tracker.py"): [
+    ("preprocessing/_poles.py", "preprocessing/test_mode_tracker.py"): [
         ("drift of tracked modes", "np.clip(mean, lowest, highest)", "mean"),
         ("poles of tracked modes contested", "counts[inverse] > 1", "counts[inverse] > 2"),
     ],
-    ("datasets/_kw51_truth.py", "datasets/test_kw51_campaign.py"): [
+    ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
-    ("preprocessing/checks/_stuck.py", "preprocessing/test_checks.py"): [
+    ("preprocessing/checks/_signs.py", "preprocessing/test_checks.py"): [
         ("stuck sensors beside rounding", "length >= USUAL * usual", "length >= usual"),
         ("stuck sensors beside resting values", "length < USUAL * same[USUAL_RANK]", "False"),
         ("stuck sensors at all", "SHORTEST = 5", "SHORTEST = 500"),
-    ],
-    ("preprocessing/checks/_shift.py", "preprocessing/test_checks.py"): [
         ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
         ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
-    ],
-    ("preprocessing/checks/_swaps.py", "preprocessing/test_checks.py"): [
-        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < BETTER:", "        if True:"),
+        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < IN_ORDER:", "        if True:"),
     ],
     ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
         ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
     ],
-    ("preprocessing/_hinges.py", "preprocessing/test_hinges.py"): [
+    ("preprocessing/_records.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),
     ],
@@ -416,10 +410,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("_effects/changes.py", "studies/test_identify_causes.py"): [
+    ("_effects.py", "studies/test_identify_causes.py"): [
         ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
-    ],
-    ("_effects/frequencies.py", "studies/test_identify_causes.py"): [
         ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
     ],
     ("studies/identification/_shapes.py", "studies/test_identify_shapes.py"): [
@@ -468,7 +460,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
-    ("plotting/_limits.py", "plotting/test_limits.py"): [
+    ("plotting/_display.py", "plotting/test_limits.py"): [
         ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
     ],

@@ -1,1 +1,1 @@
-"""What every estimator shares: checks of arguments, regressors, warnings, threads."""
+"""Warnings that point to the user's line, and threads of BLAS."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from joblib import Parallel
 
-from skthermo._estimators.arguments import check_flag
+from skthermo._tables.arrays import check_flag
 
 SILENT_SECONDS = 1.0
 SECONDS_BETWEEN = 0.1

@@ -1,1 +1,1 @@
-"""Records as arrays and frames: how they are read, matched by name, given back, saved and put into text."""
+"""Arguments and records as arrays and frames: read, matched by name, given back, saved and put into text."""

@@ -1,25 +1,31 @@
-"""Tables of records: pandas frames in and out, and checks of rows and columns."""
+"""Tables of records: pandas frames in and out, checks of rows and columns, stamps, durations and times of rows."""
 
 import re
 from collections.abc import Hashable, Iterable
-from numbers import Integral
+from datetime import timedelta
+from numbers import Integral, Real
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, median, real_array, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, robust_deviation
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
 Table: TypeAlias = Array | pd.DataFrame
-
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
 ABSURD = 20  # robust standard deviations from the median
 MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
+YEAR, DAY = pd.Timedelta(days=365.25), pd.Timedelta(days=1)
+DAY_NS = DAY.value  # nanoseconds
+LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
+ZERO = np.timedelta64(0, "ns")
+DATE_AS_TEXT = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 
 
 def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
@@ -234,3 +240,109 @@ def row_weights(sample_weight: Any, X: Any) -> Array | None:
     if not weights.any():
         raise ValueError(f"sample_weight is zero in all {n_rows} rows; expected a positive weight in some")
     return weights
+
+
+def row_times(T: Any) -> Array:
+    """Time of every row since the first one in nanoseconds, or its number where T has no ``DatetimeIndex``."""
+    if not has_stamps(T):
+        return np.arange(_num_samples(T), dtype=float)
+    stamps = T.index.as_unit("ns").asi8
+    return (stamps - stamps[:1]).astype(float)
+
+
+def time_of(T: Any, moment: Any, what: str) -> float:
+    """A position counted from 0, or a time, on the scale of `row_times`; infinite for a position after the last."""
+    times, is_timed = row_times(T), has_stamps(T)
+    if isinstance(moment, int | np.integer) and not isinstance(moment, bool) and moment >= 0:
+        if not is_timed:
+            return float(moment)
+        return float(times[moment]) if moment < len(times) else np.inf
+    try:
+        if is_timed and not isinstance(moment, Real | timedelta) and not pd.isna(moment):
+            return float((pd.Timestamp(moment).as_unit("ns") - T.index[0].as_unit("ns")).value)
+    except (TypeError, ValueError):
+        pass
+    zone = f" in the time zone {T.index.tz}" if is_timed and T.index.tz is not None else ""
+    expected = f"a position from 0, or a time{zone}" if is_timed else "a position from 0"
+    raise ValueError(f"{what} is {moment!r} for {len(times)} records; expected {expected}")
+
+
+def has_stamps(T: Any) -> bool:
+    """Whether rows have times: a frame on a ``DatetimeIndex``."""
+    return isinstance(getattr(T, "index", None), pd.DatetimeIndex)
+
+
+def correlation_time(series: Array) -> float:
+    """1 + 2 * the sum of the autocorrelations up to the first that is not clearly above zero.
+
+    That is the first within two standard errors of zero; lags reach half of the series, NaN is left out.
+    """
+    known = ~np.isnan(series)
+    if not known.any() or np.ptp(series[known]) == 0:
+        return 1.0
+    centred = np.where(known, series - series[known].mean(), 0.0)
+    variance = (centred**2).sum() / known.sum()
+    pairs = np.maximum(np.rint(_products(known.astype(float))), 1)
+    correlations = _products(centred) / pairs / variance
+    n_clear = int(np.argmin(np.append(correlations > 2 / np.sqrt(pairs), False)))
+    return float(1 + 2 * correlations[:n_clear].sum())
+
+
+def correlation_times(columns: Array) -> Array:
+    """The `correlation_time` of each column, (n_columns,)."""
+    return np.array([correlation_time(column) for column in columns.T])
+
+
+def _products(values: Array) -> Array:
+    """Sums of the products of values 1, 2, ... places apart, up to half of their number."""
+    size = next_fast_len(2 * len(values), real=True)
+    return irfft(np.abs(rfft(values, size)) ** 2, size)[1 : max(len(values) // 2, 1)]
+
+
+def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
+    """An index of stamps as a DatetimeIndex, periods by their start; None for an index of something else."""
+    if isinstance(index, pd.DatetimeIndex):
+        return index
+    if isinstance(index, pd.PeriodIndex):
+        return index.to_timestamp()
+    if isinstance(index, pd.MultiIndex):
+        if any(as_stamps(level) is not None for level in index.levels):
+            raise ValueError(f"X has stamps on one of the index levels {list(index.names)}; expected a DatetimeIndex")
+        return None
+    kind = index.inferred_type
+    if kind.startswith("timedelta"):
+        raise ValueError(
+            f"X has an index of durations, the first {index[0]}; expected a DatetimeIndex: add the time of the start"
+        )
+    if kind == "string" and DATE_AS_TEXT.match(str(index[0])):
+        raise ValueError(
+            f"X has stamps as text, the first {index[0]!r}; expected a DatetimeIndex, as pandas.to_datetime gives"
+        )
+    if kind not in ("datetime", "datetime64", "date"):
+        return None
+    try:
+        return pd.DatetimeIndex(index)
+    except (ValueError, TypeError) as error:
+        raise ValueError(
+            f"the index of X holds stamps with several offsets from UTC ({error}); expected a DatetimeIndex: convert "
+            "them by pandas.to_datetime(..., utc=True)"
+        ) from error
+
+
+def as_duration(value: Any, name: str) -> np.timedelta64:
+    """A positive duration of fixed length; that called "tolerance" may be zero."""
+    units = re.findall("[A-Za-z]+", value) if isinstance(value, str) else None
+    if any(unit.isupper() and unit not in LONE_CAPITALS for unit in units or ()):
+        raise ValueError(
+            f"{name} is {value!r}; expected a duration of fixed length with its unit, such as '10min', '1h' or '30D'"
+        )
+    try:
+        if is_real(value) or isinstance(value, bool):  # nanoseconds for pandas
+            raise TypeError
+        numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
+        duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ValueError(f"{name} is {value!r}; expected a duration of fixed length, such as '1h'") from error
+    if units == [] or not duration >= ZERO or (name != "tolerance" and duration == ZERO):
+        raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
+    return duration

@@ -12,10 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.arguments import check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_matlab
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_path
 from skthermo.datasets._results import KW51Monitoring
 from skthermo.exceptions import RecordsWarning
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._estimators.arguments import check_flag
+from skthermo._tables.arrays import check_flag
 from skthermo.datasets._sections import Section, box, channel, pipe, rectangle, tee, times
 from skthermo.fem import AffineModel, Beam, Membrane, Structure
 

@@ -14,8 +14,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._estimators.warnings import explain_rows, explained_rows, warn_user
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import frame_like, warn_of_absurd, warn_of_markers
-from skthermo._tables.times import row_times
+from skthermo._tables.frames import frame_like, row_times, warn_of_absurd, warn_of_markers
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._estimators.regressors import warn_of_fleet
 from skthermo._estimators.warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
@@ -22,11 +21,11 @@ from skthermo._tables.frames import (
     check_temperatures,
     column_names,
     frame_like,
+    has_stamps,
     positions_of,
     warn_of_disorder,
     warn_of_markers,
 )
-from skthermo._tables.times import has_stamps
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -37,6 +36,7 @@ from skthermo._validation import (
     check_is_fitted,
     last_step,
     validate_data,
+    warn_of_fleet,
 )
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
@@ -137,8 +137,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     that of all records: wholly at twice that distance, or a quarter of the range outside, before in proportion.
 
     In weather that is colder or warmer than the baseline's, predictions err by an amount that the baseline's own
-    residuals do not show. "auto" and "local" therefore fit the estimator two more times, without the coldest and
-    without the warmest fifth of the records, and compare the residuals of these with the others'. Where the column that
+    residuals do not show. "auto" therefore fits the estimator two more times, without the coldest and without the
+    warmest fifth of the records, and compares the residuals of these with the others'. Where the column that
     is farthest outside is e ranges below or above the baseline's, g log(1 + e^2) times the covariance of all records is
     added, with the g that this end has shown. An assumed value of 9 has the weight of some records in it. What no fifth
     of the baseline shows remains unknown, as the slope above freezing after a winter: `extrapolated` marks such rows.
@@ -479,8 +479,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         white = self.spread_.whiten(weather, taught, told)
         if self.whiten != "global":
             floor, near = self.whiten == "auto", rows_near_in_time(filled)
+            extrapolation = self._extrapolation(filled, frequencies) if floor else None
             followed, white = self.spread_.followed(weather, taught, told, floor=floor, near=near)
-            self.spread_ = replace(followed, extrapolation=self._extrapolation(filled, frequencies))
+            self.spread_ = replace(followed, extrapolation=extrapolation)
         if not len(fills.rows):
             return white
         untaught = np.isnan(taught).all(axis=1)

@@ -16,12 +16,19 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._estimators.arguments import is_model
-from skthermo._estimators.regressors import fit_outputs, offers, predicted_covariance, reach_of, told_by_fleet
 from skthermo._estimators.warnings import explain_rows, explained_rows, told_around, without_warnings
-from skthermo._tables.arrays import as_columns, as_floats
+from skthermo._tables.arrays import as_columns, as_floats, is_model
 from skthermo._tables.frames import column_names
-from skthermo._validation import BaseSearchCV, _BaseImputer, last_step
+from skthermo._validation import (
+    BaseSearchCV,
+    _BaseImputer,
+    fit_outputs,
+    last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+)
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.weather import PredictionError, TrainingRange

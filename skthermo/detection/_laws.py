@@ -36,7 +36,7 @@ class MeanLaw:
         """Learned from the records in some rows, and from the windows that end there."""
         records = Gaussian.of(windows.rows[rows])
         check_invertible(records.covariance, windows.rows[rows])
-        white = _standard(records, windows.rows)
+        white = records.whiten(windows.rows)
         sums, counts = windows.sums(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
         squares = windows.sums(np.nan_to_num(white) ** 2)
         excess, pairs = (sums**2 - squares)[rows].sum(axis=0), (counts**2 - counts)[rows].sum(axis=0)
@@ -44,7 +44,7 @@ class MeanLaw:
 
     def index(self, windows: Windows) -> Array:
         """Damage index of every window; NaN where no record has a mode."""
-        white = _standard(self.records, windows.rows)
+        white = self.records.whiten(windows.rows)
         counts, limits = windows.sums((~np.isnan(white)).astype(float)), CLIPPED * np.sqrt(1 - self.correlation)
         columns = zip(white.T, limits, strict=True)
         means = np.column_stack([robust_means(windows.inside(column), limit) for column, limit in columns])
@@ -52,12 +52,6 @@ class MeanLaw:
         variances = self.correlation + (1 - self.correlation) / np.where(known, counts, 1.0)
         squared = np.where(known, means**2, 0.0) / variances
         return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), means.shape[1])
-
-
-def _standard(learned: Gaussian, rows: Array) -> Array:
-    """Rows in standard deviations and uncorrelated, by a root that does not depend on the units of modes."""
-    scale = np.sqrt(np.diag(learned.covariance))
-    return Gaussian(learned.mean / scale, learned.covariance / np.outer(scale, scale)).whiten(rows / scale)
 
 
 def robust_means(rows: Array, limit: float) -> Array:

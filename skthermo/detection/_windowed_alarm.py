@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import correlation_time
+from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._laws import CountLaw, MeanLaw
@@ -92,7 +92,7 @@ class WindowedAlarm(DamageDetector):
     >>> single, week = MahalanobisDetector().fit(healthy), WindowedAlarm(7).fit(healthy)
     >>> shares = [(one.damage_index(damaged) > one.threshold_).mean() for one in (single, week)]
     >>> print("{:.0%} alarms by records, {:.0%} by weeks".format(*shares))
-    11% alarms by records, 70% by weeks
+    11% alarms by records, 66% by weeks
     """
 
     _parameter_constraints: dict = {

@@ -13,16 +13,6 @@ from joblib import delayed, effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 
-from skthermo._estimators.arguments import (
-    check_bounds,
-    check_dofs,
-    check_flag,
-    check_jobs,
-    check_model,
-    check_noise,
-    check_size,
-    check_theta,
-)
 from skthermo._estimators.threads import map_on_blas_threads, single_blas_thread
 from skthermo._io import as_they_come, with_progress
 from skthermo._tables.arrays import (
@@ -31,6 +21,14 @@ from skthermo._tables.arrays import (
     RandomState,
     as_random_state,
     central_differences,
+    check_bounds,
+    check_dofs,
+    check_flag,
+    check_jobs,
+    check_model,
+    check_noise,
+    check_size,
+    check_theta,
     is_real,
     positive_integer,
     real_array,

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import false_discovery_control, genpareto
 
-from skthermo._estimators.arguments import check_size
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_size
 from skthermo._tables.text import counted_number, listed, percent, significant
 from skthermo.monitoring import Monitor
 

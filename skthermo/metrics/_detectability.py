@@ -8,11 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.arguments import is_labelled
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import real_array
-from skthermo._tables.frames import check_same_rows
-from skthermo._tables.times import row_times, time_of
+from skthermo._tables.arrays import is_labelled, real_array
+from skthermo._tables.frames import check_same_rows, row_times, time_of
 from skthermo.exceptions import UnevaluatedRowsWarning
 
 

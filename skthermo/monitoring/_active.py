@@ -13,8 +13,8 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import DAY
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import DAY
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.exceptions import ResultWarning

@@ -14,9 +14,9 @@ from scipy.stats import gamma, nbinom
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
-from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
 
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.arguments import is_model
+from skthermo._tables.arrays import is_model
 from skthermo.preprocessing import HampelFilter
 
 Path = tuple[tuple[int, int], ...]

@@ -13,12 +13,11 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.frames import positions_of
+from skthermo._tables.arrays import check_flag
+from skthermo._tables.frames import DAY, YEAR, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
-from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import (
     Estimator,
     HasMethods,

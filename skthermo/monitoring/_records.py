@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import as_floats
+from skthermo._tables.frames import DAY_NS, YEAR
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
-from skthermo._tables.times import DAY_NS, YEAR
 from skthermo._validation import with_nan
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong

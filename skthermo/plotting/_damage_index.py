@@ -14,10 +14,20 @@ from sklearn.base import BaseEstimator
 from skthermo._tables.arrays import is_real
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting._axes import date_axis, figure_legend, on_axis
-from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
-from skthermo.plotting._style import BLACK, DAMAGE_INDEX, GREY, marker_style, plain, shortened
+from skthermo.plotting._display import (
+    BLACK,
+    DAMAGE_INDEX,
+    GREY,
+    Display,
+    date_axis,
+    figure_legend,
+    hold_outliers,
+    mark_not_evaluated,
+    marker_style,
+    on_axis,
+    plain,
+    shortened,
+)
 from skthermo.plotting._tables import as_table, in_time
 
 if TYPE_CHECKING:

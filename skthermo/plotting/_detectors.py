@@ -11,9 +11,18 @@ import pandas as pd
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import percent, printable, share_text
-from skthermo.plotting._axes import LETTER, figure_legend
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import BLACK, BLUE, GREY, ORANGE, label_of, plain, shortened
+from skthermo.plotting._display import (
+    BLACK,
+    BLUE,
+    GREY,
+    LETTER,
+    ORANGE,
+    Display,
+    figure_legend,
+    label_of,
+    plain,
+    shortened,
+)
 from skthermo.plotting._tables import check_study, names_from
 
 if TYPE_CHECKING:

@@ -1,20 +1,293 @@
-"""What all displays share: how they are made, and the axes that they draw into."""
+"""What displays share: their base, style, axes and limits of what is drawn."""
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
+from numbers import Real
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+import pandas as pd
 
-from skthermo.plotting._axes import panels
-from skthermo.plotting._style import plain
+from skthermo._tables.arrays import Array
+from skthermo._tables.text import printable
+from skthermo._validation import import_optional
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+# Okabe and Ito's palette for colour-blind readers. What is measured is blue, what is predicted or simulated orange.
+BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
+BLACK, GREY, LIGHT = "#000000", "#555555", "#BBBBBB"
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
+MARKERS = ("o", "x", "^", "s", "+", "v", "D")
+LINES = ("-", "--", "-.", ":")
+LONGEST_NAME = 30  # number of letters above which a name is shortened
+DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
+HANDLE, LETTER = 0.5, 0.085
+"""Inches that the symbol and a letter of a legend take."""
+FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
+FEWEST = 10  # points of a line from which on it may have outliers
+MARGIN = 0.05  # empty share of the axis next to its edges
+BEYOND = "beyond"
+"""Name (gid) of the marks at the edges."""
+EDGES: dict[tuple[str, bool], tuple[str, float, dict[str, object]]] = {
+    ("y", False): ("v", 0.0, {"x": 0.99, "y": 0.03, "ha": "right", "va": "bottom"}),
+    ("y", True): ("^", 1.0, {"x": 0.99, "y": 0.96, "ha": "right", "va": "top"}),
+    ("x", False): ("<", 0.0, {"x": 0.02, "y": 0.5, "ha": "left", "va": "center", "rotation": 90}),
+    ("x", True): (">", 1.0, {"x": 0.98, "y": 0.5, "ha": "right", "va": "center", "rotation": 90}),
+}
+"""Marker of an edge, its coordinate in shares of the axes, and how its text stands."""
+
+
+def drawing(module: str) -> ModuleType:
+    """A module of matplotlib, imported when something is drawn."""
+    return import_optional(module, extra="plot")
+
+
+def pyplot() -> ModuleType:
+    """Matplotlib's pyplot."""
+    return drawing("matplotlib.pyplot")
+
+
+def shortened(name: Hashable) -> str:
+    """A name for a legend, a title or a tick: a very long one loses its middle, dollar signs stay as they are."""
+    text = printable(name)
+    if len(text) > LONGEST_NAME:
+        text = f"{text[: LONGEST_NAME // 2].rstrip()} ... {text[-LONGEST_NAME // 3 :].lstrip()}"
+    return plain(text)
+
+
+def plain(text: Hashable) -> str:
+    """A text whose dollar signs matplotlib draws as they are, in lines where they enclose no formula."""
+    return "\n".join(_plain_line(printable(line)) for line in str(text).split("\n"))
+
+
+def _plain_line(line: str) -> str:
+    if "$" not in line:
+        return line
+    try:
+        drawing("matplotlib.mathtext").MathTextParser("path").parse(line)
+    except ValueError:
+        return line.replace("\\$", "$").replace("$", "\\$")
+    return line
+
+
+def label_of(name: Hashable) -> str:
+    """A column's name as text; f1 becomes a symbol with an index."""
+    text = str(name)
+    found = re.fullmatch(r"([fT])_?(\d+)", text)
+    return f"${found[1]}_{{{found[2]}}}$" if found else shortened(text)
+
+
+def with_unit(quantity: str, unit: str) -> str:
+    """Label of an axis."""
+    return plain(f"{quantity} ({unit})" if unit else quantity)
+
+
+def marker_style(number: int, n_points: int) -> dict[str, object]:
+    """Options of plot for unconnected points: colour, and a marker that tells them apart in greyscale too."""
+    size = 5.0 if n_points <= 100 else 3.5 if n_points <= 1000 else 2.0
+    marker = MARKERS[number % len(MARKERS)]
+    return {
+        "linestyle": "",
+        "marker": marker,
+        "markersize": size,
+        "color": COLOURS[number % len(COLOURS)],
+        "markeredgewidth": 0.8 if marker in "x+" else 0.0,
+    }
+
+
+def line_style(number: int, dashes: int = 0) -> dict[str, object]:
+    """Options of plot for lines: colour, and dashes that tell them apart in greyscale too."""
+    return {"linestyle": LINES[dashes % len(LINES)], "color": COLOURS[number % len(COLOURS)], "linewidth": 1.0}
+
+
+def panels(
+    ax: Axes | np.ndarray | None,
+    names: Sequence[object],
+    size: tuple[float, float],
+    n_columns: int = 1,
+    share_x: bool = False,
+    heights: Sequence[float] | None = None,
+) -> np.ndarray:
+    """One axes for each name: those that are given, or those of a new figure, perhaps with heights of its rows."""
+    if ax is None:
+        n_columns = min(n_columns, len(names))
+        n_rows = -(-len(names) // n_columns)
+        height = size[1] * n_rows if heights is None else sum(heights)
+        figure = pyplot().figure(figsize=(size[0] * n_columns, height), layout="constrained")
+        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False, height_ratios=heights).ravel()
+        for unused in axes[len(names) :]:
+            unused.remove()
+        for above in axes[max(len(names) - n_columns, 0) : len(names)] if share_x else ():
+            above.tick_params(labelbottom=True)
+        return axes[: len(names)]
+    given = np.ravel(np.asarray(ax, dtype=object))
+    if not all(hasattr(one, "plot") and hasattr(one, "figure") for one in given):
+        raise ValueError(f"ax is {ax!r:.200}; expected matplotlib's axes")
+    if len(given) != len(names):
+        raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
+    return given
+
+
+def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
+    """Names of the panels: those that are given, or those of the columns."""
+    if titles is not None and len(titles) != len(columns):
+        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
+    return [label_of(name) for name in (columns if titles is None else titles)]
+
+
+def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
+    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
+    n_rows = -(-n_panels // n_columns)
+    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
+
+
+def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
+    """One legend of all panels' labels above those of a new figure, or within the first of given axes."""
+    by_label: dict[str, Artist] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            by_label.setdefault(label, handle)
+    handles, labels = list(by_label.values()), list(by_label)
+    scale = 2.0 if any(getattr(h, "get_markersize", lambda: 9)() < 4 for h in handles) else 1.0
+    if not handles:
+        return
+    if is_own_figure:
+        n_columns = legend_columns(labels, axes[0].figure, n_columns)
+        axes[0].figure.legend(
+            handles, labels, loc="outside upper center", ncols=n_columns, frameon=False, markerscale=scale
+        )
+    else:
+        axes[0].legend(frameon=False, markerscale=scale, fontsize="small")
+
+
+def legend_columns(labels: Sequence[str], figure: Figure, most: int) -> int:
+    """How many columns of a legend fit into the width of a figure."""
+    widest = HANDLE + LETTER * max(map(len, labels))
+    return int(np.clip(figure.get_figwidth() // widest, 1, most))
+
+
+def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
+    """Ticks and label of an axis of time, or of the number of the record."""
+    if isinstance(index, pd.DatetimeIndex):
+        dates = drawing("matplotlib.dates")
+        locator = dates.AutoDateLocator()
+        ax.xaxis.set_major_locator(locator)
+        ax.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
+        ax.set_xlabel(label or "date")
+    else:
+        ax.set_xlabel(label or plain(index.name or "record"))
+
+
+def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
+    """Vertical lines in all panels, with their labels above the first."""
+    for text, place in (marks or {}).items():
+        for ax in axes:
+            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
+        above = axes[0].get_xaxis_transform()
+        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
+
+
+def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
+    """A time in the zone of the index, or a number; on an axis of time, a number is the position of a record."""
+    is_number = isinstance(place, Real)
+    if not isinstance(index, pd.DatetimeIndex):
+        if not is_number:
+            raise ValueError(f"{place!r} is not a number; expected one, since the records have no DatetimeIndex")
+        return place
+    if is_number:
+        if not 0 <= place < len(index):
+            raise ValueError(f"there is no record number {place!r}; expected a time, or 0 to {len(index) - 1}")
+        place = index[int(place)]
+    try:
+        time = pd.Timestamp(place)
+    except (TypeError, ValueError):
+        raise ValueError(f"{place!r} is not a time; expected one, such as '2025-03-01', or a record's number") from None
+    if time.tz is not None and index.tz is not None:
+        time = time.tz_convert(index.tz)
+    return time.tz_localize(None).to_datetime64()
+
+
+def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = (), direction: str = "y") -> None:
+    """End an axis where the points of its lines end but for a few far ones; these are marked at the edge and counted.
+
+    Far is what would make the axis more than three times as long. ``keep`` are values that stay in view, ``also`` those
+    of bands, and ``direction`` names the axis, "x" or "y".
+    """
+    for mark in [*ax.lines, *ax.texts]:
+        if mark.get_gid() == f"{BEYOND} {direction}":
+            mark.remove()
+    lines = [line for line in ax.lines if line.get_transform() == ax.transData]
+    columns = [getattr(line, f"get_{direction}data")(orig=False).astype(float) for line in lines]
+    middles = [middle_of(values) for values in [*columns, *also] if np.isfinite(values).any()]
+    if not middles:
+        return
+    middle = np.concatenate([*middles, [*keep]])
+    low, high = middle.min() - np.ptp(middle), middle.max() + np.ptp(middle)
+    if not any((values < low).any() or (values > high).any() for values in columns):
+        return
+    seen = np.concatenate([*columns, *also, [*keep]])
+    seen = seen[(seen >= low) & (seen <= high)]
+    margin = MARGIN * np.ptp(seen)
+    lowest = seen.min() - margin if seen.min() not in keep else seen.min()
+    getattr(ax, f"set_{direction}lim")(lowest, seen.max() + margin)
+    for is_upper in (False, True):
+        beyond = [values > high if is_upper else values < low for values in columns]
+        if np.any(np.concatenate(beyond)):
+            _mark_edge(ax, lines, columns, beyond, direction, is_upper)
+
+
+def middle_of(values: Array) -> Array:
+    """All values but a few at either end, in order; of values that hardly differ otherwise, and of few values, all."""
+    known = np.sort(values[np.isfinite(values)])
+    n_few = int(np.ceil(FEW * len(known))) if len(known) >= FEWEST else 0
+    middle = known[n_few : len(known) - n_few]
+    return middle if middle[0] < middle[-1] else known
+
+
+def _mark_edge(
+    ax: Axes, lines: list[Line2D], columns: list[Array], beyond: list[Array], direction: str, is_upper: bool
+) -> None:
+    """A triangle at the edge for each point beyond it, in the colour of its line, and a text that counts them."""
+    marker, edge, place = EDGES[direction, is_upper]
+    transform = ax.get_xaxis_transform() if direction == "y" else ax.get_yaxis_transform()
+    other = "x" if direction == "y" else "y"
+    for line, rows in zip(lines, beyond, strict=True):
+        along = getattr(line, f"get_{other}data")(orig=False)[rows]
+        points = {other: along, direction: np.full(len(along), edge)}
+        style = {"linestyle": "", "marker": marker, "markersize": 5, "color": line.get_color(), "markeredgewidth": 0}
+        ax.plot(points["x"], points["y"], transform=transform, gid=f"{BEYOND} {direction}", **style)
+    far = np.concatenate([values[rows] for values, rows in zip(columns, beyond, strict=True)])
+    text = f"{len(far)} beyond, {'up' if is_upper else 'down'} to {far.max() if is_upper else far.min():.4g}"
+    _write(ax, text, gid=f"{BEYOND} {direction}", **place)
+
+
+def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
+    """Grey ticks at the bottom where records of each label are not evaluated, and a text that counts them."""
+    texts = []
+    for label, x in places.items():
+        if len(x):
+            style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
+            ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not evaluated", **style)
+            nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
+    if texts:
+        _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not evaluated")
+
+
+def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
+    """A small text in shares of the axes, on a ground that keeps points off it."""
+    box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
+    ax.text(x, y, plain(text), transform=ax.transAxes, fontsize="small", color=GREY, bbox=box, **style)
 
 
 class Display:

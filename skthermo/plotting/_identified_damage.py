@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._tables.text import chance_text
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, drawing, label_of, plain, shortened
+from skthermo.plotting._display import BLACK, BLUE, GREY, LIGHT, ORANGE, Display, drawing, label_of, plain, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,10 +10,22 @@ import numpy as np
 import pandas as pd
 
 from skthermo._tables.arrays import Array
-from skthermo.plotting._axes import date_axis, figure_legend
-from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers, mark_not_evaluated
-from skthermo.plotting._style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, line_style, marker_style, shortened
+from skthermo.plotting._display import (
+    BLACK,
+    BLUE,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
+    Display,
+    date_axis,
+    figure_legend,
+    hold_outliers,
+    line_style,
+    mark_not_evaluated,
+    marker_style,
+    shortened,
+)
 from skthermo.plotting._tables import in_time, with_breaks
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skthermo._tables.arrays import Array
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import COLOURS, GREY, LINES, MARKERS, shortened
+from skthermo.plotting._display import COLOURS, GREY, LINES, MARKERS, Display, shortened
 from skthermo.plotting._tables import check_study
 
 if TYPE_CHECKING:

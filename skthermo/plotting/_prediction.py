@@ -14,10 +14,23 @@ from sklearn.base import BaseEstimator
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import check_same_rows
-from skthermo.plotting._axes import date_axis, draw_marks, figure_legend, panel_names, size_in_time
-from skthermo.plotting._display import Display
-from skthermo.plotting._limits import hold_outliers
-from skthermo.plotting._style import BLACK, BLUE, ORANGE, label_of, line_style, marker_style, shortened, with_unit
+from skthermo.plotting._display import (
+    BLACK,
+    BLUE,
+    ORANGE,
+    Display,
+    date_axis,
+    draw_marks,
+    figure_legend,
+    hold_outliers,
+    label_of,
+    line_style,
+    marker_style,
+    panel_names,
+    shortened,
+    size_in_time,
+    with_unit,
+)
 from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
 if TYPE_CHECKING:

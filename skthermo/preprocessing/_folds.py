@@ -11,10 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._tables.frames import Table
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import Table, as_duration, has_stamps, row_times
 from skthermo._validation import _num_samples
-from skthermo.preprocessing._stamps import as_duration
 
 WEEK = "7D"
 BLOCKS_OF_ROWS = 52  # into which records without stamps are divided: weeks, if they are those of a year

@@ -11,11 +11,17 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
-from skthermo._tables.frames import Table, check_positions_are_names, frame_like, positions_of
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import (
+    Table,
+    as_duration,
+    check_positions_are_names,
+    frame_like,
+    has_stamps,
+    positions_of,
+    row_times,
+)
 from skthermo._validation import Interval
 from skthermo.preprocessing._records import RecordTransformer
-from skthermo.preprocessing._stamps import as_duration
 from skthermo.preprocessing._weather_regression import WeatherRegression
 
 LEAST_WINDOW = 3  # rows
@@ -49,7 +55,7 @@ class HampelFilter(RecordTransformer):
     targets_ : ndarray of int
         Positions of the columns that are filtered.
     regression_ : object or None
-        What the weather explains of the targets, as broken lines.
+        What the weather explains of the targets, piecewise-linear in it.
     n_features_in_ : int
         Number of columns.
     feature_names_in_ : ndarray of str

@@ -12,12 +12,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.frames import Table
+from skthermo._tables.frames import Table, as_duration
 from skthermo._tables.text import duration_text
 from skthermo._validation import Interval, StrOptions
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._records import PastFeatures
-from skthermo.preprocessing._stamps import as_duration
 
 DEFAULT_TOLERANCE = 6  # times freq
 MISSING = -1  # instead of the number of a row

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, as_floats, broken_lines, median, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, as_floats, median, piecewise_linear, robust_deviation, spread_evenly
 
 MOST_COORDINATES = 3  # principal components of the weather
 EXPLAINED = 0.99  # share of its variance that is enough
@@ -59,8 +59,8 @@ class WeatherBasis:
         return places
 
     def lines(self, places: Array) -> Array:
-        """Broken lines in the coordinates, with a constant first."""
-        return np.hstack([np.ones((len(places), 1)), broken_lines(places, self.knots)])
+        """Piecewise-linear functions of the coordinates, with a constant first."""
+        return np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
 
 
 class Grams(NamedTuple):
@@ -108,7 +108,7 @@ class Grams(NamedTuple):
 
 @dataclass(frozen=True)
 class WeatherRegression:
-    """Frequencies as broken lines of the weather."""
+    """Frequencies as piecewise-linear functions of the weather."""
 
     basis: WeatherBasis
     coefficients: Array

@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
-from skthermo._estimators.arguments import check_path, check_size
 from skthermo._io import write_when_complete
+from skthermo._tables.arrays import check_path, check_size
 from skthermo._tables.text import counted
 from skthermo.fem import Structure
 from skthermo.fleet import Fleet

@@ -13,7 +13,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array, patterns
-from skthermo._tables.times import correlation_times
+from skthermo._tables.frames import correlation_times
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.scatter import Scatter

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.model_selection import KFold, check_cv
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import correlation_times, row_times
+from skthermo._tables.frames import correlation_times, row_times
 from skthermo.preprocessing import BlockedKFold
 
 Rows = NDArray[np.intp]

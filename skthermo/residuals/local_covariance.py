@@ -11,7 +11,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import DAY_NS, has_stamps, row_times
+from skthermo._tables.frames import DAY_NS, has_stamps, row_times
 from skthermo.residuals.gaussian import Gaussian, Mask, whitenings
 from skthermo.residuals.weather import nearest
 

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, range_sums
-from skthermo._tables.times import DAY_NS, YEAR, correlation_times
+from skthermo._tables.frames import DAY_NS, YEAR, correlation_times
 from skthermo.preprocessing import BlockedKFold
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import parts

@@ -15,8 +15,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, range_sums
-from skthermo._tables.frames import column_names, frame_like
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import column_names, frame_like, has_stamps, row_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.residuals.gaussian import Gaussian
 

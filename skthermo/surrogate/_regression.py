@@ -24,12 +24,10 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.validation import check_memory
 
 import skthermo
-from skthermo._estimators.arguments import check_flag, columns_by_name
-from skthermo._estimators.regressors import check_takes_weights, fit_outputs, predict_with_std
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import give_again, recorded
 from skthermo._io import lock
-from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.arrays import Array, as_columns, check_flag, columns_by_name
 from skthermo._tables.frames import (
     Table,
     check_columns,
@@ -46,6 +44,9 @@ from skthermo._validation import (
     _fit_context,
     check_array,
     check_is_fitted,
+    check_takes_weights,
+    fit_outputs,
+    predict_with_std,
     seed_parts,
     seeded,
     validate_data,

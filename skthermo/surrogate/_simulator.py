@@ -12,9 +12,8 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._estimators.arguments import DEFAULT_TOLERANCE, Reduce, check_bounds, is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds
+from skthermo._tables.arrays import DEFAULT_TOLERANCE, Array, Bounds, Reduce, check_bounds, is_auto, tolerance
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
 

@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.arguments import seem_rad_per_s
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, seem_rad_per_s
 from skthermo.fem import FEModel, ModalModel, share_reordered
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 

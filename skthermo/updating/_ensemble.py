@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from joblib import delayed
 
-from skthermo._effects.frequencies import read_groups
-from skthermo._estimators.arguments import check_names
+from skthermo._effects import read_groups
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel
 from skthermo.updating._diagnostics import at_bounds, false_matches

@@ -14,8 +14,16 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
-from skthermo._estimators.arguments import check_model, check_noise, check_theta
-from skthermo._tables.arrays import HUGE, Array, central_differences, is_real, real_array
+from skthermo._tables.arrays import (
+    HUGE,
+    Array,
+    central_differences,
+    check_model,
+    check_noise,
+    check_theta,
+    is_real,
+    real_array,
+)
 from skthermo._tables.text import SPACE, counted, listed
 from skthermo.fem import FEModel, evaluate, shape_jacobian
 from skthermo.updating._residuals import tangent_derivatives

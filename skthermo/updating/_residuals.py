@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_assignment, minimize
 
-from skthermo._estimators.arguments import by_name, check_dofs
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, central_differences, real_array, shape_array
+from skthermo._tables.arrays import Array, as_floats, by_name, central_differences, check_dofs, real_array, shape_array
 from skthermo.exceptions import RecordsWarning
 from skthermo.fem import FEModel, LocalModel
 

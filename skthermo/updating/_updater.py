@@ -12,18 +12,22 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._estimators.arguments import (
+from skthermo._estimators.warnings import warn_each, warn_user
+from skthermo._io import run_jobs
+from skthermo._tables.arrays import (
+    Array,
+    Bounds,
     Reduce,
+    as_random_state,
     check_bounds,
     check_model,
     check_prior,
     check_size,
     is_auto,
+    positive_integer,
+    real_array,
     tolerance,
 )
-from skthermo._estimators.warnings import warn_each, warn_user
-from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, Bounds, as_random_state, positive_integer, real_array
 from skthermo._tables.frames import column_names
 from skthermo._validation import (
     Estimator,

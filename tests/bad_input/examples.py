@@ -20,7 +20,7 @@ from sklearn.neighbors import LocalOutlierFactor
 
 import skthermo
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, reporting, studies, surrogate, updating
-from skthermo._estimators.arguments import check_bounds, check_prior
+from skthermo._tables.arrays import check_bounds, check_prior
 from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures

@@ -20,7 +20,7 @@ import pytest
 import sklearn
 
 import skthermo
-from skthermo._estimators.arguments import check_noise
+from skthermo._tables.arrays import check_noise
 from skthermo.exceptions import SkthermoWarning
 
 SHARE, MOST_WRONG = 9, 0.01  # every ninth bad value is tried each time; so many may be silent or unclear

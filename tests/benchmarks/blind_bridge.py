@@ -201,8 +201,8 @@ def without_outliers(F):
 
 
 METHODS = {
-    "broken lines": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES),
-    "broken lines, whitened": lambda: TemperatureCompensator(
+    "piecewise-linear": lambda: TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES),
+    "piecewise-linear, whitened": lambda: TemperatureCompensator(
         lagged(TemperatureMapper()), targets=MODES, whiten="local"
     ),
     "chain": lambda: TemperatureCompensator(chain(), targets=MODES),
@@ -423,7 +423,7 @@ def main():
     print(f"Cable-stayed footbridge, modes at {nominal.round(2)} Hz; {bridge.n} records to train, {ASKED:.0%} asked")
     found = {}
     for name in options.methods:
-        for dirty in (False, True) if name == "broken lines" else (False,):
+        for dirty in (False, True) if name == "piecewise-linear" else (False,):
             found[name, dirty] = print_method(name, bridge, years, dirty, options.days)
     for dirty in (False, True):
         print_competitors(bridge, years, dirty)

@@ -30,7 +30,7 @@ NOISE = 0.0006
 DAMAGES = {"healthy": {}, "bottom 1 %": {"bottom": 0.01}, "diagonal 1.5 %": {"diagonal": 0.015}}
 ASKED, MOST_FALSE = 2.0, 3.0
 REGRESSORS = {
-    "broken lines": lambda: TemperatureMapper(),
+    "piecewise-linear": lambda: TemperatureMapper(),
     "linear": lambda: LinearRegression(),
     "boosting": lambda: MultiOutputRegressor(HistGradientBoostingRegressor(random_state=0)),
 }
@@ -73,7 +73,7 @@ def campaign(seed):
     return states["healthy"][:half], {name: records[half:] for name, records in states.items()}, names
 
 
-def compensator(names, regressor="broken lines", **options):
+def compensator(names, regressor="piecewise-linear", **options):
     lags = LagFeatures([0, 3, 12], freq="2h")
     return TemperatureCompensator(make_pipeline(lags, REGRESSORS[regressor]()), targets=names, **options)
 

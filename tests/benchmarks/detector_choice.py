@@ -58,8 +58,8 @@ SEEN = (
     "raw, less 2 components",
     "raw, Gaussian mixture",
     "linear regression",
-    "broken lines",
-    "broken lines, 20 neighbours",
+    "piecewise-linear",
+    "piecewise-linear, 20 neighbours",
 )
 
 
@@ -178,7 +178,7 @@ class KW51:
         self.weather = self.later.temperatures[self.later.temperatures.notna().all(axis=1)]
         lagged = make_pipeline(LagFeatures(24, freq="h"), TemperatureMapper())
         forest = RandomForestRegressor(50, min_samples_leaf=10, random_state=0)
-        self.detectors = twelve(self.targets, **{"random forest": forest, "broken lines, 24 lags": lagged})
+        self.detectors = twelve(self.targets, **{"random forest": forest, "piecewise-linear, 24 lags": lagged})
         self.assumed = self.coming = sweep(self.fem.model, severities, ["connections", "girders", "arch"])
 
     def records_of(self, T, F):

@@ -8,8 +8,8 @@ The truss day by day, with noise that is independent or has a correlation of 0.9
 after the first half of its year. "frost" has two-hourly records of a truss that freezes, in weather with a memory of
 days; "Z24" the bridge's measured ones, for which the variable SKTHERMO_DATA names the folder of data. Outlier detectors
 leave out blocks of five correlation times or, with "days left out", of days. The exit code is 1 if a detector raises
-more false alarms than asked, and sampling error, where weather repeats: broken lines do after one year of dependent
-noise, which is too little for their bends.
+more false alarms than asked, and sampling error, where weather repeats: piecewise-linear residuals do after one year of
+dependent noise, which is too little for their bends.
 """
 
 import argparse

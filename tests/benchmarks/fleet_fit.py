@@ -4,7 +4,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_fit.py --quick
 
 Bridges of ``make_fleet``, each with a year of daily records, an FE model that is a little wrong and a monitor; models
-and records are made in the workers. Then the monitors judge half a year in which every tenth bridge loses 30 % of a
+and records are made in the workers. Then the monitors evaluate half a year in which every tenth bridge loses 30 % of a
 group. The largest memory of this process and of its workers is that of all times, as Linux counts it (VmHWM).
 
 Some of the bridges are then fitted again with a worker killed by SIGKILL midway, beside a bridge whose maker always
@@ -112,7 +112,7 @@ class Watched(threading.Thread):
 
 
 def bits(fleet, names, campaign):
-    """What each bridge predicts and by which threshold it judges, as one text."""
+    """What each bridge predicts and by which threshold it evaluates, as one text."""
     found = {}
     for name in names:
         if name in fleet.chains:
@@ -157,8 +157,8 @@ def main():
         damaged = set(list(campaign)[::EVERY])
         new = {name: partial(later, bridge, name in damaged) for name, bridge in campaign.items()}
         start = time.perf_counter()
-        judged = fleet.update(new, options.jobs)
-        print(f"{len(judged)} records of {LATER} days judged in {time.perf_counter() - start:.0f} s")
+        answers = fleet.update(new, options.jobs)
+        print(f"{len(answers)} records of {LATER} days evaluated in {time.perf_counter() - start:.0f} s")
         with pd.option_context("display.width", 200, "display.max_columns", 40):
             columns = [
                 "n_records",

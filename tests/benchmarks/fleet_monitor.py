@@ -6,7 +6,7 @@
 
 Bridges of the library's synthetic fleet (`skthermo.datasets.make_fleet`), four records a day with gaps; outliers have
 been removed. Those of the fleet have a year each. A new bridge has 15 days or more from a day of the year on that is
-drawn, then a year in service. Its monitor promises one false event a year. At three times of that year, damage sets
+drawn, then a year in service. Its monitor is set for one false event a year. At three times of that year, damage sets
 in; it is found if an event opens within 30 days (the first bridge's events are also those of ``Monitor.update``). The
 means by role of the thermometers now and 12 and 48 hours ago, for all regressions.
 
@@ -14,13 +14,13 @@ fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the 
 fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
              one that foretells the fleet's own bridges best after as many days. It does not know how uncertain it is.
 ridge        of all temperatures, on the bridge's own records
-lines        broken lines of all temperatures, the library's default, on the bridge's own records
+lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
 neighbours   distance to the 20th nearest of the raw frequencies of the baseline
 fleet chain  with --chains: a ``DataInformedFEM`` whose mapper is the fleet's prior on the parameters of FE models
 
 "within" is the share of bridges whose number of events lies below the highest that ``false_alarm_estimate_`` names for
-a single year; "promised" those whose monitor could be made at all. The exit code is 1 if the fleet's monitors have more
-than 1.5 false events a year on average, or fewer than 90 % of them are within their promise, after any number of days;
+a single year; "fitted" those whose monitor could be made at all. The exit code is 1 if the fleet's monitors have more
+than 1.5 false events a year on average, or fewer than 90 % of them are within their range, after any number of days;
 or if the fleet finds no more of the damage than the best of the others whose false events are as few.
 """
 
@@ -188,7 +188,7 @@ def events_of(index, rule):
 
 
 def served(detector, modes, baseline, healthy, damaged, also_by_update):
-    """A monitor's threshold, its false events in a year, the most that it promises, and the share of damage found.
+    """A monitor's threshold, false events in a year, highest number of its range, and the share of damage found.
 
     Damage is found by an event that opens after it has set in; while a false one is open, none can.
     """
@@ -244,9 +244,9 @@ def rows_of(kind, bridge, number, options):
             }
             try:
                 found = served(detector, modes, baseline, healthy[first:], damaged, number == 0)
-                yield row | {"promised": 1.0, "error": ""} | found
+                yield row | {"fitted": 1.0, "error": ""} | found
             except ValueError as error:
-                yield row | {"promised": 0.0, "error": str(error)}
+                yield row | {"fitted": 0.0, "error": str(error)}
 
 
 def main():
@@ -273,18 +273,18 @@ def main():
             rows += rows_of(one, bridge, number, options)
     table = pd.DataFrame(rows)
     found = [f"found {severity:.0%}" for severity in options.severities]
-    numbers = ["promised", "events", "within", "in alarm", *found, "threshold", "highest"]
+    numbers = ["fitted", "events", "within", "in alarm", *found, "threshold", "highest"]
     table[numbers] = table[numbers].astype(float)
     summary = table.groupby(["days", "detector"])[numbers].mean()
     print(summary.round(2).to_string())
-    refused = table[table["promised"] == 0].groupby(["days", "detector"])["error"].agg(["size", "first"])
+    refused = table[table["fitted"] == 0].groupby(["days", "detector"])["error"].agg(["size", "first"])
     print(refused.to_string() if len(refused) else "every monitor could be made")
     print(f"{time.perf_counter() - begun:.0f} s")
     sys.exit(0 if meets(summary, found[-1]) else 1)
 
 
 def meets(summary, found):
-    """Whether the fleet's monitors keep their promise and find no less than others that keep it; says where not."""
+    """Whether the fleet's monitors have few false events and find no less than others with few; prints where not."""
     met = True
     for days, rows in summary.groupby(level="days"):
         rows = rows.droplevel("days")

@@ -161,7 +161,7 @@ class Chain(Frequencies):
 
 
 class Competitors:
-    """Mean, pooled regression and ridge of bridges of one kind, on one basis of broken lines."""
+    """Mean, pooled regression and ridge of bridges of one kind, on one piecewise-linear basis."""
 
     def __init__(self, members, covariates):
         tables = {name: member.pair() for name, member in members.items()}

@@ -3,7 +3,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/own_kind.py
     OMP_NUM_THREADS=1 SKTHERMO_DATA=path/to/data python tests/benchmarks/own_kind.py --bridges Z24
 
-Chains whose temperature mapper is made of broken lines, boosted trees or a network simulate the healthy and the damaged
+Chains whose temperature mapper is piecewise-linear, boosted trees or a network simulate the healthy and the damaged
 structure, and detectors judge: residuals of regressors of the same three kinds, of the chains themselves, and raw
 frequencies. Beside them stand the same alarms on true records of the truss, or on those of Z24, with the chain
 of the baseline and assumed damage. The own kind's advantage is the change of its alarms in records of its own kind of
@@ -42,7 +42,7 @@ def kinds():
         hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
     )
     trees = MultiOutputRegressor(GradientBoostingRegressor(random_state=0))
-    regressors = {"broken lines": None, "boosted trees": trees, "network": network}
+    regressors = {"piecewise-linear": None, "boosted trees": trees, "network": network}
     return {name: TemperatureMapper(regressor, random_state=0) for name, regressor in regressors.items()}
 
 

@@ -44,9 +44,13 @@ EXPECTED_WARNINGS = (
 def targets_of_prediction(bridge):
     """The last fifth of the healthy records, predicted by the chain and by the same regressor without one."""
     table = z24.hold_out_table(bridge, [(True, 0.3), (True, 0.5)])
-    ratios = table["ratio"].drop(["broken lines, T to F", "boosted trees, T to F"])
+    ratios = table["ratio"].drop(["piecewise-linear, T to F", "boosted trees, T to F"])
     yield "error of four chains over that of a direct regression, largest", ratios.max(), "<= 1.01", "<= 1.03"
-    yield "error, broken lines, bounds 0.3, %", table["mean"]["broken lines, chain, tracked, bounds 0.3"], "< 0.62"
+    yield (
+        "error, piecewise-linear, bounds 0.3, %",
+        table["mean"]["piecewise-linear, chain, tracked, bounds 0.3"],
+        "< 0.62",
+    )
 
 
 def targets_of_detection(bridge):
@@ -54,10 +58,10 @@ def targets_of_detection(bridge):
     records = z24.Records.of(bridge)
     found = {
         name: z24.compensate(records, estimator, "local")[0]
-        for name, estimator in (("broken lines", z24.TemperatureMapper()), ("trees", z24.boosting()))
+        for name, estimator in (("piecewise-linear", z24.TemperatureMapper()), ("trees", z24.boosting()))
     }
     table = z24.alarm_table(found)
-    days = z24.found_by_day({("broken lines", z24.WHITENED): found["broken lines"]}).loc["found"]
+    days = z24.found_by_day({("piecewise-linear", z24.WHITENED): found["piecewise-linear"]}).loc["found"]
     yield "false alarms, %, larger of two", table["false alarms"].max(), "<= 3"
     yield "damage found, %, smaller of two", table["damage found"].min(), ">= 80"
     yield "damage found from the third day, %, smallest", days.iloc[2:].min(), ">= 100"

@@ -14,9 +14,8 @@ import pandas as pd
 from scipy.special import ndtri
 from sklearn.utils import Bunch
 
-from skthermo.datasets._kw51_weather import memory
-from skthermo.datasets.fleet._climate import SiteClimate, drawn_by_hour, persistent, stream
-from skthermo.datasets.fleet._laws import Law
+from skthermo.datasets._fleet_site import Law, SiteClimate, drawn_by_hour, persistent, stream
+from skthermo.datasets._kw51_campaign import memory
 from skthermo.fem import Beam, Spring, Structure
 
 SPANS = (24.0, 33.0, 38.0, 29.0)  # m

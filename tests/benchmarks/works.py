@@ -418,7 +418,7 @@ def many_detectors(clock, quick):
     fem, year, later = truss_years()
     everyone = field_detectors(list(year.frequencies))
     names = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, Gaussian mixture"]
-    names += ["linear regression", "broken lines", "broken lines, whitened", "conditional covariance"]
+    names += ["linear regression", "piecewise-linear", "piecewise-linear, whitened", "conditional covariance"]
 
     def decisions(*chosen):
         detectors = {name: everyone[name] for name in chosen}

@@ -8,8 +8,7 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from skthermo.datasets import make_fleet
-from skthermo.datasets.fleet._climate import SiteClimate, persistent
-from skthermo.datasets.fleet._laws import LAWS, draw_law, estranged
+from skthermo.datasets._fleet_site import LAWS, SiteClimate, draw_law, estranged, persistent
 from skthermo.preprocessing import SensorMeans
 
 

@@ -7,9 +7,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pandas.testing import assert_frame_equal
 
 from skthermo.datasets import kw51_structure, make_kw51, make_kw51_campaign
-from skthermo.datasets._kw51_campaign import missing_modes, missing_temperatures
-from skthermo.datasets._kw51_truth import BOX, thermal_multipliers
-from skthermo.datasets._kw51_weather import N_HOURS, draw_weather, memory, smooth_noise
+from skthermo.datasets._kw51_campaign import (
+    BOX,
+    N_HOURS,
+    draw_weather,
+    memory,
+    missing_modes,
+    missing_temperatures,
+    smooth_noise,
+    thermal_multipliers,
+)
 from skthermo.fem import mac
 from skthermo.studies import Scenario
 

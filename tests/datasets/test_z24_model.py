@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from skthermo.datasets import load_z24, make_z24
-from skthermo.datasets._z24_model import (
+from skthermo.datasets._z24 import (
     CONSTANTS,
     DAMAGE_GROUPS,
     PARAMETERS,

@@ -12,7 +12,7 @@ from scipy.stats import beta, chi
 from scipy.stats import f as f_law
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
-from skthermo._tables.times import correlation_time
+from skthermo._tables.frames import correlation_time
 from skthermo.detection import MahalanobisDetector
 from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
 from skthermo.exceptions import FewRecordsWarning

@@ -57,9 +57,9 @@ def test_with_noise_all_inverses_end_at_the_same_estimate(models):
     assert table["error"].std() > 0.1
 
 
-def test_broken_lines_are_the_default_of_the_mapper(campaign):
+def test_piecewise_linear_regression_is_the_default_of_the_mapper(campaign):
     T, later = campaign.train[0], campaign.test[0]
-    lines = EXAMPLE.fitted_chain(campaign, EXAMPLE.regressors("truss")["broken lines"], seed=0)
+    lines = EXAMPLE.fitted_chain(campaign, EXAMPLE.regressors("truss")["piecewise-linear"], seed=0)
     default = clone(lines).set_params(mapper=TemperatureMapper()).fit(*campaign.train)
     assert_frame_equal(lines.predict(T), default.predict(T))
     assert_frame_equal(lines.predict(later), default.predict(later))
@@ -75,10 +75,10 @@ def test_trees_stay_at_their_last_value_and_lines_go_on(campaign):
     T, found = campaign.train[0], EXAMPLE.regressors("truss")
     changes = {
         name: EXAMPLE.beyond(EXAMPLE.fitted_chain(campaign, found[name], seed=0).predict, T, -1)
-        for name in ("random forest", "broken lines")
+        for name in ("random forest", "piecewise-linear")
     }
     assert EXAMPLE.beyond(campaign.law, T, -1) > 5
-    assert changes["random forest"] < 2 < changes["broken lines"]
+    assert changes["random forest"] < 2 < changes["piecewise-linear"]
 
 
 @pytest.mark.nightly
@@ -88,7 +88,7 @@ def test_mappers_have_complete_tables(models, tmp_path, monkeypatch):
     frozen_bridge(n_healthy=100, n_damaged=20).to_csv(path, index=False)
     assert EXAMPLE.find(tmp_path) == path
     assert EXAMPLE.find(tmp_path / "elsewhere") is None
-    regressors, few = EXAMPLE.regressors, ["quadratic", "broken lines"]
+    regressors, few = EXAMPLE.regressors, ["quadratic", "piecewise-linear"]
     for campaign, names in (
         (EXAMPLE.z24_campaign(models["Z24"][0], path), list(EXAMPLE.STYLES)),
         (EXAMPLE.kw51_campaign(models["KW51"][0], 0, EXAMPLE.Size(100, 20, 20)), few),

@@ -19,7 +19,7 @@ pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
 ]
 
-FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "broken lines", "broken lines, whitened", "linear regression")
+FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, whitened", "linear regression")
 
 
 @functools.cache
@@ -96,7 +96,7 @@ def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, judge
 def test_the_chain_predicts_nearly_as_well_as_a_direct_regression(frozen):
     """Within a tenth, in weather that neither has seen."""
     ratio = Z24.hold_out_table(frozen, [(True, 0.5), (False, 0.5)])["ratio"]
-    for regressor in ("broken lines", "boosted trees"):
+    for regressor in ("piecewise-linear", "boosted trees"):
         for kind in ("tracked", "sorted"):
             assert ratio[f"{regressor}, chain, {kind}, bounds 0.5"] < 1.1
 
@@ -128,7 +128,7 @@ def test_a_choice_sees_training_rows_only(frozen, few, monkeypatch):
     spoilt.T[frozen.n_train :], spoilt.F[frozen.n_train :] = 1e3, 1e3
     chosen, same = (BENCH.choose(one, some, n_repeats=2).ranking()["pod"] for one in (frozen, spoilt))
     assert chosen.equals(same)
-    assert chosen.index[0].startswith("broken lines")
+    assert chosen.index[0].startswith("piecewise-linear")
 
 
 @pytest.mark.parametrize("page", ["z24_bridge", "z24_detection", "z24_damage"])

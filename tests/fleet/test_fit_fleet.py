@@ -115,8 +115,8 @@ def test_a_bridge_fails_alone_and_is_named(fleet):
 
 
 def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
-    told = fleet.warnings.set_index(["bridge", "kind"])["times"].to_dict()
-    assert told == {("odd", "odd records"): 2, ("odd", "RuntimeWarning"): 1}
+    numbers = fleet.warnings.set_index(["bridge", "kind"])["times"].to_dict()
+    assert numbers == {("odd", "odd records"): 2, ("odd", "RuntimeWarning"): 1}
     assert fleet.table["warnings odd records"].to_dict() == dict.fromkeys("abcd", 0) | {"broken": 0, "odd": 2}
     failed, warned = fleet.caught
     assert failed.startswith("1 of 6 bridges have failed (broken), the first with FileNotFoundError: no records")
@@ -306,7 +306,7 @@ def test_wrong_arguments_are_named(fleet, tmp_path):
 
 
 @pytest.mark.nightly
-def test_a_monitor_that_is_replaced_is_kept_beside_and_told(tmp_path):
+def test_a_monitor_that_is_replaced_is_kept_beside_and_reported(tmp_path):
     makers, records = asked()
     fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01")})
     evaluated = next(tmp_path.glob("a-*.bridge")).read_bytes()
@@ -330,7 +330,7 @@ def test_what_the_owner_found_is_kept(tmp_path):
         fleet.acknowledge("x", 1, harmless=True)
 
 
-def test_records_that_are_no_tables_are_told():
+def test_records_that_are_no_tables_are_reported():
     makers, records = asked(n=(None, lambda: (1, 2)))
     fleet = fit_fleet(makers, records)
     assert "shapes () and (); expected tables" in fleet.table.loc["n", "error"]

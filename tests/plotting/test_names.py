@@ -15,7 +15,7 @@ from skthermo.plotting import (
     PredictionDisplay,
     StructureDisplay,
 )
-from skthermo.plotting._style import label_of
+from skthermo.plotting._display import label_of
 from skthermo.studies import pod_curve
 
 HOSTILE = "$E_{x$ & 50% <b>"

@@ -1,4 +1,4 @@
-"""Broken lines: what hinges append, and what linear regression makes of them."""
+"""Piecewise-linear regression: what hinges append, and what linear regression makes of them."""
 
 import numpy as np
 import pandas as pd
@@ -49,7 +49,7 @@ def test_missing_values_are_ignored_and_stay_missing():
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 6), st.integers(0, 10_000))
-def test_linear_regression_on_hinges_gives_any_broken_line(n_knots, seed):
+def test_linear_regression_on_hinges_gives_any_piecewise_linear_function(n_knots, seed):
     """Any continuous function with straight pieces between the knots, and beyond the data."""
     rng = np.random.default_rng(seed)
     x = np.sort(rng.uniform(-15, 35, 200))

@@ -6,7 +6,7 @@ import pytest
 from sklearn.impute import KNNImputer
 
 from skthermo.datasets import make_truss
-from skthermo.preprocessing import BiasAligner, KNNGapImputer, _nearest
+from skthermo.preprocessing import BiasAligner, KNNGapImputer, _impute
 
 RNG = np.random.default_rng(0)
 HOURS = pd.date_range("2025-01-01", periods=80, freq="h")
@@ -28,9 +28,9 @@ def test_imputer_gives_scikit_learns_values_on_a_frame_of_its_own(weights):
 @pytest.fixture
 def trees(monkeypatch):
     """Trees even for few rows and small pools."""
-    monkeypatch.setattr(_nearest, "FEW_PAIRS", 0)
-    monkeypatch.setattr(_nearest, "PAIRS_PER_POOL", 0.0)
-    monkeypatch.setattr(_nearest, "SMALL_POOL", 3)
+    monkeypatch.setattr(_impute, "FEW_PAIRS", 0)
+    monkeypatch.setattr(_impute, "PAIRS_PER_POOL", 0.0)
+    monkeypatch.setattr(_impute, "SMALL_POOL", 3)
 
 
 def imputed_by_definition(donors, row, column, n_neighbors, weigh):
@@ -105,9 +105,9 @@ def test_donors_are_a_copy():
 def test_trees_are_for_many_rows_of_few_patterns():
     rng = np.random.default_rng(0)
     few_patterns, many_patterns = (np.where(rng.random((9000, p)) < 0.1, np.nan, 1.0) for p in (6, 20))
-    assert _nearest.Donors(few_patterns).trees_are_faster(np.isnan(few_patterns))
-    assert not _nearest.Donors(few_patterns[:2000]).trees_are_faster(np.isnan(few_patterns[:2000]))
-    assert not _nearest.Donors(many_patterns).trees_are_faster(np.isnan(many_patterns))
+    assert _impute.Donors(few_patterns).trees_are_faster(np.isnan(few_patterns))
+    assert not _impute.Donors(few_patterns[:2000]).trees_are_faster(np.isnan(few_patterns[:2000]))
+    assert not _impute.Donors(many_patterns).trees_are_faster(np.isnan(many_patterns))
 
 
 def test_imputer_keeps_arrays_and_single_precision():

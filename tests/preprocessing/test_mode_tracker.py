@@ -15,8 +15,7 @@ from sklearn.utils import Bunch
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from skthermo.preprocessing.tracking._assignment import MISSED, assign
-from skthermo.preprocessing.tracking._reference import shape_agreement
+from skthermo.preprocessing._poles import MISSED, assign, shape_agreement
 from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)

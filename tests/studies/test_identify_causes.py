@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects, typical_rows
+from skthermo._effects import FrequencyEffects, StructuralChanges, typical_rows
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._causes import read_causes
 

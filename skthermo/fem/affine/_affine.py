@@ -7,8 +7,7 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import check_flag, check_theta
-from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, positive_integer
+from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, check_flag, check_theta, positive_integer
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
 from skthermo.fem.affine._base import (
     AffineBase,

@@ -12,9 +12,22 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.arguments import as_mapping, check_dofs, check_flag, check_theta, integer_row
 from skthermo._estimators.threads import map_on_blas_threads
-from skthermo._tables.arrays import Array, Bounds, Matrix, MatrixLike, RandomState, is_real, real_array, shape_array
+from skthermo._tables.arrays import (
+    Array,
+    Bounds,
+    Matrix,
+    MatrixLike,
+    RandomState,
+    as_mapping,
+    check_dofs,
+    check_flag,
+    check_theta,
+    integer_row,
+    is_real,
+    real_array,
+    shape_array,
+)
 from skthermo.fem._protocol import BatchModel, DamageableModel, DifferentiableModel, LocalModel, ModalModel
 from skthermo.fem._terms import warn_of_failures
 from skthermo.fem.affine._core import AffineCore

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU
 
-from skthermo._estimators.arguments import check_bounds, check_theta
 from skthermo._estimators.threads import map_on_blas_threads
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, RandomState, as_random_state
+from skthermo._tables.arrays import Array, Bounds, RandomState, as_random_state, check_bounds, check_theta
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import nominal_theta
 from skthermo.fem.affine._base import AffineBase, Change, Groups, Names

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import check_flag, check_path, check_theta
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, positive_integer, real_array
+from skthermo._tables.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
 from skthermo.fem.affine import check_different

@@ -12,10 +12,9 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._estimators.arguments import check_names, check_path
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import read_half, read_named_matrices
-from skthermo._tables.arrays import Matrix
+from skthermo._tables.arrays import Matrix, check_names, check_path
 from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
 

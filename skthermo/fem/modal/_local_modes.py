@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.arguments import check_dofs, check_model, check_theta, integer_row
-from skthermo._tables.arrays import Array, Matrix
+from skthermo._tables.arrays import Array, Matrix, check_dofs, check_model, check_theta, integer_row
 from skthermo.fem._protocol import LocalModel
 from skthermo.fem._terms import AffineTerms
 from skthermo.fem.modal._dense import hertz

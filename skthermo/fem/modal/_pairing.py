@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._estimators.arguments import check_model, check_theta
-from skthermo._tables.arrays import Array, real_array, shape_array, without_mask
+from skthermo._tables.arrays import Array, check_model, check_theta, real_array, shape_array, without_mask
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem._terms import nominal_theta
 

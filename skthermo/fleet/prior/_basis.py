@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, broken_lines, real_array, spread_evenly
+from skthermo._tables.arrays import Array, piecewise_linear, real_array, spread_evenly
 from skthermo.residuals.weather import TrainingRange
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
@@ -18,7 +18,7 @@ BREAKING = 0.02  # share from which lines in a component break
 
 @dataclass(frozen=True)
 class FleetBasis:
-    """Principal components of the standardised inputs, and broken lines in the largest; of zero mean in the fleet.
+    """Principal components of the inputs, and piecewise-linear functions of the largest, of zero mean in the fleet.
 
     The lines break at quantiles of the weather of all bridges and have unit variance there. Beyond the weather of the
     fleet they go on straight. ``covariance`` is that of the functions in the fleet. ``names`` are those of the inputs,
@@ -77,7 +77,7 @@ class FleetBasis:
         """The functions at rows of complete inputs, (n_samples, n_functions)."""
         places = (inputs - self.middle) @ self.components.T
         n_breaking = self.knots.shape[1]
-        lines = broken_lines(places[:, :n_breaking], self.knots)[:, n_breaking:]
+        lines = piecewise_linear(places[:, :n_breaking], self.knots)[:, n_breaking:]
         return (np.hstack([places, lines]) - self.centre) / self.scale
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from skthermo._tables.arrays import Array, rows_by_pattern
-from skthermo._tables.times import correlation_time
+from skthermo._tables.frames import correlation_time
 from skthermo.fleet.prior._basis import FleetBasis
 from skthermo.fleet.prior._posterior import OwnPrior, posterior
 from skthermo.fleet.prior._records import BridgeRecords

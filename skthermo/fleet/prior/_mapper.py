@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._estimators.arguments import check_flag
-from skthermo._tables.arrays import Array, as_columns
+from skthermo._tables.arrays import Array, as_columns, check_flag
 from skthermo._tables.frames import (
     check_same_rows,
     check_temperatures,
@@ -69,8 +68,8 @@ class FleetMapper(RegressorMixin, Estimator):
     Parameters
     ----------
     prior : FleetPrior, optional
-        Fitted. Without one, the bridge is on its own: broken lines in the weather of its own records, and a ridge of
-        the most likely strength.
+        Fitted. Without one, the bridge is on its own: piecewise-linear regression on the weather of its own records,
+        and a ridge of the most likely strength.
     covariates : mapping of str to value, optional
         Covariates of this bridge; what is not given counts as unknown.
     families : mapping of str to str, optional

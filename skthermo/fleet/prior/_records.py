@@ -12,8 +12,15 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, as_columns, spread_evenly
-from skthermo._tables.frames import check_columns, check_same_rows, check_temperatures, column_names, frame_like
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import (
+    check_columns,
+    check_same_rows,
+    check_temperatures,
+    column_names,
+    frame_like,
+    has_stamps,
+    row_times,
+)
 from skthermo._validation import check_array, check_is_fitted
 
 MOST_ROWS = 20_000

@@ -11,11 +11,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from skthermo._effects.frequencies import ALL_GROUPS
+from skthermo._effects import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import DAY, YEAR
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.drift._daily import DailyMeans, calendar

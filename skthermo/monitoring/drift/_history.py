@@ -10,11 +10,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from skthermo._effects.frequencies import ALL_GROUPS
+from skthermo._effects import ALL_GROUPS
 from skthermo._tables.arrays import Array, as_floats, is_real
-from skthermo._tables.frames import frame_like
+from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
-from skthermo._tables.times import YEAR, has_stamps
 
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import ALL_GROUPS, FrequencyEffects, healthy_frequencies, read_groups
+from skthermo._effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, spread_evenly
-from skthermo._tables.frames import check_same_rows, frame_like
-from skthermo._tables.times import YEAR, has_stamps
+from skthermo._tables.frames import YEAR, check_same_rows, frame_like, has_stamps
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown

@@ -13,8 +13,8 @@ from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.text import counted
-from skthermo._tables.times import DAY, YEAR, correlation_time
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes

@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, clone
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import correlation_time
 from skthermo._tables.text import probability_text
-from skthermo._tables.times import correlation_time
 from skthermo.detection import TemperatureCompensator
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.surrogate import TemperatureMapper

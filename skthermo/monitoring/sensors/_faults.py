@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.times import DAY_NS
+from skthermo._tables.frames import DAY_NS
 
 SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
 COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]

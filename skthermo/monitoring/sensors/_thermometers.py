@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
-from skthermo._tables.times import DAY, DAY_NS, YEAR
+from skthermo._tables.frames import DAY, DAY_NS, YEAR
 from skthermo.monitoring.sensors._changes import Days, Departures, ThermometerNoise
 from skthermo.residuals.gaussian import Gaussian
 

@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import columns_by_sensor, frame_like
-from skthermo._tables.times import DAY_NS
+from skthermo._tables.frames import DAY_NS, columns_by_sensor, frame_like
 from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
 from skthermo.monitoring.sensors._faults import DEPARTURES, Fault, SensorFaults
 from skthermo.monitoring.sensors._responses import CERTAIN, Responses

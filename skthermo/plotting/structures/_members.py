@@ -9,8 +9,7 @@ import numpy as np
 
 from skthermo._tables.arrays import Array
 from skthermo.fem import Structure
-from skthermo.plotting._axes import panels
-from skthermo.plotting._style import BLACK, drawing, pyplot
+from skthermo.plotting._display import BLACK, drawing, panels, pyplot
 from skthermo.plotting.structures._projection import Projection
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import numpy as np
 
 from skthermo._tables.arrays import Array
 from skthermo.fem import ModalModel, Structure
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import LIGHT, ORANGE
+from skthermo.plotting._display import LIGHT, ORANGE, Display
 from skthermo.plotting.structures._members import (
     add_members,
     check_structure,

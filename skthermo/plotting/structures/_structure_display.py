@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, real_array
 from skthermo.fem import Structure
-from skthermo.plotting._axes import legend_columns
-from skthermo.plotting._display import Display
-from skthermo.plotting._style import COLOURS, GREY, LIGHT, plain, pyplot, shortened
+from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_columns, plain, pyplot, shortened
 from skthermo.plotting.structures._members import (
     add_members,
     add_points,

@@ -2,7 +2,6 @@
 
 from skthermo.preprocessing.checks._findings import RecordFindings, check_records
 from skthermo.preprocessing.checks._plausible import Plausible
-from skthermo.preprocessing.checks._stuck import equal_runs
-from skthermo.preprocessing.checks._trend import residual_trend
+from skthermo.preprocessing.checks._signs import equal_runs, residual_trend
 
 __all__ = ["Plausible", "RecordFindings", "check_records", "equal_runs", "residual_trend"]

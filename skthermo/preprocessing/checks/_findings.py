@@ -10,19 +10,23 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import MARKERS, Table, check_same_rows, column_names, columns_by_sensor
+from skthermo._tables.frames import MARKERS, Table, check_same_rows, column_names, columns_by_sensor, row_times
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import row_times
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._exponential import trailing_means
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
-from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of
+from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
 from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
-from skthermo.preprocessing.checks._shift import TimeShift, best_shift, explained, with_past
-from skthermo.preprocessing.checks._stuck import stuck_runs
-from skthermo.preprocessing.checks._swaps import swapped_modes
-from skthermo.preprocessing.checks._trend import largest_step, trend_table
+from skthermo.preprocessing.checks._signs import (
+    TimeShift,
+    best_shift,
+    explained,
+    largest_step,
+    stuck_runs,
+    swapped_modes,
+    trend_table,
+    with_past,
+)
 
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail"]
 LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
@@ -153,8 +157,9 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
       times as long as all but three runs of the column are. Nearly all other periods of its length must vary by at
       least three steps of rounding, and its value must not be one at which the column rests again and again, as rain
       does at zero.
-    - What the *weather* explains: broken lines in up to three principal components of the temperatures, predicted out
-      of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every mode.
+    - What the *weather* explains: piecewise-linear regression in up to three principal components of the temperatures,
+      predicted out of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every
+      mode.
     - *Time shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
       less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
       Temperatures of up to a day before (24 rows without a ``DatetimeIndex``) are no finding: that may be inertia.

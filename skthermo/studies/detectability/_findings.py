@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_flag
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
 from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta, t
 
 from skthermo._tables.arrays import Array, is_real
-from skthermo._tables.times import correlation_times
+from skthermo._tables.frames import correlation_times
 
 BLOCK = 10  # length of a block, in correlation times
 LEAST_FREEDOM = 10  # fewest degrees of freedom of the variance; blocks are shortened to reach them

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
-from skthermo._estimators.arguments import check_flag
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, real_array
+from skthermo._tables.arrays import Array, check_flag, real_array
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._intervals import check_probability, clopper_pearson

@@ -17,8 +17,7 @@ from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats
-from skthermo._tables.frames import Table, column_names, frame_like
-from skthermo._tables.times import row_times, time_of
+from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._intervals import rate_of

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._estimators.arguments import check_jobs
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
-from skthermo._tables.arrays import as_random_state, positive_integer
+from skthermo._tables.arrays import as_random_state, check_jobs, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel

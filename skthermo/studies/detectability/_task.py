@@ -14,12 +14,18 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
-from skthermo._estimators.arguments import check_names, check_size
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once
-from skthermo._tables.arrays import Array, as_columns, as_floats, as_random_state, positive_integer
-from skthermo._tables.frames import Table, column_names
-from skthermo._tables.times import has_stamps, row_times, time_of
+from skthermo._tables.arrays import (
+    Array,
+    as_columns,
+    as_floats,
+    as_random_state,
+    check_names,
+    check_size,
+    positive_integer,
+)
+from skthermo._tables.frames import Table, column_names, has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets

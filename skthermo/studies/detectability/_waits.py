@@ -9,9 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, is_real
-from skthermo._tables.frames import Table
+from skthermo._tables.frames import Table, has_stamps, row_times, time_of
 from skthermo._tables.text import counted, duration_text
-from skthermo._tables.times import has_stamps, row_times, time_of
 from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
 from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_of
 

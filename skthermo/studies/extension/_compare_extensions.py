@@ -13,11 +13,18 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import clone
 
-from skthermo._estimators.arguments import check_noise, integer_row
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user, warnings_once, without_warnings
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, as_floats, as_random_state, positive_integer, real_array
+from skthermo._tables.arrays import (
+    Array,
+    as_floats,
+    as_random_state,
+    check_noise,
+    integer_row,
+    positive_integer,
+    real_array,
+)
 from skthermo._tables.frames import Table, check_same_rows, column_names
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise

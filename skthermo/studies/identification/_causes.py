@@ -9,10 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._effects.changes import HIGHEST_SEVERITY, StructuralChanges
-from skthermo._effects.frequencies import ALL_GROUPS, read_groups
-from skthermo._estimators.arguments import check_names
-from skthermo._tables.arrays import MatrixLike, is_real, real_array
+from skthermo._effects import ALL_GROUPS, HIGHEST_SEVERITY, StructuralChanges, read_groups
+from skthermo._tables.arrays import MatrixLike, check_names, is_real, real_array
 
 MOST_CAUSES = 3  # largest number of causes in one explanation
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._effects.changes import HIGHEST_SEVERITY
+from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import SPACE, chance_text, listed, percent
 from skthermo.exceptions import ResultWarning, SkthermoWarning

@@ -12,12 +12,10 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects
-from skthermo._estimators.arguments import check_jobs
+from skthermo._effects import FrequencyEffects, StructuralChanges
 from skthermo._estimators.warnings import warn_each, without_warnings
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state
+from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior, read_causes
 from skthermo.studies.identification._curves import Part, ShiftComparison
 from skthermo.studies.identification._evidence import Observed

@@ -10,12 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.arguments import seem_rad_per_s
 from skthermo._estimators.warnings import warn_user, warnings_once
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import check_same_rows
+from skthermo._tables.arrays import Array, as_floats, seem_rad_per_s
+from skthermo._tables.frames import check_same_rows, has_stamps, row_times
 from skthermo._tables.text import counted, listed, significant
-from skthermo._tables.times import has_stamps, row_times
 from skthermo._validation import check_array
 from skthermo.exceptions import (
     FewRecordsWarning,

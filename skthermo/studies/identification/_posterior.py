@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import logsumexp
 
-from skthermo._effects.frequencies import ALL_GROUPS
+from skthermo._effects import ALL_GROUPS
 from skthermo._tables.arrays import Array
 from skthermo.studies.identification._boxes import draws, log_probability
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause

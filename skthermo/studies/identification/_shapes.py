@@ -7,11 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._effects.changes import ChangedStructure
-from skthermo._effects.frequencies import central_differences
-from skthermo._estimators.arguments import check_noise
+from skthermo._effects import ChangedStructure, central_differences
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.arrays import Array, as_floats, check_noise
 from skthermo.exceptions import RecordsWarning
 
 STATES = ("healthy", "damaged")

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from skthermo._effects.frequencies import healthy_frequencies
-from skthermo._estimators.arguments import check_noise
-from skthermo._tables.arrays import Array
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._effects import healthy_frequencies
+from skthermo._tables.arrays import Array, check_noise
+from skthermo._tables.frames import has_stamps, row_times
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._effects.frequencies import read_groups
+from skthermo._effects import read_groups
 from skthermo._estimators.warnings import told_around, warn_user, without_warnings
 from skthermo._tables.arrays import as_random_state
 from skthermo.exceptions import ResultWarning

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._effects.changes import StructuralChanges
-from skthermo._effects.frequencies import FrequencyEffects
+from skthermo._effects import FrequencyEffects, StructuralChanges
 from skthermo._estimators.warnings import told_around
 from skthermo._tables.arrays import Array
 from skthermo.fem import Structure

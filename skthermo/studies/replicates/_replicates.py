@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, positive_integer
-from skthermo._tables.frames import Table, column_names, frame_like
-from skthermo._tables.times import has_stamps, row_times
+from skthermo._tables.frames import Table, column_names, frame_like, has_stamps, row_times
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.surrogate import FittedChain

@@ -12,10 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._estimators.arguments import as_mapping, check_names
-from skthermo._tables.arrays import HUGE, is_real, real_array
-from skthermo._tables.frames import Table
-from skthermo._tables.times import row_times, time_of
+from skthermo._tables.arrays import HUGE, as_mapping, check_names, is_real, real_array
+from skthermo._tables.frames import Table, row_times, time_of
 from skthermo._validation import check_is_fitted
 from skthermo.fem import FEModel
 from skthermo.surrogate import FittedChain

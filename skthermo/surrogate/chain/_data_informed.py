@@ -18,16 +18,18 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._estimators.arguments import check_flag, check_model, is_auto
-from skthermo._estimators.regressors import (
-    check_takes_weights,
-    fit_weighted,
-    inputs_of_last_step,
-    offers,
-    told_by_fleet,
-)
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
-from skthermo._tables.arrays import Array, MatrixLike, as_columns, as_floats, as_random_state, is_real
+from skthermo._tables.arrays import (
+    Array,
+    MatrixLike,
+    as_columns,
+    as_floats,
+    as_random_state,
+    check_flag,
+    check_model,
+    is_auto,
+    is_real,
+)
 from skthermo._tables.frames import (
     Table,
     check_columns,
@@ -49,9 +51,14 @@ from skthermo._validation import (
     _fit_context,
     check_array,
     check_is_fitted,
+    check_takes_weights,
+    fit_weighted,
+    inputs_of_last_step,
     last_step,
+    offers,
     seed_parts,
     seeded,
+    told_by_fleet,
     validate_data,
 )
 from skthermo.exceptions import UnevaluatedRowsWarning

@@ -12,13 +12,10 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.arguments import seem_rad_per_s
-from skthermo._estimators.regressors import offers, reach_of
-from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, column_names, columns_by_sensor
+from skthermo._tables.arrays import Array, as_floats, robust_deviation, seem_rad_per_s, spread_evenly
+from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, row_times
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import has_stamps, row_times
-from skthermo._validation import last_step
+from skthermo._validation import last_step, offers, reach_of
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape

@@ -16,24 +16,22 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.arguments import check_noise
-from skthermo._estimators.regressors import fit_weighted, offers, predicted_covariance, reach_of
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import (
     Array,
     as_columns,
     as_floats,
     as_random_state,
+    check_noise,
     is_real,
     median,
     patterns,
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like
+from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like, row_times
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.times import row_times
-from skthermo._validation import last_step
+from skthermo._validation import fit_weighted, last_step, offers, predicted_covariance, reach_of
 from skthermo.fem import FEModel
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals

@@ -15,23 +15,16 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.arguments import Reduce, as_mapping, is_auto
-from skthermo._estimators.regressors import (
-    fit_outputs,
-    inputs_of_last_step,
-    offers,
-    predicted_covariance,
-    reach_of,
-    told_by_fleet,
-    warn_of_fleet,
-)
 from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
 from skthermo._tables.arrays import (
     HUGE,
     Array,
     MatrixLike,
+    Reduce,
     as_columns,
     as_floats,
+    as_mapping,
+    is_auto,
     is_real,
     median,
     patterns,
@@ -41,7 +34,16 @@ from skthermo._tables.arrays import (
 )
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import last_step
+from skthermo._validation import (
+    fit_outputs,
+    inputs_of_last_step,
+    last_step,
+    offers,
+    predicted_covariance,
+    reach_of,
+    told_by_fleet,
+    warn_of_fleet,
+)
 from skthermo.exceptions import (
     FewRecordsWarning,
     ModelWarning,

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._estimators.arguments import check_model, check_noise, check_theta
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, as_floats
+from skthermo._tables.arrays import Array, Bounds, as_floats, check_model, check_noise, check_theta
 from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     CallbackSupport,

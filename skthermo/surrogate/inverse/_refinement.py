@@ -13,10 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils import Bunch
 
-from skthermo._estimators.arguments import by_mode, check_bounds, check_dofs, check_prior
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._io import with_progress
-from skthermo._tables.arrays import Array, real_array, robust_deviation, spread_evenly
+from skthermo._tables.arrays import (
+    Array,
+    by_mode,
+    check_bounds,
+    check_dofs,
+    check_prior,
+    real_array,
+    robust_deviation,
+    spread_evenly,
+)
 from skthermo.fem import FEModel, evaluate_modes, shape_components
 from skthermo.surrogate._simulator import Simulator
 

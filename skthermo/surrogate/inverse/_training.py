@@ -15,9 +15,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import Bunch
 
-from skthermo._estimators.arguments import is_auto, tolerance
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.arrays import Array, as_floats, is_auto, tolerance
 from skthermo._tables.frames import Table, column_names
 from skthermo._validation import validate_data
 from skthermo.exceptions import FewRecordsWarning, ModelWarning

@@ -94,7 +94,7 @@ def test_order_and_names_of_bridges_change_nothing(prior):
     assert_allclose(other.comparison_["gain"], prior.comparison_["gain"], rtol=1e-3)
 
 
-def test_an_atypical_is_told_from_the_fleet_and_loses_little(prior):
+def test_an_atypical_bridge_is_distinguished_from_the_fleet_and_loses_little(prior):
     ratios = []
     for seed in range(80, 86):
         T, F, _ = records(seed, 60, law=ATYPICAL)

@@ -1,1 +1,0 @@
-"""What changes of a structure do to its parameters and to its frequencies."""
