@@ -43,7 +43,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "preprocessing.checks": set(),
     "surrogate.inverse": set(),
     "surrogate.chain": {"surrogate.inverse"},
-    "plotting.structures": set(),
     "fleet": {"fleet.prior"},
     "fleet.prior": set(),
     "monitoring": {

@@ -486,7 +486,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("reporting/_choice.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
-    ("plotting/structures/_projection.py", "plotting/test_structures.py"): [
+    ("plotting/_structures.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_false_alarms.py", "monitoring/test_false_alarms.py"): [

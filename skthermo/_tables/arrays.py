@@ -483,11 +483,11 @@ def by_name(values: Any, names: Sequence[Any], what: str, kind: str = "parameter
     return [values[name] for name in names]
 
 
-def rows_by_name(table: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
+def rows_by_name(table: Any, names: Sequence[Any], what: str) -> Any:
     """A frame with labelled rows in the order of the names; anything else unchanged."""
     if not hasattr(table, "iloc") or table.ndim != 2 or is_numbered(table.index):
         return table
-    check_labels(list(table.index), names, what, kind)
+    check_labels(list(table.index), names, what, "parameters")
     return table.loc[list(names)]
 
 

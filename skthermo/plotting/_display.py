@@ -176,16 +176,16 @@ def legend_columns(labels: Sequence[str], figure: Figure, most: int) -> int:
     return int(np.clip(figure.get_figwidth() // widest, 1, most))
 
 
-def date_axis(ax: Axes, index: pd.Index, label: str | None = None) -> None:
+def date_axis(ax: Axes, index: pd.Index) -> None:
     """Ticks and label of an axis of time, or of the number of the record."""
     if isinstance(index, pd.DatetimeIndex):
         dates = drawing("matplotlib.dates")
         locator = dates.AutoDateLocator()
         ax.xaxis.set_major_locator(locator)
         ax.xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
-        ax.set_xlabel(label or "date")
+        ax.set_xlabel("date")
     else:
-        ax.set_xlabel(label or plain(index.name or "record"))
+        ax.set_xlabel(plain(index.name or "record"))
 
 
 def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 from skthermo._tables.arrays import Array
 from skthermo.fem import ModalModel, Structure
 from skthermo.plotting._display import LIGHT, ORANGE, Display
-from skthermo.plotting.structures._members import (
+from skthermo.plotting._structures import (
+    Projection,
     add_members,
     check_structure,
     corners,
@@ -20,7 +21,6 @@ from skthermo.plotting.structures._members import (
     sort_members,
     structure_axes,
 )
-from skthermo.plotting.structures._projection import Projection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

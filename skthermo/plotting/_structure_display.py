@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from skthermo._tables.arrays import Array, real_array
 from skthermo.fem import Structure
 from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_columns, plain, pyplot, shortened
-from skthermo.plotting.structures._members import (
+from skthermo.plotting._structures import (
+    Projection,
     add_members,
     add_points,
     check_structure,
@@ -23,7 +24,6 @@ from skthermo.plotting.structures._members import (
     sort_members,
     structure_axes,
 )
-from skthermo.plotting.structures._projection import Projection
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
