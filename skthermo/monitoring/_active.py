@@ -23,7 +23,7 @@ from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
-from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange
+from skthermo.residuals.weather import BEYOND, TrainingRange
 
 DECIMALS = 6  # of a damage index
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
@@ -221,9 +221,9 @@ class ActiveDetector(SavesFrames):
             if (seen[:-1] & ~seen[1:]).any():
                 lost = int(np.flatnonzero(seen[:-1] & ~seen[1:])[0])
                 raise ValueError(
-                    f"{target} that falls by {PROBED[lost]:g} standard deviations of the baseline is in alarm, and by "
-                    f"{PROBED[lost + 1]:g} it is not: a step of the detector drops or fills large changes; expected "
-                    "more alarm for more change: filter the baseline before fit"
+                    f"the detector is in alarm where {target} falls by {PROBED[lost]:g} standard deviations of the "
+                    f"baseline, and not where it falls by {PROBED[lost + 1]:g}: one of its steps drops or fills large "
+                    "changes; expected more alarm for more change: filter the baseline before fit"
                 )
             blind += [] if seen[-1] else [str(target)]
         if blind:
@@ -313,19 +313,19 @@ class ActiveDetector(SavesFrames):
         marks."""
         unknown = np.flatnonzero(np.isnan(index))
         causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
-        outside = self.far_outside(records.iloc[first:])
+        outside = self.extrapolated(records.iloc[first:])
         phrases = (
-            [causes.get(n, ""), mark, "temperatures far outside those of the baseline" if far else ""]
+            [causes.get(n, ""), mark, "extrapolated: temperatures outside those of the baseline" if far else ""]
             for n, (mark, far) in enumerate(zip(marks, outside, strict=True))
         )
         return ["; ".join(filter(None, parts)) for parts in phrases]
 
-    def far_outside(self, records: pd.DataFrame) -> NDArray[np.bool_]:
-        """Which records have a temperature far outside those of the baseline."""
+    def extrapolated(self, records: pd.DataFrame) -> NDArray[np.bool_]:
+        """Which records have a temperature outside those of the baseline, by more than a twentieth of their range."""
         if not self.temperatures:
             return np.zeros(len(records), dtype=bool)
         excess = self.weather.excess(records[self.temperatures])
-        return (np.nan_to_num(excess) > FAR_OUTSIDE).any(axis=1)
+        return (np.nan_to_num(excess) > BEYOND).any(axis=1)
 
 
 def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:

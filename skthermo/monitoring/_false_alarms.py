@@ -46,10 +46,9 @@ class EventState:
 
 @dataclass(frozen=True)
 class EventRule(SavesFrames):
-    """An event opens when ``persistence`` evaluated records in a row exceed ``threshold``.
+    """An event opens when ``persistence`` of the last ``2 persistence - 1`` evaluated records exceed ``threshold``.
 
-    That is when their level, the lowest index of the last ``persistence`` evaluated records, exceeds it; before there
-    are so many, it is 0. An event closes when the levels of ``hold`` have stayed within ``release``. Records that are
+    That is when their level, the median index of these records, exceeds it; those before the first count as 0. An event closes when the levels of ``hold`` have stayed within ``release``. Records that are
     not evaluated (NaN) neither open nor close it: the time of quiet counts only between evaluated records.
     """
 
@@ -81,11 +80,11 @@ class EventRule(SavesFrames):
 
 
 def levels(index: Array, persistence: int, recent: tuple[float, ...] = ()) -> tuple[Array, tuple[float, ...]]:
-    """The lowest index of the last evaluated records at each of them, and the indices that the next ones need."""
-    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), persistence - 1
+    """The median index of the last evaluated records at each of them, and the indices that the next ones need."""
+    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), 2 * (persistence - 1)
     values = np.append([*np.zeros(n), *recent][len(recent) :], index[known])
     if known.any():
-        level[known] = sliding_window_view(values, persistence).min(axis=1)
+        level[known] = np.median(sliding_window_view(values, n + 1), axis=1)
     return level, tuple(values[len(values) - n :].tolist())
 
 

@@ -132,6 +132,9 @@ class Monitor(SavesFrames, Estimator):
         After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
+    active_, status_ : object
+        The detector in charge with all by which it evaluates, and all that was evaluated so far. Both are immutable:
+        `update`, `refit` and `rebaseline` put others in their place.
 
     See Also
     --------
@@ -301,7 +304,7 @@ class Monitor(SavesFrames, Estimator):
         active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
         active.check()
         store = RecordStore.of(baseline, max_delay, max_jump, retention)
-        self._active, self._state = active, MonitorState.of(active, store)
+        self.active_, self.status_ = active, MonitorState.of(active, store)
         self.versions_ = versions()
         return self
 
@@ -337,10 +340,10 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         records = read_records(new, self.baseline_.columns, self.baseline_.index.tz)
-        intake = self._state.store.sort_in(records, check_flag(confirm, "confirm"))
-        state, answers = self._state.taken_in(self._active, intake)
+        intake = self.status_.store.sort_in(records, check_flag(confirm, "confirm"))
+        state, answers = self.status_.taken_in(self.active_, intake)
         _warn_of_not_evaluated(answers)
-        self._state = state
+        self.status_ = state
         return answers
 
     def state(self) -> Literal["healthy", "alarm", "not evaluated"]:
@@ -352,9 +355,9 @@ class Monitor(SavesFrames, Estimator):
             "alarm" while a damage event is open, else "healthy" or "not evaluated", as the newest record was.
         """
         check_is_fitted(self)
-        if self._state.log.is_open(DAMAGE):
+        if self.status_.log.is_open(DAMAGE):
             return "alarm"
-        evaluations = self._state.evaluations
+        evaluations = self.status_.evaluations
         return evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
 
     def years_watched(self, since: Any = None) -> float:
@@ -414,7 +417,7 @@ class Monitor(SavesFrames, Estimator):
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
         p_values = [
-            [estimate for taken, estimate in self._state.estimates if taken <= event["start"]][-1].p_value(
+            [estimate for taken, estimate in self.status_.estimates if taken <= event["start"]][-1].p_value(
                 event["peak"], n_years, tail_shape
             )
             for _, event in events.iterrows()
@@ -441,14 +444,14 @@ class Monitor(SavesFrames, Estimator):
             If there is no such event.
         """
         check_is_fitted(self)
-        events = self._state.log.events
+        events = self.status_.log.events
         if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
             raise ValueError(f"note is {note!r:.100}; expected text")
         of, now = events[event - 1], self.last_.as_unit("ns").value
         one = Acknowledgement(of.kind, of.peak_time, now, check_flag(harmless, "harmless"), note)
-        self._state = replace(self._state, acknowledgements=(*self._state.acknowledgements, one))
+        self.status_ = replace(self.status_, acknowledgements=(*self.status_.acknowledgements, one))
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
@@ -488,7 +491,7 @@ class Monitor(SavesFrames, Estimator):
         check_is_fitted(self)
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
-            records = self._active.corrections.cleaned(records)
+            records = self.active_.corrections.cleaned(records)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -542,9 +545,9 @@ class Monitor(SavesFrames, Estimator):
         return ActiveDetector.of(
             detector,
             trained,
-            self._active.columns if columns is None else columns,
+            self.active_.columns if columns is None else columns,
             self.targets_,
-            self._active.corrections if corrections is None else corrections,
+            self.active_.corrections if corrections is None else corrections,
             Memory.of(detector) if self.lookback is None else Memory.of_time(_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
@@ -553,7 +556,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, corrections, state = retraining.baseline, None, self._active.corrections, self._state
+        trained, end, corrections, state = retraining.baseline, None, self.active_.corrections, self.status_
         if retraining.kind == "new baseline":
             now = self.last_.as_unit("ns").value
             end, note = now + 10**9, f"ended by the new baseline since {retraining.since}"
@@ -571,8 +574,8 @@ class Monitor(SavesFrames, Estimator):
             options = {"fem": fem, "sensors": self.sensors}
             corrections = Corrections.of(whole, self.targets_, corrections.reference, self.units_, **options)
         active = self._activated(retraining.detector, trained, corrections=corrections)
-        self._active = replace(active, prior=retraining.prior, since=retraining.since)
-        self._state = state.handed_over(self._active, end)
+        self.active_ = replace(active, prior=retraining.prior, since=retraining.since)
+        self.status_ = state.handed_over(self.active_, end)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
@@ -625,29 +628,29 @@ class Monitor(SavesFrames, Estimator):
                 f"{'; beyond the limit' if one['beyond_limit'] else ''}"
                 for group, one in drift[drift["significant"]].iterrows()
             ]
-            n_days = self._state.corrections.drift.n_left_out
+            n_days = self.status_.corrections.drift.n_left_out
             lines += [f"drift: not followed for {counted(n_days, 'day')}, as responses changed at once"] * (n_days > 0)
         return "\n".join(lines)
 
     @property
     def detector_(self) -> Any:
         """The fitted detector."""
-        return self._active.detector
+        return self.active_.detector
 
     @property
     def trained_(self) -> pd.DataFrame:
         """What the detector in charge was fitted on."""
-        return self._active.trained.copy()
+        return self.active_.trained.copy()
 
     @property
     def lookback_(self) -> Memory:
         """Which earlier records the evaluation of a record needs."""
-        return self._active.memory
+        return self.active_.memory
 
     @property
     def false_alarm_estimate_(self) -> FalseAlarmEstimate:
         """How the threshold was set, and how many false events to expect."""
-        return self._active.estimates[DAMAGE]
+        return self.active_.estimates[DAMAGE]
 
     @property
     def threshold_(self) -> float:
@@ -662,62 +665,62 @@ class Monitor(SavesFrames, Estimator):
     @property
     def prior_(self) -> pd.DataFrame | None:
         """Records from before the intervention after which the baseline began anew."""
-        return self._active.prior
+        return self.active_.prior
 
     @property
     def since_(self) -> pd.Timestamp | None:
         """When that intervention was complete."""
-        return self._active.since
+        return self.active_.since
 
     @property
     def baseline_(self) -> pd.DataFrame:
         """Records of the baseline, raw."""
-        return self._state.store.baseline.copy()
+        return self.status_.store.baseline.copy()
 
     @property
     def records_(self) -> pd.DataFrame:
         """Records kept since the baseline, raw."""
-        return self._state.store.kept.copy()
+        return self.status_.store.kept.copy()
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
-        return self._state.corrected.loc[self._state.store.kept.index]
+        return self.status_.corrected.loc[self.status_.store.kept.index]
 
     @property
     def last_(self) -> pd.Timestamp:
         """Stamp of the newest record."""
-        return self._state.store.last
+        return self.status_.store.last
 
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record that is kept."""
-        return self._state.evaluations.copy()
+        return self.status_.evaluations.copy()
 
     @property
     def days_(self) -> pd.DataFrame:
         """Daily summaries."""
-        return self._state.days.copy()
+        return self.status_.days.copy()
 
     @property
     def counts_(self) -> dict[str, int]:
         """Numbers of records, and of values that were left out."""
-        return self._state.counts
+        return self.status_.counts
 
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1."""
-        return event_table(self._state.log.events, self._state.acknowledgements, self.last_.tz)
+        return event_table(self.status_.log.events, self.status_.acknowledgements, self.last_.tz)
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed."""
-        return self._active.corrections.faults(self._state.corrections)
+        return self.active_.corrections.faults(self.status_.corrections)
 
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        return self._active.corrections.drifts(self._state.corrections)
+        return self.active_.corrections.drifts(self.status_.corrections)
 
     def _responses(self, columns: list[Any], compensators: Sequence[TemperatureCompensator]) -> list[Any]:
         """Names of the responses: as given, those of the compensators, or those of the chain."""

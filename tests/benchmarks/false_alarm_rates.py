@@ -95,7 +95,7 @@ def cleaned(T, F):
 
 def series(monitor, records):
     """Rounded damage indices, as those of ``update``."""
-    values = -monitor.detector_.score_samples(records[monitor._active.columns])
+    values = -monitor.detector_.score_samples(records[monitor.active_.columns])
     return pd.Series(values, records.index).round(6)
 
 
@@ -112,7 +112,7 @@ def rows_of(name, law, is_cleaned, seed, also_by_update):
     monitor = Monitor(detector, sensors=False).fit(baseline)
     index = {s: series(monitor, T[YEAR:].join(one[YEAR:])) for s, one in F.items()}
     for persistence in PERSISTENCE:
-        rule = estimate_false_alarms(monitor._active.baseline_index, persistence=persistence).rule
+        rule = estimate_false_alarms(monitor.active_.baseline_index, persistence=persistence).rule
         events = find_events(index[0.0].to_numpy(), index[0.0].index, rule)
         if also_by_update and persistence == monitor.persistence:
             monitor.update(T[YEAR : 2 * YEAR].join(F[0.0][YEAR : 2 * YEAR]))

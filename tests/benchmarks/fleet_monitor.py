@@ -196,7 +196,7 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
     rule, before = monitor.false_alarm_estimate_.rule, baseline[-MEMORY:]
 
     def index_of(new):
-        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor._active.columns])
+        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor.active_.columns])
         return pd.Series(values[len(before) :], new.index).round(6)
 
     calm, found = index_of(healthy), {}

@@ -327,6 +327,6 @@ def test_a_kill_leaves_a_whole_state_that_goes_on_to_the_same_decisions(saved, r
             assert load_monitor(file).last_ in (records.index[day - 1], records.index[day])
     assert kills >= 3
     left = load_monitor(file)
-    left._state = replace(left._state, n_repeated=0)  # where the kill came after the state was saved
+    left.status_ = replace(left.status_, n_repeated=0)  # where the kill came after the state was saved
     assert_same_course(left, undisturbed)
     assert not list(tmp_path.glob(".*.unfinished"))

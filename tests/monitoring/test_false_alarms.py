@@ -24,11 +24,11 @@ def chi(random, shape, n_modes=6):
 
 def plain_events(index, times, rule):
     """Whether an event is open after each record, one after the other."""
-    is_open, quiet_since, after, last = False, None, [], [0.0] * rule.persistence
+    is_open, quiet_since, after, last = False, None, [], [0.0] * (2 * rule.persistence - 1)
     for value, time in zip(index, times, strict=True):
         if not np.isnan(value):
             last = [*last[1:], value]
-            value = min(last)
+            value = sorted(last)[rule.persistence - 1]
         if value > rule.release:
             is_open, quiet_since = is_open or value > rule.threshold, None
         elif value <= rule.release:
@@ -84,6 +84,14 @@ def test_change_that_lasts_is_found_by_as_many_records_as_asked_for():
     for persistence in (1, 2, 5):
         (start,) = find_events(index, times, EventRule(3.0, 1.0, DAY, persistence))["start"]
         assert start == times[20 + persistence - 1]
+
+
+@pytest.mark.parametrize("persistence", [2, 3, 4])
+def test_change_of_every_second_record_is_found_and_isolated_ones_are_not(persistence):
+    index, times = np.tile([9.0, 0.0], 20), stamps(40)
+    assert len(find_events(index, times, EventRule(3.0, 1.0, DAY, persistence))) == 1
+    alone = np.where(np.arange(40) % (2 * persistence - 1) < persistence - 1, 9.0, 0.0)
+    assert find_events(alone, times, EventRule(3.0, 1.0, DAY, persistence)).empty
 
 
 def test_a_season_with_more_noise_has_its_scale_and_others_have_that_of_chance():

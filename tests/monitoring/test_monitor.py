@@ -180,7 +180,7 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
 def test_memory_is_what_lags_and_windows_need(name):
     monitor, _, _ = fitted(name)
     assert str(monitor.lookback_) == DETECTORS[name][1]
-    evaluate, times = monitor._active, ALL.index.asi8
+    evaluate, times = monitor.active_, ALL.index.asi8
     rows = range(N_BASELINE, N_BASELINE + 3)
     alone = [evaluate.alone(ALL, times, row) for row in rows]
     np.testing.assert_allclose(evaluate.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
@@ -188,7 +188,7 @@ def test_memory_is_what_lags_and_windows_need(name):
 
 def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch):
     monitor, _, _ = fitted("lags")
-    evaluate, exact = monitor._active, ActiveDetector._exact
+    evaluate, exact = monitor.active_, ActiveDetector._exact
     edge = 3.0000005
     bits = iter([edge - 1e-12, edge + 1e-12])
 
@@ -394,7 +394,7 @@ def test_state_does_not_grow_with_history():
         sizes.append((len(monitor.records_), len(monitor.evaluations_), len(monitor.corrected_)))
     assert sizes[-1] == sizes[-2] == (81, 81, 81)
     assert len(monitor.days_) == 25
-    assert len(monitor._state.checkpoints) <= 9
+    assert len(monitor.status_.checkpoints) <= 9
     other = Monitor(DETECTORS["lags"][0], retention="20D").fit(BASELINE)
     assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is evaluated
     pd.testing.assert_frame_equal(other.days_, monitor.days_)

@@ -131,7 +131,7 @@ def retrained(
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
-    old, targets = monitor._active, list(monitor.targets_)
+    old, targets = monitor.active_, list(monitor.targets_)
     prior, since = monitor.prior_, monitor.since_
     baseline = pd.concat([old.trained, harvest.records])
     if prior is not None:
@@ -178,7 +178,7 @@ def retrained(
 def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = _stamp(since, monitor.trained_.index)
-    old, targets, prior = monitor._active, list(monitor.targets_), monitor.prior_
+    old, targets, prior = monitor.active_, list(monitor.targets_), monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
         prior = old.trained
