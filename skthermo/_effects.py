@@ -180,7 +180,7 @@ class FrequencyEffects:
         return cls(structure, theta, weights, np.log(healthy))
 
     def nominal(self) -> "FrequencyEffects":
-        """The same effects at the model's nominal state: drifted parameters would make mirrored groups seem to differ."""
+        """The same effects at the model's nominal state: drifted parameters make mirrored groups seem to differ."""
         theta = np.ones((1, self.theta.shape[1]))
         return FrequencyEffects.at(self.structure, theta, np.ones((1, self.healthy.shape[1])))
 
