@@ -18,7 +18,6 @@ SILENT_SECONDS = 1.0
 SECONDS_BETWEEN = 0.1
 WIDTH = 30
 
-
 Part = TypeVar("Part")
 _n_open = 0  # contexts within which no bar is drawn
 _stage = ContextVar("stage", default="")  # what an estimator is doing in this thread, which a bar names
@@ -29,9 +28,8 @@ def with_progress(
 ) -> Iterator[Part]:
     """Yield the results unchanged, and show on stderr how many are done; ``count`` says how many are in a part.
 
-    With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides: 1 shows the bar, 0 does not. Unset, the bar
-    appears only on a terminal or in a notebook, after a second, and only in the main thread of the main process: bars
-    of several workers would overwrite each other. Work within the parts draws none.
+    With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides, 1 or 0. Unset, the bar appears after a
+    second on a terminal or in a notebook, in the main thread of the main process.
     """
     if shown is not None:
         check_flag(shown, "progress")
@@ -97,8 +95,6 @@ def as_they_come(**options: Any) -> Parallel:
 def bar(done: int, total: int, seconds: float, unit: str = "samples") -> str:
     """One line: share, number, time passed and time left.
 
-    Examples
-    --------
     >>> bar(250, 1000, 60)
     ' 25 % |#######-----------------------| 250 of 1000 samples in 60 s, 180 s left   '
     """

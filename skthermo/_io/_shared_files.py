@@ -31,11 +31,6 @@ def alone_with(path: Path, seconds: float) -> Iterator[None]:
     """Be the only process that works on a file, which may be replaced meanwhile; wait for others so long at most.
 
     The lock is a file beside it, which says who holds it. What killed processes left half written is removed.
-
-    Raises
-    ------
-    TimeoutError
-        If another process still works on the file; it is named.
     """
     path = path.resolve()
     with open(path.with_name(f".{path.name}.lock"), "a+") as holder:

@@ -160,7 +160,6 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
 COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be told apart
 ACCURATE = 0.1  # largest relative standard deviation of the estimates of a recommended subset
 
-
 NO_INFORMATION = 1e-12
 """Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
 

@@ -44,7 +44,9 @@ def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], l
     """Keys and matrices: symmetric copies, dense or sparse as given."""
     if isinstance(terms, Mapping):
         pairs = list(terms.items())
-    elif isinstance(terms, Sequence) and all(_is_pair(term) for term in terms):
+    elif isinstance(terms, Sequence) and all(
+        isinstance(term, tuple) and len(term) == 2 and isinstance(term[0], tuple | str) for term in terms
+    ):
         pairs = list(terms)
     else:
         pairs = [((), terms)]
@@ -56,10 +58,6 @@ def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], l
         matrices.append(read_matrix(matrix, f"{what} term {key}", n_dof))
         n_dof = matrices[0].shape[0]
     return keys, matrices
-
-
-def _is_pair(term) -> bool:
-    return isinstance(term, tuple) and len(term) == 2 and isinstance(term[0], tuple | str)
 
 
 def _read_key(key, what: str) -> Key:

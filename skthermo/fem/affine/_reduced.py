@@ -58,7 +58,8 @@ def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
     """Add modes at the points of largest estimated error until estimate and true error at new points are small."""
-    random = own_stream(random_state)
+    own_seed = as_random_state(random_state).randint(2**32, size=8, dtype=np.uint32)
+    random = np.random.RandomState(own_seed)  # other points than those of a sample with the same seed
     nominal = nominal_theta(len(bounds))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     factors = factorise(stiffness)
@@ -99,10 +100,7 @@ def grow_basis(
 
 
 def basis_of(directions: Directions, full: AffineCore, tol: float) -> tuple[Array, AffineCore]:
-    """Basis vectors, the directions that hold ``tol`` or more of the strain energy of a snapshot, and the core on them.
-
-    No snapshot loses more than ``tol`` with any direction.
-    """
+    """Basis vectors, the directions with ``tol`` or more of the strain energy of a snapshot, and the core on them."""
     vectors = directions.vectors[:, directions.energies > tol]
     return vectors, full.projected(vectors, tol)
 
@@ -112,11 +110,6 @@ def guided(full: AffineCore, core: AffineCore, vectors: Array, tol: float) -> Af
     if not isinstance(full.solver, ShiftInvertSolver):
         return full
     return replace(full, solver=GuidedSolver(full.solver, core.solver, vectors, tol))
-
-
-def own_stream(seed: RandomState) -> np.random.RandomState:
-    """A random stream that differs from that of a sample drawn with the same seed."""
-    return np.random.RandomState(as_random_state(seed).randint(2**32, size=8, dtype=np.uint32))
 
 
 def drawn(bounds: Array, random: np.random.RandomState, n_points: int) -> tuple[Array, Array]:
@@ -177,10 +170,7 @@ def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
 
 
 def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
-    """Principal directions of vectors in the inner product of a stiffness, without those of less than some energy.
-
-    The directions times the roots of their energies stand for the vectors where further ones are added.
-    """
+    """Principal directions of vectors in the inner product of a stiffness, without those of less than some energy."""
     energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
     kept = energies > max(least, LEAST_ENERGY * energies[-1])
     return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])
@@ -303,10 +293,7 @@ class ReducedModel(AffineBase):
         known = dict(zip(self._parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
-        return self._regrown(full, np.array([known[name] for name in full.parameter_names]))
-
-    def _regrown(self, full: AffineBase, bounds: Array) -> Self:
-        """A reduced model of another full model; its basis starts from the present one."""
+        bounds = np.array([known[name] for name in full.parameter_names])
         twin = self._twin(_full=full, _bounds=bounds, _parameter_names=full.parameter_names, _groups=full._groups)
         twin._use(grow_basis(full._core, bounds, self._tol, 0, start=self._basis))
         return twin

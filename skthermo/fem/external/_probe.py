@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from functools import reduce
 from numbers import Integral
 from operator import add
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -46,13 +45,6 @@ class Program:
         return matrices
 
 
-class Difference(NamedTuple):
-    """The largest difference between a program's matrix and the affine one."""
-
-    matrix: str
-    share: float
-
-
 def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
     """|entry_ij| / sqrt(d_i d_j)."""
     size, scale = np.abs(entries.data), np.sqrt(np.abs(diagonal[entries.row] * diagonal[entries.col]))
@@ -77,20 +69,22 @@ def check_affine(program: Program, terms: tuple[Terms, Terms], row: Array) -> No
         raise ValueError(f"the program is not affine: {name!r} acts together with two or more of {list(names[:j])}")
 
 
-def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> Difference | None:
+def _difference(program: Program, terms: tuple[Terms, Terms], row: Array) -> tuple[str, float] | None:
+    """Which matrix of a program differs from the affine one, and by which share of the diagonal."""
     theta = by_name(row, program.parameter_names)
     for what, matrix, pairs in zip(MATRICES, program(row), terms, strict=True):
         affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
         entries = (matrix - affine).tocoo()
         share = relative(entries, matrix.diagonal())
         if share.size and share.max() > SAME:
-            return Difference(what, float(share.max()))
+            return what, float(share.max())
     return None
 
 
-def _refuse(names: str, found: Difference, where: str) -> None:
+def _refuse(names: str, found: tuple[str, float], where: str) -> None:
+    matrix, share = found
     raise ValueError(
-        f"the program is not affine in {names}: its {found.matrix} differs by {found.share:.2%} of the diagonal from "
+        f"the program is not affine in {names}: its {matrix} differs by {share:.2%} of the diagonal from "
         f"K_0 + sum of theta_j K_j at {where}; expected each parameter to act alone and to the first power (let one "
         "stand for the power or product), or CallableModel for what is not affine"
     )

@@ -165,7 +165,6 @@ STEPS = (3, 5, 5, 5)
 TOL_OF_SHAPES = 1e-12
 """Largest relative error of an eigenvalue whose shape is wanted: that of the shape is about its square root."""
 
-
 LEAST_MASS = 1e-12  # share of the largest mu below which a coordinate is massless
 
 

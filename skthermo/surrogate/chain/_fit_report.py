@@ -1,15 +1,15 @@
-"""What the fit of a chain has found about its records: numbers and warnings."""
+"""What others need of a chain that has been fitted, and the report of its fit: numbers and warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, seem_rad_per_s, spread_evenly
@@ -20,12 +20,103 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning,
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
-from skthermo.residuals.weather import SensorRegression
-from skthermo.surrogate.chain._fitted_chain import FittedChain
-from skthermo.surrogate.chain._records import TrainingRecords
-from skthermo.surrogate.chain._stages import Estimates
+from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.surrogate._simulator import Box, Simulator
+from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
+from skthermo.surrogate.chain._stages import Discrepancy, Estimates, ThermalModel, Weather
 from skthermo.surrogate.inverse import InverseSurrogate
 from skthermo.updating import cramer_rao
+
+
+class FittedChain(Protocol):
+    """A fitted `DataInformedFEM`, or anything that predicts and simulates as it does.
+
+    Attributes
+    ----------
+    model : FE model
+        What turns parameters into frequencies.
+    n_jobs : int or None
+        Number of parallel jobs.
+    n_features_in_ : int
+        Number of temperature columns.
+    mode_names_, parameter_names_ : list of str
+        Columns of the frequencies and of the parameters.
+    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, box_, thermal_, recorder_
+        What the chain has learned, as `DataInformedFEM` describes it.
+    parameters_, noise_, records_, report_
+        What it has found in the training records.
+
+    See Also
+    --------
+    DataInformedFEM : The class of skthermo with this interface.
+    """
+
+    model: FEModel
+    n_jobs: int | None
+    n_features_in_: int
+    mode_names_: list[Any]
+    parameter_names_: list[str]
+    inverse_: BaseEstimator
+    mapper_: BaseEstimator
+    aligner_: BaseEstimator
+    discrepancy_: Discrepancy
+    simulator_: Simulator
+    sensors_: SensorRegression
+    training_range_: TrainingRange
+    box_: Box | None
+    parameters_: Table
+    noise_: Array
+    thermal_: ThermalModel
+    recorder_: RecordSimulator
+    records_: TrainingRecords
+    report_: Any
+
+    @property
+    def training_records_(self) -> tuple[Table, Table]:
+        """Temperatures and frequencies that ``fit`` was given."""
+
+    def residuals(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
+
+    def weather(self, X: ArrayLike) -> Weather:
+        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        """
+
+    def predict(self, X: ArrayLike) -> Table:
+        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        """
+
+    def predict_parameters(self, X: ArrayLike) -> Table:
+        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        """
+
+    def simulate(self, X: ArrayLike, **options: Any) -> Table:
+        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius.
+        **options : dict
+            Damage, noise, gaps and outliers.
+        """
+
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
 MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed

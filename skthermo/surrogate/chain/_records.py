@@ -382,8 +382,7 @@ class RecordSimulator(SavesFrames):
     def service_of(self, F: ArrayLike | None = None) -> ServiceRecords:
         """Gaps and outliers of the training records.
 
-        An outlier is what is far from its neighbours in time or, with the frequencies of the training records before
-        they were cleaned, (n_records, n_modes), what cleaning has changed or removed.
+        With their frequencies before cleaning, outliers are what cleaning has changed or removed.
         """
         if F is None:
             return self.service

@@ -256,7 +256,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         random_state = 0 if self.random_state is None and self.memory is not None else self.random_state
         random = check_random_state(random_state)
         seed = None if random_state is None else random
-        self.n_steps_ = self._n_steps()
+        if self.model is None and self.refine:
+            raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
+        self.n_steps_ = 0 if self.model is None else self.steps_on(self.model)
         self.columns_ = InverseColumns.of(self)
         self.shape_inputs_ = self.columns_.shapes
         if self.model is not None:
@@ -546,14 +548,6 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     def _stated_noise(self) -> ArrayLike:
         """The noise of the simulations: what is stated, which is nothing where it is estimated."""
         return 0.0 if isinstance(self.noise, str) else self.noise
-
-    def _n_steps(self) -> int:
-        """Number of steps of the refinement: those asked for, else some where derivatives are exact."""
-        if self.model is None:
-            if self.refine:
-                raise ValueError(f"refine is {self.refine} without a model; expected an FE model to refine on")
-            return 0
-        return self.steps_on(self.model)
 
     def steps_on(self, model: FEModel) -> int:
         """Largest number of steps that refine an estimate on a model: 0 if estimates are not refined.

@@ -484,10 +484,8 @@ class ResponseSurface:
     def linearise(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies and d ln f / d ln theta."""
         z = (np.log(theta) - self.middle) / self.scale
-        log_f, slopes = (
-            np.empty((len(z), self.coefficients.shape[1])),
-            np.empty((len(z), self.coefficients.shape[1], z.shape[1])),
-        )
+        log_f = np.empty((len(z), self.coefficients.shape[1]))
+        slopes = np.empty((*log_f.shape, z.shape[1]))
         for rows in (slice(i, i + ROWS_PER_CHUNK) for i in range(0, len(z), ROWS_PER_CHUNK)):
             log_f[rows] = terms(z[rows], self.degree) @ self.coefficients
             slopes[rows] = (slopes_of_terms(z[rows], self.degree) @ self.coefficients).swapaxes(1, 2)
@@ -667,7 +665,8 @@ class Refinement:
 
     def _refine_block(self, objective: Objective, start: Array) -> Refined:
         """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
-        found = refine(objective, start, self.n_steps, sorts=self._sorts)
+        sorts = not getattr(self.simulator.model, "track", False)
+        found = refine(objective, start, self.n_steps, sorts=sorts)
         if self.simulator.reduced is not None:
             outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
             if outside.size:
@@ -677,10 +676,6 @@ class Refinement:
                 last.solves += found.solves[outside]
                 found.put(outside, last)
         return found
-
-    @property
-    def _sorts(self) -> bool:
-        return not getattr(self.simulator.model, "track", False)
 
     def _with_shapes(self, noise: Array) -> Array:
         """Standard deviations of all observations, (n_samples, n_observations), given those of ln f."""
