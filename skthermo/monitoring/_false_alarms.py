@@ -48,8 +48,9 @@ class EventState:
 class EventRule(SavesFrames):
     """An event opens when ``persistence`` of the last ``2 persistence - 1`` evaluated records exceed ``threshold``.
 
-    That is when their level, the median index of these records, exceeds it; those before the first count as 0. An event closes when the levels of ``hold`` have stayed within ``release``. Records that are
-    not evaluated (NaN) neither open nor close it: the time of quiet counts only between evaluated records.
+    That is when their level, the median index of these records, exceeds it; those before the first count as 0. An
+    event closes when the levels of ``hold`` have stayed within ``release``. Records that are not evaluated (NaN)
+    neither open nor close it: the time of quiet counts only between evaluated records.
     """
 
     threshold: float

@@ -64,8 +64,9 @@ class Monitor(SavesFrames, Estimator):
     false_alarms_per_year : float, default=1.0
         Damage events that a healthy structure has in a year, on average.
     persistence : int, default=3
-        Number of evaluated records in a row above the threshold by which an event opens: single outliers raise no
-        alarm, and damage is found by so many records later. 1 means that a single record does.
+        Number of records above the threshold by which an event opens, among the last ``2 persistence - 1`` that were
+        evaluated: three of five. Single outliers raise no alarm, and a change that lasts is found by its third record.
+        1 means that a single record opens an event.
     direction : {"both", "softening"}, default="both"
         Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
     max_delay : str or timedelta, default="7D"
@@ -97,16 +98,16 @@ class Monitor(SavesFrames, Estimator):
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
     threshold_ : float
-        A damage event opens with an index above it, of ``persistence`` evaluated records in a row.
+        A damage event opens with an index above it, of ``persistence`` of the last evaluated records.
     clear_threshold_ : float
-        An event closes when, for a day, no ``persistence`` records in a row have been above it.
+        An event closes when, for a day, fewer than ``persistence`` of the last records have been above it.
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage", "stiffening", or "measurement or structure": responses
         that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it is open),
-        ``peak`` (highest index that ``persistence`` records in a row reached; of the last kind, the largest number of
-        responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open), ``acknowledged``,
+        ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the largest number
+        of responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open), ``acknowledged``,
         ``harmless`` and ``note``.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
@@ -613,8 +614,8 @@ class Monitor(SavesFrames, Estimator):
             f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
             f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
             f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
-            f"damage events: open with {counted(self.persistence, 'record')} in a row above {self.threshold_:.4g}, "
-            f"close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            f"damage events: open with {self.persistence} of {2 * self.persistence - 1} records above "
+            f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
             *_events_in_words(self.events_),
         ]
         faults = self.faults_

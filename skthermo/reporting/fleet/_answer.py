@@ -59,7 +59,7 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any,
         )
     words = (
         "A monitor compares the natural frequencies of a bridge with those of its healthy time in the same weather. "
-        "An event begins when its damage index exceeds a threshold for several records in a row. An alarm does not "
+        "An event begins when its damage index exceeds a threshold for most of several records. An alarm does not "
         "prove damage, and healthy means that no change is seen, not that there is none."
     )
     return first_section("The bridges today", standing, [text for text in known if text], _steps(bridges), words)

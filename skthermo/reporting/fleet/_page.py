@@ -195,7 +195,7 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
     ]
     text = (
         "The number behind the small line is the newest damage index over its threshold: an event opens when it is "
-        "above 1 for several records in a row. The line shows the highest index of each week of the last year, and the "
+        "above 1 for most of several records. The line shows the highest index of each week of the last year, and the "
         "dashed line the threshold."
     )
     caption = "All bridges, the worst first: alarms, lost stiffness, bridges of which nothing is known, healthy ones."
