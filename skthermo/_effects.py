@@ -153,11 +153,8 @@ class ChangedStructure:
 
 @dataclass(frozen=True)
 class FrequencyEffects:
-    """Mean change of the logarithms of the measured frequencies that some amounts of change cause.
-
-    The mean is that over the weather of some records, as a weighted sum over a few rows of theta, with weights
-    (n_rows, n_modes).
-    """
+    """Mean change of the logarithms of the measured frequencies that some amounts of change cause, as a weighted sum
+    over a few rows of theta, with weights (n_rows, n_modes)."""
 
     structure: ChangedStructure
     theta: Array
@@ -183,11 +180,7 @@ class FrequencyEffects:
         return cls(structure, theta, weights, np.log(healthy))
 
     def nominal(self) -> "FrequencyEffects":
-        """The same effects at the model's nominal state.
-
-        Parameters that the records do not determine may have drifted, so that a symmetric structure is no longer
-        symmetric and mirrored groups would seem to differ.
-        """
+        """The same effects at the model's nominal state: drifted parameters make mirrored groups seem to differ."""
         theta = np.ones((1, self.theta.shape[1]))
         return FrequencyEffects.at(self.structure, theta, np.ones((1, self.healthy.shape[1])))
 
@@ -234,12 +227,9 @@ class FrequencyEffects:
 
 
 def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """A few rows of theta, and weights (n_rows, n_modes) that stand for all rows that have a mode.
-
-    They are the mean and a point to either side of it along each principal direction of ln theta. The weights give the
-    mean and the mean square along each direction of those rows of theta that have the mode, so that the mean of any
-    quadratic function of them is exact, but for products of different directions.
-    """
+    """A few rows of theta, and weights (n_rows, n_modes) that give the mean and the mean square along each principal
+    direction of ln theta over all rows that have a mode. The mean of any quadratic function of them is exact, but for
+    products of different directions."""
     shares = present / present.sum(axis=0)
     if len(theta) <= 3:
         return theta, shares

@@ -190,11 +190,8 @@ def seeded(random_state: Any) -> np.random.RandomState | None:
 
 
 def seed_parts(estimator: BaseEstimator, random_state: np.random.RandomState | None) -> None:
-    """Seed every ``random_state`` of an estimator and its parts that is None; None seeds nothing.
-
-    FE models, and the parts of a part that has its own seed, are not seeded. A seed is drawn for every other part, so
-    that giving one part its own seed does not change the seeds of the others.
-    """
+    """Seed every ``random_state`` of an estimator and its parts that is None, but not of FE models; None seeds nothing.
+    A seed is drawn for every part, so that giving one its own does not change the seeds of the others."""
     if random_state is None:
         return
     parameters = estimator.get_params(deep=True)
@@ -296,11 +293,8 @@ def import_optional(module: str, *, extra: str) -> ModuleType:
 
 
 def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
-    """A clone of the regressor fitted to all outputs, or one clone for each output if it takes only one.
-
-    Several outputs are simply tried, because scikit-learn's tag for them is not reliable: it is False for
-    ``MLPRegressor``.
-    """
+    """A clone of the regressor fitted to all outputs, or one clone for each output if it takes only one. Several
+    outputs are tried: scikit-learn's tag is not reliable (False for ``MLPRegressor``)."""
     try:
         return fit_weighted(clone(regressor), X, y, sample_weight)
     except InvalidParameterError:
@@ -385,10 +379,8 @@ def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
 
 
 def offers(estimator: Any, name: str) -> bool:
-    """Whether a fitted estimator offers a method or an attribute: that at the end of a pipeline or search counts.
-
-    Clones for each output offer what all of them do, and a chain with a mapper what that mapper offers.
-    """
+    """Whether a fitted estimator, or the end of a pipeline or search, offers a method or an attribute. Clones for each
+    output offer what all of them do, and a chain with a mapper what that mapper offers."""
     last = last_step(estimator)
     if isinstance(last, MultiOutputRegressor):
         return all(offers(part, name) for part in last.estimators_)
@@ -404,10 +396,8 @@ def inputs_of_last_step(estimator: Any, X: Any) -> Any:
 
 
 def predicted_covariance(estimator: Any, X: Any) -> Array:
-    """What a fitted estimator that offers ``predict_covariance`` says, (n_samples, n_outputs, n_outputs).
-
-    Clones for each output know nothing of each other: theirs is diagonal.
-    """
+    """What a fitted estimator that offers ``predict_covariance`` says, (n_samples, n_outputs, n_outputs); that of
+    clones for each output is diagonal."""
     last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)
     if isinstance(last, MultiOutputRegressor):
         variances = np.array([predicted_covariance(part, inputs)[:, 0, 0] for part in last.estimators_]).T

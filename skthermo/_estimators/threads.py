@@ -34,11 +34,8 @@ def _in_control() -> Iterator[None]:
 
 @contextmanager
 def single_blas_thread() -> Iterator[None]:
-    """Limit every BLAS library of this process to one thread.
-
-    The limit is global to the process. Contexts that overlap in several Python threads are therefore counted: the first
-    to enter sets the limit, and the last to leave lifts it.
-    """
+    """Limit every BLAS library of this process to one thread. Contexts that overlap in several Python threads are
+    counted: the first to enter sets the limit, and the last to leave lifts it."""
     global _n_inside, _limits
     with _lock:
         if not _n_inside:

@@ -54,11 +54,8 @@ def _within(**changes: Any) -> Iterator[None]:
 
 
 def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
-    """Warn at the nearest line outside skthermo, scikit-learn and joblib.
-
-    One cross-validation or search gives one warning of each kind, not one for each fold; a worker process, which sees
-    only its own folds, one in its life.
-    """
+    """Warn at the nearest line outside skthermo, scikit-learn and joblib, once for all folds of a cross-validation or
+    search; a worker process, which sees only its own folds, warns once in its life."""
     warn_each([category(message, kind)])
 
 
@@ -90,11 +87,8 @@ def _give(warning: Warning, kind: str) -> None:
 
 @contextmanager
 def counted_warnings() -> Iterator[Counter[tuple[str, str]]]:
-    """Count the warnings of a job by kind and text, in any thread; none is shown.
-
-    Jobs of one process take turns, because filters belong to the whole process. Warnings of other packages have their
-    class as their kind.
-    """
+    """Count the warnings of a job by kind and text (other packages' by class), in any thread; none is shown. Jobs of
+    one process take turns, because filters belong to the whole process."""
     counts: Counter[tuple[str, str]] = Counter()
     with _turn, _within(given=set()), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")

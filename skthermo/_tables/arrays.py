@@ -192,11 +192,8 @@ def rows_by_pattern(mask: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], ND
 
 
 def central_differences(function: Callable[[Array], Array], theta: Array, values: Array, step: float) -> Array:
-    """Derivatives of a function at rows of theta by a relative step, (n_samples, ..., n_parameters).
-
-    The function turns rows of theta into values (n_rows, ...); where it is NaN on one side, ``values``, those at theta,
-    take its place.
-    """
+    """Derivatives of a function of rows of theta by a relative step, (n_samples, ..., n_parameters). Where it is NaN on
+    one side, ``values``, those at theta, take its place."""
     n_samples, n_parameters = theta.shape
     steps = step * theta[:, np.newaxis] * np.eye(n_parameters)  # (sample, perturbed parameter, parameter)
     moved = np.stack([theta[:, np.newaxis] + steps, theta[:, np.newaxis] - steps])

@@ -111,11 +111,8 @@ def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
 
 
 def check_temperatures(T: ArrayLike) -> None:
-    """Raise an error for temperatures in kelvin, and for numbers that stand for a missing value, such as -999.
-
-    Numbers above 100 or below -80 count as missing values if they differ by more than 100 from the rest of their
-    column; so does any number below absolute zero.
-    """
+    """Raise an error for temperatures in kelvin, and for numbers that stand for a missing value: below absolute zero,
+    or above 100 or below -80 and more than 100 from the rest of their column."""
     for name, column in zip(column_names(T, PREFIXES["temperature"]), as_floats(T).T, strict=True):
         if np.fmin.reduce(column) >= -80 and np.fmax.reduce(column) <= 100:
             continue  # nothing to sort for

@@ -61,11 +61,9 @@ class SiteClimate:
         )
 
     def weather(self, first: pd.Timestamp, last: pd.Timestamp, key: tuple[int, ...]) -> pd.DataFrame:
-        """Hourly "air" temperature in C and "sun", its share of full sunshine on a horizontal deck.
-
-        The weather of an hour depends on its date and the key alone. The frame begins with the year before the
-        first record, so that what remembers the weather has settled.
-        """
+        """Hourly "air" temperature in C and "sun", its share of full sunshine on a horizontal deck, which depend on the
+        date and the key alone. It begins with the year before the first record, so that what remembers the weather has
+        settled."""
         years = range(first.year - 1, last.year + 1)
         index = pd.date_range(f"{years[0]}-01-01", f"{years[-1] + 1}-01-01", freq="h", inclusive="left", name="time")
         drawn = drawn_by_hour(years, 2, key)

@@ -218,10 +218,8 @@ def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
 
 
 def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = (), direction: str = "y") -> None:
-    """End an axis where the points of its lines end but for a few far ones; these are marked at the edge and counted.
-
-    Far is what would make the axis more than three times as long. ``keep`` are values that stay in view, ``also`` those
-    of bands, and ``direction`` names the axis, "x" or "y".
+    """End an axis ("x" or "y") where the points of its lines end but for those that would make it more than three times
+    as long; these are marked at the edge and counted. Values in ``keep`` and those of bands in ``also`` stay in view.
     """
     for mark in [*ax.lines, *ax.texts]:
         if mark.get_gid() == f"{BEYOND} {direction}":

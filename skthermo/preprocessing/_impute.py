@@ -210,10 +210,8 @@ class Donors:
         return len(rows_by_pattern(gappy)) * len(self.patterns) * PAIRS_PER_POOL < n_pairs
 
     def nearest(self, receivers: Array, observed: Mask, column: int, n_neighbors: int) -> tuple[Array, Rows]:
-        """The nearest donors that have a value in a column.
-
-        Returns their distances and row numbers, both (n_receivers, n_neighbors) and by ascending distance.
-        If there are fewer donors, the remaining distances are infinite and row numbers 0.
+        """Distances and row numbers of the nearest donors that have a value in a column, both (n_receivers,
+        n_neighbors) and ascending. If there are fewer donors, the remaining distances are infinite and row numbers 0.
         """
         distances = np.full((len(receivers), n_neighbors), np.inf)
         rows = np.zeros((len(receivers), n_neighbors), dtype=np.intp)

@@ -391,11 +391,8 @@ def warn_of_doubts(
 
 
 def _warn_of_losses(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names: list[str]) -> None:
-    """One warning for modes that no record has, and modes whose shapes are found at frequencies too far away.
-
-    Pairs are poles that were left over and modes of their shapes; ratios are those of their frequencies. Poles that are
-    2 pi times as high or as low as the reference are an error.
-    """
+    """One warning for modes that no record has, and modes whose shapes are found, among poles that were left over, at
+    frequencies too far away. Poles that are 2 pi times as high or as low as the reference are an error."""
     lost = ~found[pairs.record, pairs.mode]
     mode, record, ratio = pairs.mode[lost], pairs.record[lost], ratio[lost]
     in_rad = np.maximum(ratio, 1 / ratio) / (2 * np.pi)

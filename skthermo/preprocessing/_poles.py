@@ -311,11 +311,8 @@ def fitting_pairs(poles: Poles, modes: ReferenceModes, min_mac: float, close: fl
 
 
 def assign(record: Positions, pole: Positions, mode: Positions, cost: Array) -> Positions:
-    """Positions of the pairs that assign poles to modes one-to-one in every record, at the lowest total cost.
-
-    Where the best poles of all modes of a record differ, they are the solution; only other records are solved as
-    assignment problems. A mode may stay without a pole at the cost `MISSED`.
-    """
+    """Positions of the pairs that assign poles to modes one-to-one in every record, at the lowest total cost. A mode
+    may stay without a pole at the cost `MISSED`."""
     order = np.lexsort((cost, mode, record))
     is_first = np.ones(len(order), dtype=bool)
     is_first[1:] = (np.diff(record[order]) != 0) | (np.diff(mode[order]) != 0)
@@ -349,11 +346,9 @@ def assign_near(pairs: Pairs, reference: Array, max_shift: float) -> tuple[Posit
 def assign_while_following(
     pairs: Pairs, reference: Array, max_shift: float, *, order: Positions, n_records: float, max_drift: float
 ) -> tuple[Positions, Positions, Array]:
-    """The same, record by record in the order given, near exponential means of the frequencies assigned before.
-
-    A mode without a pole keeps its mean, and no mean leaves the reference by more than ``max_drift``. The third result
-    holds the means that every record was compared with.
-    """
+    """The same, record by record in the order given, near exponential means of the frequencies assigned before, which
+    are the third result. A mode without a pole keeps its mean, and no mean leaves the reference by more than
+    ``max_drift``."""
     gain = -np.expm1(-1 / n_records)
     lowest, highest = (1 - max_drift) * reference, (1 + max_drift) * reference
     by_record = np.argsort(pairs.record, kind="stable")

@@ -64,12 +64,6 @@ def test_batches_have_the_means_that_they_have_among_all_records(rows):
     np.testing.assert_allclose(found, whole[rows], rtol=1e-10)
 
 
-def test_shuffled_rows_come_back_in_their_own_order():
-    shuffled = T.sample(frac=1, random_state=0)
-    whole = ExponentialMeans(["1D"]).fit_transform(T)
-    np.testing.assert_allclose(ExponentialMeans(["1D"]).fit_transform(shuffled), whole.loc[shuffled.index], rtol=1e-10)
-
-
 def test_gaps_leave_no_row_out_and_only_the_current_value_missing():
     gappy = T.copy()
     gappy.iloc[50:60, 0] = np.nan
