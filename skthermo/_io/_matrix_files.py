@@ -73,9 +73,11 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
         return "failed"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command, pipes = [sys.executable, "-P", str(CHILD)], {"stdout": output, "stderr": subprocess.PIPE}
+    command, pipe = [sys.executable, "-P", str(CHILD)], subprocess.PIPE
     try:
-        done = subprocess.run(command, input=job.encode(), env=environment, timeout=seconds, check=False, **pipes)
+        done = subprocess.run(
+            command, input=job.encode(), env=environment, timeout=seconds, check=False, stdout=output, stderr=pipe
+        )
     except subprocess.TimeoutExpired:
         return f"took more than {seconds:.0f} s"
     return f"ended the process with exit code {done.returncode} {done.stderr[-300:].decode(errors='replace')}".strip()

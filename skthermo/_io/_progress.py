@@ -5,7 +5,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from contextvars import ContextVar
 from typing import Any, TypeVar
@@ -25,7 +25,7 @@ _stage = ContextVar("stage", default="")  # what an estimator is doing in this t
 
 def with_progress(
     parts: Iterable[Part], total: int, shown: bool | None, *, count: Callable[[Part], int], unit: str = "samples"
-) -> Iterator[Part]:
+) -> Generator[Part, None, None]:
     """Yield the results unchanged, and show on stderr how many are done; ``count`` says how many are in a part.
 
     With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides, 1 or 0. Unset, the bar appears after a
