@@ -38,6 +38,7 @@ def test_images_and_files_of_a_page_exist(page):
 def test_a_script_saves_its_open_figures_by_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["examples/plot_bridge.py", "--figures", str(tmp_path / "new")])
     folder = page_recipes.command_line().parse_args().figures
+    page_recipes.plt.close("all")
     assert page_recipes.save_figures(folder) == []
     assert not folder.exists()  # where nothing is open, as in a gallery
     for _ in range(2):

@@ -52,7 +52,7 @@ def path(tmp_path, ending):
 
 
 @each_form
-@pytest.mark.parametrize("stop", [FIRST + 3, DAMAGED + 4], ids=["in a window", "in an event"])
+@pytest.mark.parametrize("stop", [FIRST + 3, DAMAGED + 8], ids=["in a window", "in an event"])
 def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
     late = [stop + 1, stop - 2]  # both come after the monitor was loaded
     monitor.update(records[FIRST:stop].drop(records.index[late], errors="ignore"))
