@@ -437,8 +437,8 @@ def warn_of_fleet(rows: NDArray[np.bool_], consequence: str) -> None:
     """Count the rows in weather that the fleet has seen, and the records of this structure have not."""
     if rows.any():
         warn_user(
-            f"{rows.sum()} of {len(rows)} rows are in weather that the training records have not seen, and stand on "
+            f"{rows.sum()} of {len(rows)} rows are in weather that the training records have not seen, and rely on "
             f"what the fleet has shown there: {consequence}",
             WeatherWarning,
-            "rows that stand on the fleet",
+            "rows that rely on the fleet",
         )

@@ -19,7 +19,7 @@ from skthermo.exceptions import RecordsWarning
 Table: TypeAlias = Array | pd.DataFrame
 PREFIXES = {"temperature": "T", "frequency": "f"}
 ABSOLUTE_ZERO = -273.15  # degrees Celsius
-ABSURD = 20  # robust standard deviations from the median
+IMPLAUSIBLE = 20  # robust standard deviations from the median
 MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
 YEAR, DAY = pd.Timedelta(days=365.25), pd.Timedelta(days=1)
 DAY_NS = DAY.value  # nanoseconds
@@ -152,22 +152,22 @@ def warn_of_markers(X: ArrayLike) -> None:
         )
 
 
-def warn_of_absurd(X: ArrayLike) -> None:
-    """Warn of values that are absurdly far from the median of their column."""
+def warn_of_implausible(X: ArrayLike) -> None:
+    """Warn of values that are implausibly far from the median of their column."""
     values = as_floats(X)
     values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
     if np.isnan(values).all(axis=0).any():
         return
     deviations = robust_deviation(values)
-    far = (np.abs(values - median(values)) > ABSURD * deviations) & (deviations > 0)
+    far = (np.abs(values - median(values)) > IMPLAUSIBLE * deviations) & (deviations > 0)
     if far.any():
         row, column = np.argwhere(far)[0]
         warn_user(
-            f"{far.sum()} of {far.size} baseline values are absurdly far from the others of their column, the first "
+            f"{far.sum()} of {far.size} baseline values are implausibly far from the others of their column, the first "
             f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
-            f"damage; expected NaN where a value is wrong (absurd is more than {ABSURD} robust deviations away)",
+            f"damage; expected NaN where a value is wrong (more than {IMPLAUSIBLE} robust deviations away)",
             RecordsWarning,
-            "absurd values",
+            "implausible values",
         )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, as_random_state, check_noise, is_real, positive_integer
 from skthermo.datasets._fleet_site import (
-    ALIENS,
+    ATYPICAL_LAWS,
     Law,
     SiteClimate,
     Thermometer,
@@ -52,7 +52,7 @@ class FleetBridge:
         Its kind.
     seed : tuple of int
         What everything about it is drawn from.
-    alien : {"reversed", "doubled", "knee elsewhere"}, optional
+    atypical_law : {"reversed", "doubled", "knee elsewhere"}, optional
         How its thermal laws differ from those of its family.
 
     See Also
@@ -72,16 +72,16 @@ class FleetBridge:
     name: str
     kind: str
     seed: tuple[int, ...]
-    alien: str | None = None
+    atypical_law: str | None = None
 
     def __reduce__(self):
         """Leave out what can be built again."""
-        return FleetBridge, (self.name, self.kind, self.seed, self.alien)
+        return FleetBridge, (self.name, self.kind, self.seed, self.atypical_law)
 
     @property
     def is_atypical(self) -> bool:
         """Whether its thermal laws are not those of its family."""
-        return self.alien is not None
+        return self.atypical_law is not None
 
     @cached_property
     def covariates(self) -> dict[str, str | float]:
@@ -141,7 +141,7 @@ class FleetBridge:
             for zone, what in KINDS[self.kind].zones.items()
         }
         random = self._random("laws")
-        by_material = {what: draw_law(what, self.alien, random) for what in dict.fromkeys(zones.values())}
+        by_material = {what: draw_law(what, self.atypical_law, random) for what in dict.fromkeys(zones.values())}
         return {zone: by_material[what] for zone, what in zones.items()}
 
     def records(
@@ -422,6 +422,6 @@ def make_fleet(
         round_, turn = divmod(k, len(kinds))
         phase = first + turn / len(kinds)
         is_atypical = np.floor((round_ + 1) * atypical + phase) > np.floor(round_ * atypical + phase)
-        alien = ALIENS[stream(root, k).randint(len(ALIENS))] if is_atypical else None
-        bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), alien))
+        atypical_law = ATYPICAL_LAWS[stream(root, k).randint(len(ATYPICAL_LAWS))] if is_atypical else None
+        bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), atypical_law))
     return BridgeFleet(bridges)

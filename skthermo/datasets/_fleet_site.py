@@ -19,7 +19,7 @@ TILT = np.deg2rad(23.44)  # of the Earth's axis
 COLD_SCATTER = 0.25  # how much more the weather varies in winter than on average
 CLOUD_HOURS = 20.0
 REFERENCE = 10.0  # C, where the logarithm of the multiplier of a family's law is about 0
-ELSEWHERE = 14.0  # K, how far the knee of an alien law is moved
+ELSEWHERE = 14.0  # K, how far the knee of an atypical law is moved
 STYLES = ("T{i}", "TH-{i:02d}", "{role}_{i}", "temperature {i}")
 OFFSET, READING_NOISE = 0.7, (0.1, 0.4)  # C
 INERTIA = {"air": (0.0, 1.0), "deck": (3.0, 8.0)}  # hours
@@ -140,10 +140,10 @@ LAWS = {
 SCATTER = {"steel": 0.10, "concrete": 0.15, "composite": 0.15, "pavement": 0.25, "bearings": 0.30, "soil": 0.30}
 KNEE_SCATTER = 0.5  # K
 INERTIA_SCATTER = 0.2
-ALIENS = ("reversed", "doubled", "knee elsewhere")
+ATYPICAL_LAWS = ("reversed", "doubled", "knee elsewhere")
 
 
-def draw_law(material: str, alien: str | None, random: np.random.RandomState) -> Law:
+def draw_law(material: str, atypical_law: str | None, random: np.random.RandomState) -> Law:
     """The law of one part of a bridge: its family's with its own coefficients."""
     family, scatter = LAWS[material], SCATTER[material]
     law = replace(
@@ -154,7 +154,7 @@ def draw_law(material: str, alien: str | None, random: np.random.RandomState) ->
         hours=family.hours * np.exp(INERTIA_SCATTER * random.standard_normal()),
         sun=family.sun * np.exp(INERTIA_SCATTER * random.standard_normal()),
     )
-    return law if alien is None else estranged(law, alien)
+    return law if atypical_law is None else estranged(law, atypical_law)
 
 
 def estranged(law: Law, how: str) -> Law:

@@ -14,7 +14,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._estimators.warnings import explain_rows, explained_rows, warn_user
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import frame_like, row_times, warn_of_absurd, warn_of_markers
+from skthermo._tables.frames import frame_like, row_times, warn_of_implausible, warn_of_markers
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
@@ -137,7 +137,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """
         F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
-        warn_of_absurd(frame_like(X, F))
+        warn_of_implausible(frame_like(X, F))
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
         if n_rows < 2:
             raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")

@@ -38,7 +38,7 @@ TOLD = (
     "rows that cannot be predicted",
     "weather outside the training range",
     "sensor apart from others",
-    "rows that stand on the fleet",
+    "rows that rely on the fleet",
 )  # kinds of warnings that the compensator gives
 
 

@@ -319,7 +319,11 @@ def campaign_rows(world, fleet, groups, days_asked, starts, newcomers=None):
                     ways |= by_kind[member.bridge.kind].ways(name, start, days)
                     ways |= {"prior": prior.mapper(covariates=known_of(member.bridge, covariates.loc[list(known)]))}
                     found = judge(member, name, start, days, ways) + [row | {"days": days} for row in year]
-                    about = {"start": label, "kind": member.bridge.kind, "alien": member.bridge.alien or ""}
+                    about = {
+                        "start": label,
+                        "kind": member.bridge.kind,
+                        "atypical_law": member.bridge.atypical_law or "",
+                    }
                     rows += [row | about for row in found]
             if hasattr(member, "alone"):
                 member.alone.clear()
@@ -395,7 +399,9 @@ def main():
         fleet = make_fleet(options.bridges, random_state=seed)
         lawless = make_fleet(max(options.bridges // 2, 9), atypical=1.0, random_state=100 + seed)
         strangers = make_fleet(options.newcomers, atypical=1.0, random_state=200 + seed)
-        strangers = type(strangers)([type(b)(f"alien {n}", b.kind, b.seed, b.alien) for n, b in strangers.items()])
+        strangers = type(strangers)(
+            [type(b)(f"atypical {n}", b.kind, b.seed, b.atypical_law) for n, b in strangers.items()]
+        )
         for name in options.worlds:
             world = {"frequencies": Frequencies, "chains": Chain}[name]
             label = f"{name}, seed {seed}"
@@ -405,15 +411,15 @@ def main():
             shown(f"{label}: what the fleet costs (negative: gives)", losses(rows))
             shown(f"{label}: mean error by kind, %", table(rows, by=("kind", "start", "days")))
             shown(f"{label}: share of records in 90 % intervals", table(rows, what="inside"))
-            if (rows["alien"] != "").any():
-                shown(f"{label}: mean error of the atypical among them, %", table(rows[rows["alien"] != ""]))
+            if (rows["atypical_law"] != "").any():
+                shown(f"{label}: mean error of the atypical among them, %", table(rows[rows["atypical_law"] != ""]))
             print(prior.summary())
             print(f"a prior of {len(fleet) - len(fleet) // options.groups} bridges: {seconds / options.groups:.1f} s")
             missed += misses_of(label, rows)
             rows, *_ = campaign_rows(world, fleet, 1, options.days, options.starts, strangers)
             shown(f"{label}: new bridges with thermal laws of their own, mean error, %", table(rows))
             shown(f"{label}: what the fleet costs them", losses(rows))
-            shown(f"{label}: the same by law", table(rows, by=("alien", "days")))
+            shown(f"{label}: the same by law", table(rows, by=("atypical_law", "days")))
             missed += losses_of(f"{label}, atypical", rows)
             if options.quick:
                 continue

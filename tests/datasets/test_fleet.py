@@ -42,12 +42,12 @@ def test_seeds_give_other_bridges(fleet):
 
 
 @pytest.mark.parametrize("atypical", [0.0, 0.05, 0.3, 1.0])
-def test_the_share_of_aliens_holds_in_every_kind(atypical):
+def test_the_share_of_atypical_bridges_holds_in_every_kind(atypical):
     fleet = make_fleet(300, atypical=atypical, random_state=3)
     shares = pd.Series({name: bridge.is_atypical for name, bridge in fleet.items()}).groupby(fleet.covariates["kind"])
     assert (shares.sum() - 100 * atypical).abs().max() <= 1
     if atypical:
-        assert {bridge.alien for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
+        assert {bridge.atypical_law for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
 
 
 def test_records_depend_on_their_date_alone(bridge):
@@ -166,7 +166,7 @@ def test_laws_are_lines_above_the_knee_and_level_off_in_frost(material):
     np.testing.assert_allclose(rise, law.limit if law.gain else 0.0, rtol=1e-3)
 
 
-def test_coefficients_scatter_about_the_family_and_aliens_do_not():
+def test_coefficients_scatter_about_the_family_and_atypical_bridges_do_not():
     laws = [draw_law("bearings", None, np.random.RandomState(seed)) for seed in range(400)]
     slopes = np.log([law.slope / LAWS["bearings"].slope for law in laws])
     assert slopes.mean() == pytest.approx(0, abs=0.05)

@@ -19,7 +19,7 @@ ROOT = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, -0.3, 0.7]])
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "stand on what the fleet",
+        "rely on what the fleet",
         "of fold",
         "far outside those of the training",
         "far from their neighbours in time",

@@ -62,7 +62,7 @@ def in_service():
     records.iloc[25, :3] = np.nan
     records.iloc[30, 4], records.iloc[31, 0] = -999.0, 285.0
     records.iloc[40:, 2] = records.iloc[40, 2]
-    records.iloc[50, 3] *= 100  # absurd
+    records.iloc[50, 3] *= 100  # implausible
     return records.drop(records.index[[5, 6, *range(52, 64)]])
 
 

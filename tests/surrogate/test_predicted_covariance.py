@@ -21,7 +21,7 @@ from tests.bayesian import MEAN as FLEET_MEAN
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "stand on what the fleet",
+        "rely on what the fleet",
         "far outside",
         "of fold",
         "rows train",
@@ -128,9 +128,9 @@ def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of
     np.testing.assert_array_equal(table["from_fleet"], ~seen)
     assert list(table)[-2:] == ["outside_bounds", "from_fleet"]
     np.testing.assert_array_equal((table[["T1", "T2"]] > 0).any(axis=1), ~seen)
-    with pytest.warns(UserWarning, match="stand on what the fleet") as given:
+    with pytest.warns(UserWarning, match="rely on what the fleet") as given:
         fem.predict(T)
-    said = f"{(~seen).sum()} of 395 rows are in weather that the training records have not seen, and stand on what the"
+    said = f"{(~seen).sum()} of 395 rows are in weather that the training records have not seen, and rely on what the"
     assert [str(one.message).startswith(said) for one in given] == [True]
     with pytest.warns(UserWarning, match="1 of 1 rows have temperatures far outside those of the training records"):
         fem.predict(T[:1] + 200)

@@ -173,10 +173,10 @@ class TestWarningsOfFit:
         assert not caught(fem.fit, gappy, F)
         assert fem.report_.n_trained == 365
 
-    def test_absurd_records_are_named(self):
-        absurd = F.copy()
-        absurd.iloc[5, 2] = 999.0
-        fem = chain(mapper=TemperatureMapper(Ridge())).fit(T, absurd)
+    def test_implausible_records_are_named(self):
+        implausible = F.copy()
+        implausible.iloc[5, 2] = 999.0
+        fem = chain(mapper=TemperatureMapper(Ridge())).fit(T, implausible)
         outliers = fem.report_.findings.outliers
         assert outliers.to_numpy().sum() == outliers.iloc[5, 2] == 1
         assert "the first 999 Hz in 2025-01-06" in repr(fem.report_)

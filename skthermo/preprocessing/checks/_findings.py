@@ -39,7 +39,7 @@ SHORTEST_TREND = pd.Timedelta(days=90)  # of records; in fewer it may be the sea
 CERTAIN = 5.0  # standard errors of a trend
 LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that matters changes them
 LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
-ABSURD = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
+IMPLAUSIBLE = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
 PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
 
 WARNINGS = {
@@ -192,7 +192,7 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
         raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
     records = _Records.of(temperatures, frequencies, f" {unit}" if unit else "")
     findings = [*_stuck(records)]  # its rows then are NaN, and so on
-    findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _absurd(records)
+    findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _implausible(records)
     far = np.zeros_like(records.outliers)
     far[records.order] = records.outliers
     index = frequencies.index if isinstance(frequencies, pd.DataFrame) else None
@@ -349,11 +349,11 @@ def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Itera
     yield from _outliers_found(records, far & (deviation > 0))
 
 
-def _absurd(records: _Records) -> Iterator[list[object]]:
+def _implausible(records: _Records) -> Iterator[list[object]]:
     """Values of twice or half the median of their mode, which need no weather to be doubtful."""
     middle, deviation = median(records.F), robust_deviation(records.F)
     with np.errstate(invalid="ignore"):
-        far = (ABSURD * middle < records.F) | (middle / ABSURD > records.F)
+        far = (IMPLAUSIBLE * middle < records.F) | (middle / IMPLAUSIBLE > records.F)
         far &= (middle > 0) & (np.abs(records.F - middle) > OUTLYING * deviation)
     yield from _outliers_found(records, far)
 
