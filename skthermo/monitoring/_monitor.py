@@ -393,8 +393,9 @@ class Monitor(SavesFrames, Estimator):
         since : str or Timestamp, optional
             Only events that are open, or have ended since then; by default all.
         tail_shape : float, optional
-            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges (`Fleet.discoveries`);
-            0 is an exponential tail. By default the baseline decides whether that is heavy enough.
+            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges
+            (`~skthermo.fleet.Fleet.discoveries`); 0 is an exponential tail. By default the baseline decides whether
+            that is heavy enough.
 
         Returns
         -------

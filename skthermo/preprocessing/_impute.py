@@ -120,6 +120,30 @@ class KNNGapImputer(KNNImputer):
         )
 
     def fit(self, X: ArrayLike, y: None = None) -> KNNGapImputer:
+        """Store the records among which neighbours are searched.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records with gaps, such as temperatures and frequencies side by side.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        KNNGapImputer
+            The fitted imputer.
+
+        Raises
+        ------
+        ValueError
+            If a column has no value, unless ``keep_empty_features=True``.
+
+        Warns
+        -----
+        UserWarning
+            If there are numbers that stand for a missing value, such as -999, while ``missing_values`` is NaN.
+        """
         if isinstance(self.n_neighbors, bool):
             raise ValueError(f"n_neighbors is {self.n_neighbors}; expected an integer")
         if isinstance(self.weights, type) or isinstance(self.metric, type):
@@ -146,6 +170,18 @@ class KNNGapImputer(KNNImputer):
     @overload
     def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Fill the gaps.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Records with gaps.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features)
+            A frame gives a frame on its own index.
+        """
         check_is_fitted(self)
         X, values = with_nan(X), None
         names = [*getattr(X, "columns", ()), *self.get_feature_names_out()[self.n_features_in_ :]]
@@ -179,6 +215,18 @@ class KNNGapImputer(KNNImputer):
         return mean
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the columns: those of the input, then those of ``add_indicator``.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Names of the input's columns; by default those seen in `fit`.
+
+        Returns
+        -------
+        ndarray of str
+            Names of the columns, indicators included.
+        """
         check_is_fitted(self)
         names = list(_check_feature_names_in(self, input_features))
         indicators = [name for name in super().get_feature_names_out(input_features) if name not in names]
