@@ -29,6 +29,7 @@ DECIMALS = 6  # of a damage index
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
+SET_ASIDE = 3  # of the last five records with a response that is set aside open an event
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
 PROBED = (5.0, 20.0, 80.0)  # standard deviations by which each response is lowered to see whether there is an alarm
@@ -145,7 +146,7 @@ class ActiveDetector(SavesFrames):
     @property
     def rules(self) -> dict[str, EventRule]:
         """By which events of each kind open and close."""
-        set_aside = EventRule(threshold=0.5, release=0.5, hold=pd.Timedelta(0))
+        set_aside = EventRule(threshold=0.5, release=0.5, hold=DAY, persistence=SET_ASIDE)
         return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
 
     @property

@@ -28,23 +28,26 @@ class CorrectionState:
 class Corrected:
     """Records as the detector sees them, and what became of their values.
 
-    ``is_held`` are records of which a response was set aside although the structure may have moved it: they are not
-    healthy. ``n_held`` counts those that were set aside for so long that it is an event, and ``held`` names them.
+    ``n_held`` counts the responses of a record that were set aside although the structure may have moved them, and
+    ``held`` names them: where there are some, ``is_held``, a record is not healthy.
     """
 
     records: pd.DataFrame
-    is_held: NDArray[np.bool_]
     n_held: Array
     held: list[str]
     notes: list[str]
     n_left_out: NDArray[np.int64]
+
+    @property
+    def is_held(self) -> NDArray[np.bool_]:
+        """Which records have responses that were set aside."""
+        return self.n_held > 0
 
     @classmethod
     def joined(cls, parts: Sequence[Corrected]) -> Corrected:
         """One after the other."""
         return cls(
             pd.concat([part.records for part in parts]),
-            np.concatenate([part.is_held for part in parts]),
             np.concatenate([part.n_held for part in parts]),
             [name for part in parts for name in part.held],
             [note for part in parts for note in part.notes],
@@ -120,19 +123,19 @@ class Corrections:
         wrong = self.plausible.implausible(raw.to_numpy())
         day = raw.mask(wrong) if wrong.any() else raw
         T, F = day[self.temperatures], day[self.targets]
-        held, n_held = np.zeros(F.shape, dtype=bool), np.zeros(len(raw))
+        held = np.zeros(F.shape, dtype=bool)
         notes, n_left_out = self._said_of(raw, wrong), wrong.sum(axis=1)
         if self.sensors is None:
             T = T.drop(columns=self.reference)
         else:
             seen = self.sensors.masked(state.sensors, T, F, acknowledged)
-            T, F, held, n_held, n_left_out = seen.T, seen.F, seen.held, seen.opens, n_left_out + seen.n_left_out
+            T, F, held, n_left_out = seen.T, seen.F, seen.held, n_left_out + seen.n_left_out
             notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
         if self.drift is not None:
             F = self.drift.corrected(state.drift, F)
         names = [", ".join(str(self.targets[k]) for k in np.flatnonzero(row)) if row.any() else "" for row in held]
         records = pd.concat([T, F], axis=1)[[name for name in raw.columns if name not in self.reference]]
-        return Corrected(records, held.any(axis=1), n_held, names, notes, n_left_out)
+        return Corrected(records, held.sum(axis=1).astype(float), names, notes, n_left_out)
 
     def _said_of(self, raw: pd.DataFrame, wrong: NDArray[np.bool_]) -> list[str]:
         """A phrase about each record that has values which no sensor measures."""

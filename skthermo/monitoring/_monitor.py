@@ -152,10 +152,10 @@ class Monitor(SavesFrames, Estimator):
 
     More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
     25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not
-    evaluated, or in alarm if the others are. From the third such record on, an event of kind "measurement or structure"
-    is open. While it is, or while a response repeats one value, no record is healthy and no damage event closes, until
-    the response comes back or `acknowledge` says that its sensor is at fault. Smaller changes, and those of most
-    responses at once, are left to the detector; `fit` refuses one that drops large changes.
+    evaluated, or in alarm if the others are. With three such records of the last five, an event of kind "measurement or
+    structure" opens. While it is open, or while a response repeats one value, no record is healthy and no damage event
+    closes, until a day after the response has come back, or `acknowledge` says that its sensor is at fault. Smaller
+    changes, and those of most responses at once, are left to the detector; `fit` refuses one that drops large changes.
 
     A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
     a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in

@@ -68,6 +68,12 @@ class MonitorState(SavesFrames):
         return self.checkpoints[-1].corrections
 
     @property
+    def acknowledged(self) -> list[int]:
+        """Times (nanoseconds) at which what was set aside was said to be the fault of a sensor."""
+        by_peak = {one.peak_time: one for one in self.acknowledgements if one.kind == MEASUREMENT}
+        return [one.time for one in by_peak.values() if one.harmless]
+
+    @property
     def counts(self) -> dict[str, int]:
         """Numbers of records, and of values that were left out."""
         n_outside = self.n_too_late + len(self.store.ahead)
@@ -147,7 +153,7 @@ class MonitorState(SavesFrames):
         for row in range(len(known), len(raw)):
             said = [reasons[row], *(remark for remark, rows in remarks.items() if rows[row])]
             reasons[row] = "; ".join(filter(None, said))
-        is_held = seen.is_held | pending
+        is_held = seen.is_held | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
         points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
@@ -189,10 +195,16 @@ class MonitorState(SavesFrames):
         states = [begin.corrections]
         for day in parts[:-1]:
             states.append(corrections.advance(states[-1], day))
-        by_peak = {one.peak_time: one for one in self.acknowledgements if one.kind == MEASUREMENT}
-        acknowledged = [one.time for one in by_peak.values() if one.harmless]
-        seen = [corrections.corrected(*pair, acknowledged) for pair in zip(states, parts, strict=True) if len(pair[1])]
+        seen = [
+            corrections.corrected(*pair, self.acknowledged) for pair in zip(states, parts, strict=True) if len(pair[1])
+        ]
         return days, states, Corrected.joined(seen)
+
+    def _unexplained(self, log: EventLog, numbers: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Records in an event of responses set aside that nobody had acknowledged as harmless before them."""
+        starts = np.array([0, *(event.start for event in log.events)])[numbers]
+        said = [(starts <= time) & (time < times) for time in self.acknowledged]
+        return (numbers > 0) & ~np.any(said, axis=0) if said else numbers > 0
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
         """The answers to new records, and those to others that have changed."""

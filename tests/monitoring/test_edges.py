@@ -82,6 +82,15 @@ def test_no_change_of_any_size_or_pattern_is_healthy(factors, window, sensors, s
     assert set(opened["kind"]) & KINDS
 
 
+@pytest.mark.parametrize("pattern", [[0.6, 1.0], [0.6, 0.6, 1.0], [0.6, 1.0, 0.6, 0.6, 1.0]])
+def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
+    monitor, records = fitted(), changed({}, 20)
+    records["f3"] *= np.resize(pattern, len(records))
+    answers = monitor.update(records)
+    assert set(answers["state"].iloc[5:]) <= {"alarm", "not evaluated"}
+    assert (monitor.events_["kind"] == "measurement or structure").sum() == 1
+
+
 def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
     monitor = fitted()
     monitor.update(changed({"f3": 0.8}, 5))

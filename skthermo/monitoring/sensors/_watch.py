@@ -122,15 +122,13 @@ class WatchState:
 class Watched:
     """Records without what sensors at fault show, and what became of their values.
 
-    ``held`` are responses that were set aside although the structure may have moved them, (n_records, n_responses), and
-    ``opens`` how many of them have been for long enough for an event (NaN: for less). ``notes`` say of each record what
-    was left out, ``n_left_out`` how many of its values.
+    ``held`` are responses that were set aside although the structure may have moved them, (n_records, n_responses).
+    ``notes`` say of each record what was left out, ``n_left_out`` how many of its values.
     """
 
     T: pd.DataFrame
     F: pd.DataFrame
     held: NDArray[np.bool_]
-    opens: Array
     notes: list[str]
     n_left_out: Counts
 
@@ -223,7 +221,7 @@ class SensorWatch:
         given = np.hstack([temperatures[:, own], responses])
         out = self._left_out(state.faults)
         removed = (np.hstack([impossible, far]) | out) & ~np.isnan(given)
-        held, opens = self._held(state, ~np.isnan(responses), far, T.index.as_unit("ns").asi8, acknowledged)
+        held = self._held(state, ~np.isnan(responses), far, T.index.as_unit("ns").asi8, acknowledged)
         notes = self._notes(state.faults, given, np.hstack([impossible, far]), held, expected)
         for sensor, columns in enumerate(self.columns):
             temperatures[removed[:, sensor], columns[0]] = np.nan
@@ -234,7 +232,7 @@ class SensorWatch:
             temperatures[:, own] = np.where(np.isnan(temperatures[:, own]), filled, temperatures[:, own])
         kept = T.columns[~np.isin(np.arange(T.shape[1]), [own[n] for n in np.flatnonzero(self.is_reference)])]
         responses = np.where(removed[:, n_sensors:], np.nan, responses)
-        return Watched(frame_like(T, temperatures)[kept], frame_like(F, responses), held, opens, notes, removed.sum(1))
+        return Watched(frame_like(T, temperatures)[kept], frame_like(F, responses), held, notes, removed.sum(1))
 
     def _held(
         self,
@@ -243,8 +241,8 @@ class SensorWatch:
         far: NDArray[np.bool_],
         moments: Counts,
         acknowledged: Sequence[int],
-    ) -> tuple[NDArray[np.bool_], Array]:
-        """Responses set aside that the structure may have moved, and how many of them are so for long."""
+    ) -> NDArray[np.bool_]:
+        """Responses set aside that the structure may have moved."""
         n_sensors, faults = len(self.sensors), state.faults
         of_mode = {
             column - n_sensors: fault
@@ -258,13 +256,12 @@ class SensorWatch:
             for row in range(len(far)):
                 lengths[row] = runs.implausible(seen[row], far[row])
                 runs = replace(runs, counts=np.array([*runs.counts[:IMPLAUSIBLE], lengths[row]]))
-        held, certain = (lengths > 0) | is_fault, (lengths >= FEWEST[IMPLAUSIBLE]) | is_fault
+        held = (lengths > 0) | is_fault
         for mode, fault in of_mode.items():
             said = [time for time in acknowledged if time >= fault.since]
             if said:
                 held[moments > min(said), mode] = False
-        opens = (held & certain).sum(axis=1).astype(float)
-        return held, np.where((opens == 0) & held.any(axis=1), np.nan, opens)
+        return held
 
     def _notes(
         self,
