@@ -412,7 +412,7 @@ def predicted_covariance(estimator: Any, X: Any) -> Array:
 
 
 def reach_of(estimator: Any, X: Any) -> tuple[Any, Any] | None:
-    """The weather that a fitted estimator with ``reach_`` stands on, and X as the inputs that it is of; else None."""
+    """The weather that an estimator with ``reach_`` was fitted in, and X as the inputs that it is of; else None."""
     if not offers(estimator, "reach_"):
         return None
     last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)

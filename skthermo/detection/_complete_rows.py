@@ -101,7 +101,7 @@ class Regression:
             return clone(self.rest).fit(inputs[~apart], y[~apart]).predict(inputs[apart])
 
     def reach(self, X: Any) -> tuple[TrainingRange, Any] | None:
-        """The weather that the estimator stands on, and X as it is given to its last step; None without ``reach_``."""
+        """The weather that the estimator was fitted in, and X as its last step sees it; None without ``reach_``."""
         if not offers(self.rest.regressor_, "reach_"):
             return None
         with without_warnings():

@@ -112,7 +112,7 @@ def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Section:
         rows = [
             [str(kind), f"{row['n']:,}", element("span", row["first"], class_="text")] for kind, row in kinds.iterrows()
         ]
-        text = "Warnings of the fits, by kind. Those of a bridge stand on its own page."
+        text = "Warnings of the fits, by kind. Those of a bridge are on its own page."
         parts += [paragraphs(text), table("Warnings by kind.", ["Kind", "Bridges", "The first of them"], rows)]
     else:
         parts.append(paragraphs("There was no warning."))

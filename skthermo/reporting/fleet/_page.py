@@ -162,7 +162,7 @@ def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, wri
 
 
 def _as_written(now: Time) -> pd.Timestamp:
-    """The time that stands on the pages, as it was given: bridges may have records of different time zones."""
+    """The time shown on the pages, as it was given: bridges may have records of different time zones."""
     if now is None:
         return time_of(None).floor("min")
     zone = pd.to_datetime(str(now), errors="coerce").tz

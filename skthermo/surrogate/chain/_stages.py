@@ -156,7 +156,7 @@ class ChainInverse:
         return frame_like(F, np.hstack([as_floats(F), components]), names)
 
     def shape_warnings(self, aligned: Table) -> Iterator[SkthermoWarning]:
-        """Warnings about measured shapes, which stand beside the frequencies: kind and text of each."""
+        """Warnings about measured shapes, which are given beside the frequencies: kind and text of each."""
         inverse = self.refining
         if inverse is None:
             return
