@@ -12,8 +12,8 @@ import scipy.sparse
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, MatrixLike, is_real
 from skthermo.exceptions import ModelWarning
+from skthermo.fem._factors import factorise
 from skthermo.fem.affine import check_different, read_matrix
-from skthermo.fem.modal import factorise
 
 Key = tuple[str, ...]
 Terms = dict[Key, scipy.sparse.csc_array]
