@@ -156,8 +156,6 @@ def test_detectors_that_begin_alike_share_these_steps_and_their_residuals(fem, m
     several = {name: compensated(last) for name, last in lasts.items()}
     in_hertz = TemperatureCompensator(LinearRegression(), targets=MODES, whiten=None)
     several["other"] = make_pipeline(in_hertz, MahalanobisDetector())
-        TemperatureCompensator(LinearRegression(), targets=MODES, whiten=None), lasts["few"]
-    )
     alone = {name: study_of(fem, {name: one}, SCENARIOS).run(WEATHER) for name, one in several.items()}
     counted("fit_transform")
     counted("transform")
