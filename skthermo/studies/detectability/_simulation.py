@@ -230,7 +230,8 @@ class Measurement:
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
-    every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
+    every scenario; ``reference`` gives true frequencies for a scenario and a seed, and the FE model is asked for
+    frequencies of ``n_years`` such weathers in all."""
 
     fem: FittedChain
     candidates: Mapping[str, Candidate]
@@ -239,6 +240,7 @@ class Simulation:
     clean: Mapping[str, Sequence[Array]]
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
+    n_years: int = 1
 
     def first_repeat(
         self, measured: Mapping[str, Table], seeds: Sequence[int], errors: Mapping[str, Exception]
@@ -353,10 +355,13 @@ def transitions_of(decisions: Array, n_window: int) -> Array:
 
 
 def clean_frequencies(
-    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
+    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0, n_years: int = 1
 ) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
-    structure, clean = fem.thermal_.in_weather(fem.weather(T)), {}
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on.
+
+    The same chain, or others with its FE model, will simulate so many years like T in all.
+    """
+    structure, clean = fem.thermal_.in_weather(fem.weather(T), n_years * len(T)), {}
     for scenario in scenarios:
         draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
         changes = [scenario.changes(T, int(draw)) for draw in draws]
