@@ -56,7 +56,7 @@ from skthermo.residuals.weather import (
     warn_of_unseen,
 )
 
-AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
+AS_FLOATS = {"order": "C", "dtype": np.float64}
 
 
 class TemperatureCompensator(TransformerMixin, Estimator):
