@@ -66,6 +66,7 @@ from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._regression import TemperatureMapper, remembered
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
@@ -316,6 +317,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             check_takes_weights(self.mapper_)
         mended = {"outliers", "memory"} if self.mapper is None else {"outliers"}
         findings = findings_of(self._findings, T, F, mended=mended)
+        warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
         self.sensors_ = SensorRegression.of(T)
         filled = frame_like(T, self.sensors_.fill(T)[0])
