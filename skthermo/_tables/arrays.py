@@ -229,14 +229,19 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
             raise ValueError(f"{where} holds {kind}, such as {example!r:.60}; expected numbers{hint}")
 
 
-def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1) -> None:
-    """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
-    whose names are not all text or all numbers."""
-    expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
+def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
+    """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
     if scipy.sparse.issparse(values):
         raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
         raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
+
+
+def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1) -> None:
+    """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
+    whose names are not all text or all numbers."""
+    expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
+    refuse_no_array(values, what, expected)
     refuse_no_numbers(values, what)
     array: Any = values if hasattr(values, "dtypes") else np.asarray(values)
     shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])

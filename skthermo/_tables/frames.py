@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, refuse_no_array, robust_deviation
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
@@ -205,6 +205,8 @@ def first_disorder(X: Any) -> int:
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     """Raise an error if two tables differ in length or, where both are frames, in index."""
+    for what, table in zip(names, (X, y), strict=True):
+        refuse_no_array(table, what)
     if _num_samples(X) != _num_samples(y):
         raise ValueError(
             f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"
