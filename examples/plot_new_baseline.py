@@ -59,7 +59,7 @@ print(monitor.rebaseline(works_end).summary())
 
 # %%
 # A month later, a refit would add the new records. It says whether that is a gain; here it is none, because the hard
-# frost then raises the threshold, and the detector of the new baseline judges on. No record of the strengthened bridge
+# frost then raises the threshold, and the detector of the new baseline is in charge from then on. No record of the strengthened bridge
 # is in alarm until January.
 
 month = works_end + pd.Timedelta(days=30)

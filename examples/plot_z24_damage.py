@@ -288,7 +288,7 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 # Which detector would simulation have chosen?
 # --------------------------------------------
 # An engineer before the damage knows neither its place nor the weather to come. So every group of the model loses 10 to
-# 50 %. Detectors learn the first three quarters of the baseline, and judge simulated records in the weather of the
+# 50 %. Detectors learn the first three quarters of the baseline, and evaluate simulated records in the weather of the
 # last, which is ahead of them. They are ranked by the mean probability of detection (POD), those first that keep the
 # limit of 2 % false alarms. The last column moves all thresholds to 2 %.
 

@@ -59,13 +59,13 @@ for expected in (
 ):
     warnings.filterwarnings("ignore", expected)
 records = Records.of(bridge)
-print(f"Baseline: {len(records.baseline)} healthy records. Judged: {len(records.later)} later healthy ones and the")
+print(f"Baseline: {len(records.baseline)} healthy records. Evaluated: {len(records.later)} later healthy ones and the")
 print(f"{len(records.damaged)} after damage began. Every detector is asked for 2 % false alarms.")
 
 # %%
 # .. code-block:: none
 #
-#    Baseline: 2240 healthy records. Judged: 560 later healthy ones and the
+#    Baseline: 2240 healthy records. Evaluated: 560 later healthy ones and the
 #    130 after damage began. Every detector is asked for 2 % false alarms.
 #
 # The field's detectors
