@@ -10,6 +10,7 @@ import pandas as pd
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import significant
 from skthermo.reporting._html import Html, element, joined
+from skthermo.reporting._readable import Values, readable
 
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 640, 220, 44, 24, 20  # of a chart, and its margins, in units of its view box
 LINE_WIDTH, LINE_HEIGHT = 132, 30  # of a line of a table
@@ -26,7 +27,7 @@ def chart(
 ) -> Html:
     """Highest damage index of each day as dots over its threshold; ticks for days not evaluated, events shaded.
 
-    ``index`` has a row for each day, NaN where none was judged, on midnights without a time zone.
+    ``index`` has a row for each day, NaN where none was evaluated, on midnights without a time zone.
     """
     days, values = index.index, index.to_numpy(dtype=float)
     top = _highest(values, threshold)
@@ -55,11 +56,13 @@ def chart(
         *_months(days, step),
     ]
     box = {"viewBox": f"0 0 {WIDTH} {HEIGHT}", "class_": "chart", "role": "img", "aria_label": alt}
-    return element("svg", joined(part for part in parts if part), **box)
+    picture = element("svg", joined(part for part in parts if part), **box)
+    table = pd.DataFrame({"highest of the day": values, "threshold": threshold}, pd.Index(days, name="date"))
+    return readable(picture, Values("damage index of the last year", table), x / WIDTH)
 
 
 def line(index: Sequence[float], threshold: float) -> Html:
-    """Highest index of each week as a line, with its threshold; nothing where none was judged."""
+    """Highest index of each week as a line, with its threshold; nothing where none was evaluated."""
     values = np.asarray(index, dtype=float)
     values = np.pad(values, (-len(values) % WEEK, 0), constant_values=np.nan).reshape(-1, WEEK)
     weeks = np.fmax.reduce(values, axis=1, initial=-np.inf)

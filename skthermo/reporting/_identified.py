@@ -7,6 +7,7 @@ import pandas as pd
 from skthermo._tables.text import bounds_text, chance_text, share_text
 from skthermo.reporting._figures import draw_identified_damage
 from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
+from skthermo.reporting._readable import Values, csv_link
 from skthermo.studies import IdentifiedDamage
 
 LEAST = 0.005  # probability from which on an explanation has a row
@@ -43,6 +44,10 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
             "Explanations with their probabilities; severity of each group, on average over all explanations; shift of "
             "each natural frequency, measured and explained.",
             [draw_identified_damage(identified)],
+        ),
+        element(
+            "p",
+            csv_link(Values("identified damage", identified.table.rename_axis("group")), "Table of all groups (CSV)"),
         ),
     ]
     return section("identified", "Identified damage", *parts)
