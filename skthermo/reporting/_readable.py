@@ -6,6 +6,7 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import printable
@@ -45,7 +46,11 @@ def csv_link(values: Values, text: str = "CSV") -> Html:
         times = table.index.tz_localize(None)
         has_hours = (times != times.normalize()).any()
         table = table.set_axis(times.strftime("%Y-%m-%d %H:%M" if has_hours else "%Y-%m-%d"))
-    content = table.to_csv(float_format=DIGITS, index_label=values.table.index.name or "record", lineterminator="\n")
+    elif not is_numeric_dtype(table.index):
+        table = table.set_axis([printable(name) for name in table.index])
+    content = table.to_csv(
+        float_format=DIGITS, index_label=printable(values.table.index.name or "record"), lineterminator="\n"
+    )
     address = f"data:text/csv;charset=utf-8,{quote(content, safe=',:;+/')}"
     name = f"{values.name.replace(' ', '_')}.csv"
-    return element("a", text, href=address, download=name, aria_label=f"{values.name} (CSV)")
+    return element("a", text, href=address, download=name, aria_label=f"{text}: {values.name}")
