@@ -75,8 +75,9 @@ def learned(report: FitReport) -> list[Html]:
     error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
     return [
         paragraphs(
-            f"The model predicts the frequencies of these records with a mean error of {error}{SPACE}%; the mean frequency "
-            f"as prediction has {mean}{SPACE}%. Errors of records that the model has not learned from are usually larger.",
+            f"The model predicts the frequencies of these records with a mean error of {error}{SPACE}%; the mean "
+            f"frequency as prediction has {mean}{SPACE}%. Errors of records that the model has not learned from are "
+            "usually larger.",
             f"Of {counted(report.n_rows, 'record')}, {report.n_trained:,} were complete enough to learn from.",
         ),
         table(

@@ -23,11 +23,10 @@ return [...document.querySelectorAll("body *")]
   .map((one) => `${one.tagName}.${one.className.baseVal ?? one.className}: ${one.textContent.slice(0, 60)}`)
 """
 SMALL_TEXT = """
+const sizeOf = (one) => parseFloat(getComputedStyle(one).fontSize) * (one.ownerSVGElement ? one.getScreenCTM().a : 1);
 return [...document.querySelectorAll("body *")]
   .filter((one) => [...one.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim())
-                   && one.checkVisibility() && one.getClientRects().length
-                   && !["SCRIPT", "STYLE"].includes(one.tagName)
-                   && parseFloat(getComputedStyle(one).fontSize) < 11)
+                   && one.checkVisibility() && one.getClientRects().length && sizeOf(one) < 10)
   .map((one) => one.textContent.trim().slice(0, 40))
 """
 

@@ -24,7 +24,7 @@ script.textContent = "window.ran = true";
 document.body.append(script);
 return window.ran
 """
-KINDS = ["study", "monitor", "fleet"]
+KINDS = ["study", "monitor", "fleet", "one of the fleet"]
 EVENTS = [event_row("2025-03-01", "2025-03-09", acknowledged=True), event_row("2025-06-20", None, modes="f2, f1")]
 DRIFT = pd.DataFrame(
     {
@@ -53,10 +53,11 @@ def files(tmp_path_factory, browser):
     )
     subjects = {"study": (study, {"identified": found}), "monitor": (monitor, {}), "fleet": (fleet, {})}
     now = {"now": monitor.last_}
-    return {
+    files = {
         kind: owner_report(subject, folder / f"{kind}.html", **options, **(now if kind != "study" else {}))
         for kind, (subject, options) in subjects.items()
     }
+    return files | {"one of the fleet": folder / "fleet_pages" / "North_viaduct.html"}
 
 
 @pytest.fixture(params=KINDS)
@@ -98,7 +99,7 @@ def test_what_is_printed_is_whole(browser, file):
     assert pdf.count(b"/Type /Page\n") > 1
 
 
-@pytest.mark.parametrize("kind", ["study", "monitor"])
+@pytest.mark.parametrize("kind", ["study", "monitor", "one of the fleet"])
 def test_a_drawing_shows_the_value_under_a_finger_and_by_keys(browser, files, kind):
     from selenium.webdriver import Keys
 

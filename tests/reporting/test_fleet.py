@@ -121,10 +121,14 @@ def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert page.is_self_contained()
     assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "false-alarms", "warnings", "settings"]
     assert f"ValueError: {QUOTED}" in page.text
-    assert "OSError: checksum <wrong>" in page.text
+    for what in ("Its model could not be fitted to its records", "Its new records could not be evaluated"):
+        assert page.text.count(what) == 2  # as a state, and beside its message
     assert "expect 11 false alarms a year" in page.text
     assert all(line in page.text for line in fleet.discoveries(0.1).summary().splitlines())
     fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
+    broken = Page((file.parent / "all of #1_pages" / "broken_file.html").read_text(encoding="utf-8"))
+    assert "The file of its monitor cannot be read." in broken.paragraphs
+    assert "OSError: checksum <wrong>" in broken.text
     assert "with a mean error of" in fitted.text
     assert QUOTED in fitted.text
 
@@ -211,5 +215,5 @@ def test_a_line_shows_the_highest_of_each_week():
     index[63:] = np.nan
     drawn = line(index, 2.0)
     assert len(places(drawn, "dots above")) == 1
-    assert len(re.findall("[ML]", re.search('class="course" d="([^"]*)"', drawn)[1])) == 9
+    assert len(re.findall("[ML]", re.search('class="line" d="([^"]*)"', drawn)[1])) == 9
     assert line(np.full(20, np.nan), 2.0) == ""

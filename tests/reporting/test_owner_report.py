@@ -247,7 +247,7 @@ def test_control_characters_in_names_are_seen_and_harm_nothing():
     text.encode("utf-8")
 
 
-def test_records_that_cannot_be_judged_are_counted_and_not_called_healthy(chain, study, tmp_path):
+def test_records_that_cannot_be_evaluated_are_counted_and_not_called_healthy(chain, study, tmp_path):
     assert "The alarm system evaluated every simulated record." in Page(answer(study, [], [])).text
     partly = copy.copy(study)
     indices = {key: index.where(np.arange(len(index)) >= 30) for key, index in study.indices_.items()}
@@ -263,7 +263,7 @@ def test_records_that_cannot_be_judged_are_counted_and_not_called_healthy(chain,
 def test_text_has_enough_contrast(number):
     """Contrast of at least 4.5, as WCAG 2 asks of text at level AA."""
     colours = dict(re.findall(r"--(\w+): (#\w{6})", STYLE.split("@media")[number]))
-    for text in ("text", "soft", "accent", "healthy", "alarm", "unjudged"):
+    for text in ("text", "soft", "accent", "healthy", "alarm", "unknown"):
         for ground in ("page", "card"):
             assert contrast(colours[text], colours[ground]) >= 4.5
     assert contrast(colours["text"], colours["bar"]) >= 4.5

@@ -31,7 +31,7 @@ from tests.reporting.pages import HOSTILE, QUOTED, Page
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "promise", "settings"]
+SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "false_alarms", "settings"]
 SPACE = "\xa0"
 
 
@@ -289,7 +289,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
     assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
 
 
-def test_the_promise_counts_damage_events_beside_false_alarms_that_were_to_be_expected():
+def test_damage_events_are_counted_beside_the_false_alarms_that_were_to_be_expected():
     seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="stiffening")]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
     text = Page(false_alarms(standing_of(monitor))).text
