@@ -155,6 +155,11 @@ class Structure:
         return len(next(iter(self._coordinates.values())))
 
     @property
+    def n_dof(self) -> int:
+        """Number of free degrees of freedom."""
+        return len(self.dofs)
+
+    @property
     def nodes(self) -> dict[Hashable, Array]:
         """Coordinates of every node in m."""
         return dict(self._coordinates)
@@ -273,9 +278,9 @@ class Structure:
                 "that is not divided yet"
             )
         terms = model.stiffness_terms
-        if terms[0].shape[0] != len(self.dofs):
+        if terms[0].shape[0] != self.n_dof:
             raise ValueError(
-                f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {len(self.dofs)}; expected a "
+                f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {self.n_dof}; expected a "
                 "model that this structure has assembled"
             )
         parts: dict[str, dict[int, MatrixLike]] = {}
@@ -310,11 +315,7 @@ class Structure:
             part = {part_of[member]: STIFFNESS} if member in part_of else {}
             assembler.add(member, {properties: matrices[properties]}, element.dofs(self.dimension), {}, part)
         summed = [matrix for _, matrix in assembler.terms()]
-        if abs(sum(summed) - term).max() > SAME * abs(term).max():
-            raise ValueError(
-                f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
-                "expected the structure that assembled the model"
-            )
+        check_same(sum(summed), term, contents)
         names = [name for name in dict.fromkeys(part_of.values()) if assembler.positions(name)]
         return {name: summed[assembler.positions(name)[0]] for name in names}
 
@@ -396,8 +397,17 @@ class Structure:
 
     def __repr__(self) -> str:
         return (
-            f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
-            f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
+            f"{type(self).__name__}({len(self._coordinates)} nodes, {len(self._members)} members, "
+            f"{self.n_dof} degrees of freedom, groups {sorted(self._groups)})"
+        )
+
+
+def check_same(summed: Matrix, term: Matrix, contents: Sequence[tuple[Hashable, Key]]) -> None:
+    """Raise an error if the matrices of a term's members do not add up to the term."""
+    if abs(summed - term).max() > SAME * abs(term).max():
+        raise ValueError(
+            f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
+            "expected the structure that assembled the model"
         )
 
 
@@ -412,10 +422,20 @@ def _read_directions(along: object, node: Hashable) -> list[str]:
 
 
 def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    coordinates = read_coordinates(nodes)
+    places: dict[tuple[float, ...], Hashable] = {}
+    for node, xyz in coordinates.items():
+        twin = places.setdefault(tuple(xyz.tolist()), node)
+        if twin != node:
+            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+    return coordinates
+
+
+def read_coordinates(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    """Coordinates of every node, two or three finite numbers each."""
     if not nodes:
         raise ValueError("nodes is empty; expected a mapping of node to coordinates")
     coordinates: dict[Hashable, Array] = {}
-    places: dict[tuple[float, ...], Hashable] = {}
     first = np.shape(next(iter(nodes.values())))
     for node, place in nodes.items():
         try:
@@ -427,9 +447,7 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
                 f"node {node!r} has the coordinates {place!r}; expected two or three finite numbers, "
                 "as many as the first node has"
             )
-        twin = places.setdefault(tuple(xyz + 0.0), node)
-        if twin != node:
-            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+        xyz = xyz + 0.0  # no negative zeros
         xyz.flags.writeable = False
         coordinates[node] = xyz
     return coordinates
