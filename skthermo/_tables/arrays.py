@@ -5,7 +5,7 @@ return their argument, or raise a ValueError that says what was got and what was
 name.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time, timedelta
 from numbers import Integral, Real
 from os import PathLike
@@ -416,9 +416,12 @@ def check_path(path: Any, what: str = "path") -> Path:
     return Path(path)
 
 
-def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
-    """Different degrees of freedom of a model."""
-    array = integer_row(dofs, "dofs")
+Label: TypeAlias = tuple[Hashable, Hashable]
+
+
+def check_dofs(dofs: ArrayLike, n_dof: int, labels: Sequence[Label] = ()) -> NDArray[np.intp]:
+    """Different degrees of freedom of a model by position, from positions or from labels, such as (12, "x")."""
+    array = integer_row(_positions(dofs, labels, n_dof), "dofs")
     outside = array[(array < 0) | (array >= n_dof)]
     if outside.size:
         raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
@@ -426,6 +429,36 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     if (counts > 1).any():
         raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
     return array.astype(np.intp)
+
+
+def _positions(dofs: Any, labels: Sequence[Label], n_dof: int) -> Any:
+    """Positions of labels among those of a model; anything but pairs is returned as it is."""
+    rows = dofs.tolist() if isinstance(dofs, np.ndarray) else dofs
+    if not isinstance(rows, list | tuple) or not rows:
+        return dofs
+    if not all(isinstance(row, list | tuple) and len(row) == 2 for row in rows):
+        return dofs
+    if not labels:
+        raise ValueError(
+            f"dofs holds {rows[0]!r:.100}, but the model's degrees of freedom have no labels; expected 0 to {n_dof - 1}"
+        )
+    places = {label: i for i, label in enumerate(labels)}
+    unknown = [row for row in map(tuple, rows) if not is_label(row) or row not in places]
+    if unknown:
+        raise ValueError(
+            f"dofs holds {unknown[0]!r:.100}; expected degrees of freedom of the model, such as {labels[0]!r} "
+            "(model.dofs lists all)"
+        )
+    return [places[tuple(row)] for row in rows]
+
+
+def is_label(dof: Any) -> bool:
+    """Whether something can be the label of a degree of freedom, (node, direction)."""
+    try:
+        hash(dof)
+    except TypeError:
+        return False
+    return isinstance(dof, tuple) and len(dof) == 2 and not any(isinstance(part, bool) for part in dof)
 
 
 def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:
