@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import reduce
 from operator import add
 
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, Matrix
+from skthermo._tables.arrays import Array, Label, Matrix
 from skthermo.fem.affine import AffineModel
 from skthermo.fem.assembly._structure import (
     MASS,
@@ -28,10 +28,9 @@ Contents = Sequence[tuple[Hashable, tuple[str, ...]]]
 
 @dataclass(frozen=True)
 class ImportedMember(PhysicalElement):
-    """A member whose stiffness is a matrix of the whole model's degrees of freedom."""
+    """Ends or corners of a member, whose stiffness `ImportedStructure` holds, a matrix of all degrees of freedom."""
 
     corners: tuple[Hashable, ...]
-    matrix: scipy.sparse.csc_array = field(repr=False)
 
     _properties = ()
 
@@ -40,7 +39,7 @@ class ImportedMember(PhysicalElement):
         return self.corners
 
     def stiffness(self, coordinates: Array) -> ByProperties:
-        return {(): self.matrix}
+        return {}
 
     def mass(self, coordinates: Array) -> ByProperties:
         return {}
@@ -59,7 +58,7 @@ class ImportedStructure(Structure):
         member may be one element or several, such as all shells between two cross beams. What belongs to no member,
         and the mass, stay as they are.
     nodes : mapping of node to coordinates
-        (x, y) or (x, y, z) in m. Nodes at which no member ends are left out.
+        (x, y) or (x, y, z) in m. Nodes at which neither members end nor supports are, are left out.
     members : mapping of str to node or sequence of nodes
         Parameter of the model -> its ends or corners. They say which members follow each other, and where they are
         drawn: two nodes are a line, three or more a surface, and a single one is a point, such as a bearing.
@@ -119,11 +118,12 @@ class ImportedStructure(Structure):
         for what, argument in {"nodes": nodes, "members": members}.items():
             if not isinstance(argument, Mapping) or not argument:
                 raise ValueError(f"{what} is {argument!r:.200}; expected a mapping that is not empty")
-        matrices, self._rest = matrices_by_member(model, list(members))
-        coordinates, ends = placed(nodes, members)
-        drawn = {name: ImportedMember(ends[name], matrix) for name, matrix in matrices.items()}
-        super().__init__(coordinates, drawn, {n: s for n, s in (supports or {}).items() if n in coordinates}, groups)
-        self.dofs = list(getattr(model, "dofs", ()))
+        self._matrices, self._rest = matrices_by_member(model, list(members))
+        if not isinstance(supports, Mapping | None):
+            raise ValueError(f"supports is {supports!r:.200}; expected a mapping of node to directions")
+        coordinates, ends = placed(nodes, members, supports or {})
+        self._labels = model.dofs
+        super().__init__(coordinates, {name: ImportedMember(ends[name]) for name in members}, supports or {}, groups)
         self._mass = model.matrices(np.ones(len(model.parameter_names)))[1]
 
     @property
@@ -166,24 +166,29 @@ class ImportedStructure(Structure):
         for name, (what, _, _) in (bindings | damageable).items():
             if what == MASS:
                 raise ValueError(f"{name!r} multiplies mass, which is not known by member; expected groups")
-        members_of: dict[tuple[tuple[str, ...], frozenset[str]], list[Hashable]] = {}
+        members_of: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Hashable]] = {}
         for member in self._members:
-            key = tuple(self._bound(member, bindings, STIFFNESS))
-            members_of.setdefault((key, frozenset(self._bound(member, damageable, STIFFNESS))), []).append(member)
+            key, damage = (tuple(self._bound(member, bound, STIFFNESS)) for bound in (bindings, damageable))
+            members_of.setdefault((key, damage), []).append(member)
         terms = [(key, self._sum_of(members)) for (key, _), members in members_of.items()]
-        positions = {name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable}
+        contents: list[Contents] = [[(member, ()) for member in members] for members in members_of.values()]
+        if self._rest.nnz:
+            terms.append(((), self._rest))
+            contents.append([])
         return AffineModel(
-            [*terms, *([((), self._rest)] if self._rest.nnz else [])],
+            terms,
             self._mass,
             n_modes=n_modes,
             parameter_names=tuple(bindings),
-            groups=positions,
+            groups={name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable},
             track=track,
-            contents=[
-                *([(member, ()) for member in members] for members in members_of.values()),
-                *([()] if self._rest.nnz else []),
-            ],
+            dofs=self.dofs,
+            contents=contents,
         )
+
+    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
+        self._fixed_dofs(supports)
+        return self._labels
 
     def _sum_by_part(self, contents: Contents, part_of: Mapping[Hashable, str], term: Matrix) -> dict[str, Matrix]:
         check_same(self._sum_of([member for member, _ in contents]), term, contents)
@@ -194,11 +199,13 @@ class ImportedStructure(Structure):
         return {name: self._sum_of(members) for name, members in parts.items()}
 
     def _sum_of(self, members: Sequence[Hashable]) -> Matrix:
-        matrices = [self._members[member].matrix for member in members if member in self._members]
+        matrices = (self._matrices[member] for member in members if member in self._matrices)
         return reduce(add, matrices, scipy.sparse.csc_array((self.n_dof, self.n_dof)))
 
 
-def matrices_by_member(model: AffineModel, members: Sequence[str]) -> tuple[dict[str, Matrix], Matrix]:
+def matrices_by_member(
+    model: AffineModel, members: Sequence[str]
+) -> tuple[dict[Hashable, Matrix], scipy.sparse.csc_array]:
     """Stiffness of each member, the sum of the terms that its parameter multiplies, and of what belongs to none."""
     known, terms = model.parameter_terms, model.stiffness_terms
     unknown = [member for member in members if not known.get(member)]
@@ -213,21 +220,28 @@ def matrices_by_member(model: AffineModel, members: Sequence[str]) -> tuple[dict
     total = model.matrices(np.ones(len(known)))[0]
     if abs(reduce(add, terms, none) - total).max() > SAME * abs(total).max():
         raise ValueError(f"{model!r} is damaged or calibrated; expected the model as the program has written it")
-    matrices = {member: reduce(add, (terms[position] for position in known[member]), none) for member in members}
+    matrices: dict[Hashable, Matrix] = {
+        member: reduce(add, (terms[position] for position in known[member]), none) for member in members
+    }
     rest = reduce(add, (term for position, term in enumerate(terms) if position not in owners), none)
     return matrices, rest
 
 
 def placed(
-    nodes: Mapping[Hashable, Sequence[float]], members: Mapping[str, Hashable | Sequence[Hashable]]
-) -> tuple[dict[Hashable, Array], dict[str, tuple[Hashable, ...]]]:
-    """Coordinates of nodes at which members end, and these nodes by member; nodes at the same place become one."""
+    nodes: Mapping[Hashable, Sequence[float]],
+    members: Mapping[str, Hashable | Sequence[Hashable]],
+    supports: Collection[Hashable],
+) -> tuple[dict[Hashable, tuple[float, ...]], dict[str, tuple[Hashable, ...]]]:
+    """Coordinates of nodes that are used, and the ends of members; nodes at the same place become one."""
     ends = {name: _nodes_of(name, place, nodes) for name, place in members.items()}
-    coordinates = read_coordinates({node: nodes[node] for places in ends.values() for node in places})
+    used = [*(node for node in supports if node in nodes), *(node for places in ends.values() for node in places)]
     first: dict[tuple[float, ...], Hashable] = {}
-    same = {node: first.setdefault(tuple(place.tolist()), node) for node, place in coordinates.items()}
+    same = {
+        node: first.setdefault(tuple(place.tolist()), node)
+        for node, place in read_coordinates({node: nodes[node] for node in used}).items()
+    }
     joined = {name: tuple(dict.fromkeys(same[node] for node in places)) for name, places in ends.items()}
-    return {node: coordinates[node] for node in first.values()}, joined
+    return {node: tuple(place) for place, node in first.items()}, joined
 
 
 def _nodes_of(name: str, place: object, nodes: Mapping[Hashable, object]) -> tuple[Hashable, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, Matrix, MatrixLike, real_array
+from skthermo._tables.arrays import Array, Label, Matrix, MatrixLike, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element, check_matrices
 
@@ -20,7 +20,7 @@ Key = tuple[str, ...]
 class TermAssembler:
     """Sums members' matrices, at the free ``dofs``, into one term for each combination of parameters and groups."""
 
-    def __init__(self, dofs: Sequence[Dof]):
+    def __init__(self, dofs: Sequence[Label]):
         self._index = {dof: i for i, dof in enumerate(dofs)}
         self._entries: dict[tuple[Key, frozenset[str]], list] = {}
         self._contents: dict[tuple[Key, frozenset[str]], list[tuple[Hashable, Key]]] = {}
@@ -146,7 +146,7 @@ class Structure:
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
         self._groups = {group: self._read_group(group, names) for group, names in (groups or {}).items()}
-        self.dofs = self._free_dofs(supports)
+        self.dofs: list[Label] = list(self._free_dofs(supports))
         self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
 
     @property
@@ -274,8 +274,8 @@ class Structure:
         """
         if not getattr(model, "contents", ()):
             raise ValueError(
-                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, and "
-                "that is not divided yet"
+                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, such as "
+                "structure.assemble([...]), and that is not divided yet"
             )
         terms = model.stiffness_terms
         if terms[0].shape[0] != self.n_dof:
@@ -367,8 +367,8 @@ class Structure:
             raise ValueError(f"group {group!r} holds {list(unknown) or 'no member'}; expected names of members")
         return members
 
-    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
-        directions = TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
+    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
+        directions = self._directions
         used: set[Dof] = set()
         for name, element in self._members.items():
             for node, direction in element.dofs(self.dimension):
@@ -381,7 +381,14 @@ class Structure:
         for node in self._coordinates:
             if node not in connected:
                 raise ValueError(f"node {node!r} is disconnected: no member ends there")
-        fixed = set()
+        used -= self._fixed_dofs(supports)
+        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
+        if not free:
+            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
+        return free
+
+    def _fixed_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> set[Dof]:
+        directions, fixed = self._directions, set()
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
@@ -389,11 +396,11 @@ class Structure:
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
                 fixed.add((node, direction))
-        used -= fixed
-        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
-        if not free:
-            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
-        return free
+        return fixed
+
+    @property
+    def _directions(self) -> tuple[str, ...]:
+        return TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
 
     def __repr__(self) -> str:
         return (

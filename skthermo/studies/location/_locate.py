@@ -122,9 +122,7 @@ def locate_damage(
     """
     check_chain(fem)
     if not isinstance(structure, Structure):
-        raise ValueError(
-            f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model"
-        )
+        raise ValueError(f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model")
     contents = read_groups(fem.model, groups)
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
