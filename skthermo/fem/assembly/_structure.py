@@ -274,8 +274,8 @@ class Structure:
         """
         if not getattr(model, "contents", ()):
             raise ValueError(
-                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, such as "
-                "structure.assemble([...]), and that is not divided yet"
+                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, "
+                "by structure.assemble(...), and that is not divided yet"
             )
         terms = model.stiffness_terms
         if terms[0].shape[0] != self.n_dof:
