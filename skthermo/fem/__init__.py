@@ -12,7 +12,7 @@ from skthermo.fem._protocol import (
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.assembly import Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
-from skthermo.fem.external import CallableModel, load_affine, probe, read_triplets
+from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "Spring",
     "Structure",
     "add_noise",
+    "difference_terms",
     "evaluate",
     "evaluate_modes",
     "linearise",

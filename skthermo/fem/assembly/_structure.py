@@ -228,7 +228,7 @@ class Structure:
             parameter_names=tuple(bindings),
             groups={name: terms for name in damageable if (terms := stiffness.positions(name)) or groups is not None},
             track=track,
-            dof_names=[f"node {node!r} along {direction}" for node, direction in self.dofs],
+            dofs=self.dofs,
             contents=stiffness.contents,
         )
 

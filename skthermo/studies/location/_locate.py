@@ -71,8 +71,9 @@ def locate_damage(
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, as in `identify_damage`. They tell mirrored
         places of a symmetric structure apart, which frequencies do not.
-    dofs : array-like of shape (n_dofs,), optional
-        Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        Degrees of freedom of the shapes' rows, by position, counted from 0, or by label, as in ``fem.model.dofs``;
+        needed with ``shapes``.
     shape_noise : float, array-like of shape (n_modes,) or "fitted", default=0.01
         Errors of the shapes, as in `identify_damage`.
     random_state : int, RandomState or None, default=None
