@@ -30,7 +30,6 @@ AGAINST = -0.6  # correlation of a sensor with the others whose sign is wrong
 LOGGED = (*MARKERS, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
 BEYOND = 3.0  # times the range of the inner 80 % of a column, from its median, of a value that is none
 OTHER_MODE = 2.0  # times the median of a mode, or its inverse, of a frequency that is none of the mode
-NO_MODE = 10.0  # the same, of a frequency that is that of no mode
 FEW_LEVELS, MANY_VALUES = 3, 5  # different values that repeat, far from so many others
 FEW_VALUES, LEAST_KNOWN = 4, 50  # different values of a column of so many
 FEW_ROWS = 50
@@ -341,7 +340,7 @@ def _isolated_levels(column: Column, jump: float) -> Array:
 def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
     """Put aside what is no frequency, or no response of another kind.
 
-    Beside the weather, a value that may be another mode's is left to the search for exchanged modes and outliers.
+    Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
     """
     in_hertz, unit = unit == "Hz", f" {unit}" if unit else ""
     for place in range(len(F.columns)):
@@ -350,7 +349,8 @@ def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
         if not len(rest):
             column.put_aside("markers", column.levels, unit)
         elif len(rest) < len(column.ordered):
-            logged = column.levels[np.isin(column.levels, LOGGED)]
+            repeats = (column.counts > 1) | (column.levels < 0)
+            logged = column.levels[np.isin(column.levels, LOGGED) & repeats]
             low, middle, high = (rest[int(share * (len(rest) - 1))] for share in (0.1, 0.5, 0.9))
             column.put_aside("markers", logged[np.abs(logged - middle) > BEYOND * (high - low)], unit)
         if in_hertz:
@@ -363,11 +363,9 @@ def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
             isolated = isolated[(isolated > OTHER_MODE * middle) | (isolated < middle / OTHER_MODE)]
         column.put_aside("isolated level", isolated if width > 0 else isolated[:0], unit)
         deviation = QUARTILES * (column.quantile(0.75) - column.quantile(0.25))
-        levels, middle = column.levels, column.quantile(0.5)
-        far = (np.abs(levels - middle) > IMPLAUSIBLE * deviation) & (deviation > 0)
-        if beside_weather and in_hertz:
-            far &= (levels > NO_MODE * middle) | (levels < middle / NO_MODE)
-        column.put_aside("implausible values", levels[far], unit)
+        far = np.abs(column.levels - column.quantile(0.5)) > IMPLAUSIBLE * deviation
+        if deviation > 0 and not beside_weather:
+            column.put_aside("implausible values", column.levels[far], unit)
     _find_equal_columns(F)
 
 
