@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Hashable, Iterable
-from datetime import timedelta
+from datetime import timedelta, tzinfo
 from numbers import Integral, Real
 from typing import Any, TypeAlias
 
@@ -262,6 +262,30 @@ def time_of(T: Any, moment: Any, what: str) -> float:
     zone = f" in the time zone {T.index.tz}" if is_timed and T.index.tz is not None else ""
     expected = f"a position from 0, or a time{zone}" if is_timed else "a position from 0"
     raise ValueError(f"{what} is {moment!r} for {len(times)} records; expected {expected}")
+
+
+def as_moment(now: Any, zone: tzinfo | None) -> pd.Timestamp:
+    """A time in the time zone of records, by the clock if none is given; records without a zone have local times."""
+    try:
+        time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
+    except (TypeError, ValueError):
+        time = pd.NaT
+    if pd.isna(time) or (time.tz is not None and zone is None):
+        raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
+    if zone is None:
+        return time
+    return time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
+
+
+def check_duration(value: Any, name: str) -> pd.Timedelta:
+    """A duration of zero or more."""
+    try:
+        duration = pd.Timedelta(value).as_unit("ns")
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{name} is {value!r}; expected a duration, such as '7D'") from error
+    if not duration >= pd.Timedelta(0):
+        raise ValueError(f"{name} is {value!r}; expected a duration of zero or more, such as '7D'")
+    return duration
 
 
 def has_stamps(T: Any) -> bool:

@@ -29,7 +29,7 @@ from skthermo._estimators.warnings import counted_warnings
 from skthermo._io import without_bars
 from skthermo._validation import seed_parts
 from skthermo.metrics import mape
-from skthermo.monitoring import Monitor
+from skthermo.monitoring import Monitor, MonitorStatus
 
 SPEED = 1  # fastest compression of zlib, which adds a checksum
 LIBRARIES = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "dask", "distributed"}
@@ -82,11 +82,22 @@ class BridgeOutcome:
     facts: dict[str, float] = field(default_factory=dict)
     standing: dict[str, Any] = field(default_factory=lambda: dict(NOT_WATCHED))
     events: pd.DataFrame | None = None
+    status: MonitorStatus | None = None  # at the time of the newest record
     warnings: tuple[Warned, ...] = ()
     late_warnings: tuple[Warned, ...] = ()  # of the last update
     failures: tuple[Failure, ...] = ()
     seconds: float = 0.0
     n_bytes: int = 0
+
+    def status_at(self, now: Any, max_age: Any) -> MonitorStatus:
+        """How the bridge is at a time; after an error nothing is known of its newest records."""
+        error = "; ".join(str(failure) for failure in self.failures)
+        if self.status is None or not self.is_fitted:
+            return MonitorStatus("not evaluated", error or "there is no monitor").at(now)
+        status = self.status.at(now, max_age=max_age)
+        if not error:
+            return status
+        return replace(status, state="alarm" if status.state == "alarm" else "not evaluated", reason=error)
 
     @property
     def is_watched(self) -> bool:
@@ -149,7 +160,7 @@ class BridgeFit:
             return outcome, None
         try:
             monitor = _watching(self.monitor(chain), self.seed, T, F)
-            return replace(outcome, standing=standing_of(monitor), events=monitor.events_), monitor
+            return replace(outcome, **known_of(monitor)), monitor
         except (Exception, SystemExit) as error:
             return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
 
@@ -190,7 +201,7 @@ class BridgeUpdate:
                     raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
                 answers = monitor.update(new)
                 fitted = pickled((chain, monitor))
-                known: dict[str, Any] = {"standing": standing_of(monitor), "events": monitor.events_}
+                known = known_of(monitor)
             except (Exception, SystemExit) as error:
                 return self.lost(Failure.of(stage, error), warned(counts))
         known |= {"failures": (), "late_warnings": warned(counts), "n_bytes": len(fitted)}
@@ -268,6 +279,12 @@ def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
     report = getattr(chain, "report_", None)
     errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
+
+
+def known_of(monitor: Monitor) -> dict[str, Any]:
+    """What an outcome holds of a monitor."""
+    status = monitor.status(monitor.last_)
+    return {"standing": standing_of(monitor), "events": monitor.events_, "status": status}
 
 
 def standing_of(monitor: Monitor) -> dict[str, Any]:

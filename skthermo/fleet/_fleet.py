@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,11 @@ from skthermo._io import with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning
-from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, pickled, unpickled
+from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, known_of, pickled, unpickled
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
 from skthermo.fleet._storage import Storage
 from skthermo.fleet._workers import run_tasks
-from skthermo.monitoring import Monitor
+from skthermo.monitoring import Monitor, MonitorStatus
 
 MOST_NAMED = 5  # bridges or kinds in a sentence
 SILENT = 7  # days without a record, after which a bridge counts as silent
@@ -321,7 +322,31 @@ class Fleet:
         with storage.alone():
             chain, monitor = unpickled(storage.fitted(bridge))
             monitor.acknowledge(event, harmless=harmless, note=note)
-            storage.put(replace(storage.outcomes[bridge], events=monitor.events_), pickled((chain, monitor)))
+            storage.put(replace(storage.outcomes[bridge], **known_of(monitor)), pickled((chain, monitor)))
+
+    def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> dict[Hashable, MonitorStatus]:
+        """The state of each bridge at a time, and the facts behind it, for machines.
+
+        Parameters
+        ----------
+        now : str or datetime, optional
+            The time. By default that of the computer's clock; if records have no time zone, the local time.
+        max_age : str or timedelta, optional
+            Age of a newest record beyond which nothing is healthy. By default the usual time between the records of
+            the bridge, and two days more.
+
+        Returns
+        -------
+        dict of name to MonitorStatus
+            As `~skthermo.monitoring.Monitor.status` gives it. A bridge without a monitor, or whose newest records could
+            not be used, is "not evaluated", with the reason.
+
+        Raises
+        ------
+        ValueError
+            If ``now`` is no time, or has a time zone where records have none; if ``max_age`` is no duration.
+        """
+        return {name: one.status_at(now, max_age) for name, one in self._outcomes.items()}
 
     def discoveries(self, fdr: float = 0.1, *, days: float = 365.25) -> Discoveries:
         """Which open events are significant after correction for many bridges.

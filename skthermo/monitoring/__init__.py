@@ -2,7 +2,8 @@
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring._status import MonitorStatus
 from skthermo.monitoring.drift import ParameterHistory, track_parameters
 from skthermo.monitoring.retraining import Retraining
 
-__all__ = ["Monitor", "ParameterHistory", "Retraining", "load_monitor", "track_parameters"]
+__all__ = ["Monitor", "MonitorStatus", "ParameterHistory", "Retraining", "load_monitor", "track_parameters"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo.monitoring._transitions import Transition, fault_changes
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import SensorWatch
 from skthermo.preprocessing.checks import Plausible
@@ -151,6 +152,13 @@ class Corrections:
         if self.sensors is None:
             return pd.DataFrame({name: [] for name in ("column", "kind", "since", "detected", "until", "detail")})
         return self.sensors.faults(state.sensors)
+
+    def fault_changes(self, before: CorrectionState, after: CorrectionState, newest: int) -> Iterator[Transition]:
+        """Sensors that have failed between two states, and those that are used again."""
+        if self.sensors is not None:
+            names = [*self.sensors.sensors, *self.sensors.modes]
+            lists = (state.sensors.faults.faults for state in (before, after))
+            yield from fault_changes(*lists, names, self.sensors.units, newest)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
         """The drift of each group; None where none is followed."""

@@ -15,7 +15,7 @@ from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import check_flag
-from skthermo._tables.frames import DAY, YEAR, positions_of
+from skthermo._tables.frames import DAY, YEAR, check_duration, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
 from skthermo._validation import (
@@ -38,6 +38,8 @@ from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._records import RecordStore, read_records
 from skthermo.monitoring._state import MonitorState
+from skthermo.monitoring._status import MonitorStatus, facts_of
+from skthermo.monitoring._transitions import Transition
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 MOST_CAUSES = 3  # in a warning
@@ -265,8 +267,8 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        max_delay, retention = (_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        max_jump = None if self.max_jump is None else _duration(self.max_jump, "max_jump")
+        max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
+        max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
         if retention < max_delay + 2 * DAY:
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
@@ -361,6 +363,64 @@ class Monitor(SavesFrames, Estimator):
         evaluations = self.status_.evaluations
         return evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
 
+    def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
+        """The state at a time, and the facts behind it, for machines.
+
+        Parameters
+        ----------
+        now : str or datetime, optional
+            The time. By default that of the computer's clock; if the records have no time zone, the local time.
+        max_age : str or timedelta, optional
+            Age of the newest record beyond which nothing is healthy. By default the usual time between records, and
+            two days more.
+
+        Returns
+        -------
+        MonitorStatus
+            State, newest record and its age, damage index and thresholds, open events, failed sensors and counts;
+            ``as_dict()`` gives plain values.
+
+        Raises
+        ------
+        ValueError
+            If ``now`` is no time, or has a time zone where the records have none; if ``max_age`` is no duration.
+        """
+        check_is_fitted(self)
+        return facts_of(self).at(now, max_age=max_age)
+
+    def transitions(self, after: int = 0) -> list[dict[str, Any]]:
+        """What has changed: events that open and close, sensors that fail, detectors that take over.
+
+        Parameters
+        ----------
+        after : int, default=0
+            Number of the last entry that is known already, such as ``status().transition`` before an update.
+
+        Returns
+        -------
+        list of dict
+            Plain values of each later entry, the oldest first. ``id``: its number, from 1, which it keeps. ``what``:
+            "opened", "closed" or "withdrawn" (late records have shown that there was no event), "acknowledged",
+            "fault" or "put back" (a sensor), "refit" or "rebaseline". ``time``: when it happened, by the stamps of
+            the records. ``newest``: the newest record when it was reported. ``event``: the number of the event, 0 for
+            none. ``kind``: that of the event or fault. ``column``: the sensor, else "". ``detail``: text.
+
+        Raises
+        ------
+        ValueError
+            If ``after`` is not a number from 0 to that of the newest entry.
+
+        Notes
+        -----
+        Entries are saved with the monitor. A reader that remembers the last number it has seen misses none and gets
+        none twice, also if it was stopped in between.
+        """
+        check_is_fitted(self)
+        found = self.status_.transitions
+        if isinstance(after, bool) or not isinstance(after, Integral) or not 0 <= after <= len(found):
+            raise ValueError(f"after is {after!r}; expected a number of a transition from 0 to {len(found)}")
+        return [one.as_dict(number, self.last_.tz) for number, one in enumerate(found, 1) if number > after]
+
     def years_watched(self, since: Any = None) -> float:
         """Time in which records were evaluated.
 
@@ -453,7 +513,12 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(f"note is {note!r:.100}; expected text")
         of, now = events[event - 1], self.last_.as_unit("ns").value
         one = Acknowledgement(of.kind, of.peak_time, now, check_flag(harmless, "harmless"), note)
-        self.status_ = replace(self.status_, acknowledgements=(*self.status_.acknowledgements, one))
+        said = Transition("acknowledged", now, now, of.kind, int(event), detail=note)
+        self.status_ = replace(
+            self.status_,
+            acknowledgements=(*self.status_.acknowledgements, one),
+            transitions=(*self.status_.transitions, said),
+        )
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
@@ -550,7 +615,7 @@ class Monitor(SavesFrames, Estimator):
             self.active_.columns if columns is None else columns,
             self.targets_,
             self.active_.corrections if corrections is None else corrections,
-            Memory.of(detector) if self.lookback is None else Memory.of_time(_duration(self.lookback, "lookback")),
+            Memory.of(detector) if self.lookback is None else Memory.of_time(check_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
             persistence=self.persistence,
@@ -577,7 +642,9 @@ class Monitor(SavesFrames, Estimator):
             corrections = Corrections.of(whole, self.targets_, corrections.reference, self.units_, **options)
         active = self._activated(retraining.detector, trained, corrections=corrections)
         self.active_ = replace(active, prior=retraining.prior, since=retraining.since)
-        self.status_ = state.handed_over(self.active_, end)
+        now = self.last_.as_unit("ns").value
+        taken_over = Transition("refit" if end is None else "rebaseline", now, now, retraining.kind)
+        self.status_ = state.handed_over(self.active_, end).changed_from(state, self.active_, taken_over)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
@@ -794,14 +861,3 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
         UnevaluatedRowsWarning,
         "records not evaluated",
     )
-
-
-def _duration(value: Any, name: str) -> pd.Timedelta:
-    """A duration of zero or more."""
-    try:
-        duration = pd.Timedelta(value).as_unit("ns")
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{name} is {value!r}; expected a duration, such as '7D'") from error
-    if not duration >= pd.Timedelta(0):
-        raise ValueError(f"{name} is {value!r}; expected a duration of zero or more, such as '7D'")
-    return duration

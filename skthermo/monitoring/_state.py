@@ -18,6 +18,7 @@ from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionS
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, Acknowledgement, EventLog
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
+from skthermo.monitoring._transitions import Transition, event_changes
 
 ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
 
@@ -50,6 +51,7 @@ class MonitorState(SavesFrames):
     n_repeated: int = 0
     n_late: int = 0
     n_too_late: int = 0
+    transitions: tuple[Transition, ...] = ()
 
     @classmethod
     def of(cls, active: ActiveDetector, store: RecordStore) -> MonitorState:
@@ -106,7 +108,15 @@ class MonitorState(SavesFrames):
         if len(outside):
             refused = not_evaluated(outside.index, active.threshold, intake.reasons)
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index(kind="stable")
-        return replace(state, store=intake.store.trimmed()), answers
+        return replace(state, store=intake.store.trimmed()).changed_from(self, active), answers
+
+    def changed_from(self, before: MonitorState, active: ActiveDetector, *others: Transition) -> MonitorState:
+        """This state with what has changed since another one, in order of time, and other changes first."""
+        newest = self.store.last.as_unit("ns").value
+        found = [*event_changes(before.log.events, self.log.events, newest)]
+        found += active.corrections.fault_changes(before.corrections, self.corrections, newest)
+        found.sort(key=lambda one: one.time)
+        return replace(self, transitions=(*before.transitions, *others, *found))
 
     def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[MonitorState, pd.DataFrame]:
         """The state after new records, which are in the store already, and what it says of these and of later ones.

@@ -1,5 +1,6 @@
 """Many bridges side by side: each fails alone, killed processes lose no others, and all have the same bits."""
 
+import json
 import os
 import pickle
 import signal
@@ -282,6 +283,15 @@ def test_monitors_evaluate_new_records_each_alone(fleet):
     assert table.loc["b", ["n_events", "n_open"]].tolist() == [1, 1]
     assert table.loc["b", "alarm_rate"] == alone.days_["n_alarms"].sum() / alone.days_["n_evaluated"].sum()
     assert made.events.loc[made.events["bridge"] == "b", "event"].tolist() == [1]
+    status = made.status("2026-03-02")
+    assert list(status) == list(table.index)
+    assert status["b"].state == "alarm"
+    assert status["a"] == made.monitors["a"].status("2026-03-02")
+    assert status["c"].reason == "FileNotFoundError: no records of this bridge"
+    assert {status[name].state for name in ("c", "d", "broken", "odd")} == {"not evaluated"}
+    late = made.status("2027-01-01")
+    assert [late[name].state for name in "ab"] == ["not evaluated", "alarm"]
+    json.dumps({name: one.as_dict() for name, one in status.items()}, allow_nan=False)
     found = made.discoveries()
     assert found.bridges == ["b"]
     assert {"c", "d", "odd"} == set(found.not_evaluated)

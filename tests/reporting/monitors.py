@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from skthermo.monitoring._status import facts_of
+
 NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "detected", "until", "detail"])
 
 
@@ -78,6 +80,12 @@ class FakeMonitor:
     def state(self):
         is_open = self.events_["end"].isna() & (self.events_["kind"] == "damage")
         return "alarm" if is_open.any() else str(self.evaluations_["state"].iloc[-1])
+
+    def transitions(self, after=0):
+        return []
+
+    def status(self, now=None):
+        return facts_of(self).at(now)
 
     def update(self, new):
         raise NotImplementedError

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._io import write_when_complete
+from skthermo._tables.frames import as_moment
 from skthermo._tables.text import counted, percent
 from skthermo.fleet import Fleet
 from skthermo.reporting._html import Html, Section, bullets, element, joined, page, paragraphs, section, table
@@ -39,7 +40,6 @@ from skthermo.reporting.service import (
     moment,
     monitor_page,
     symbol,
-    time_of,
 )
 from skthermo.surrogate import DataInformedFEM
 
@@ -164,9 +164,9 @@ def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, wri
 def _as_written(now: Time) -> pd.Timestamp:
     """The time shown on the pages, as it was given: bridges may have records of different time zones."""
     if now is None:
-        return time_of(None).floor("min")
+        return as_moment(None, None).floor("min")
     zone = pd.to_datetime(str(now), errors="coerce").tz
-    return time_of(now, zone)
+    return as_moment(now, zone)
 
 
 def _opened(mapping: Mapping[Hashable, Any], name: Hashable) -> tuple[Any, str]:

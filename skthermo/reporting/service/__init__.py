@@ -9,7 +9,6 @@ from skthermo.reporting.service._standing import (
     Standing,
     Time,
     moment,
-    time_of,
 )
 
 __all__ = [
@@ -24,5 +23,4 @@ __all__ = [
     "moment",
     "monitor_page",
     "symbol",
-    "time_of",
 ]

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, tzinfo
+from datetime import datetime
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
 import pandas as pd
 
+from skthermo._tables.frames import as_moment
 from skthermo._tables.text import SPACE, counted, duration_text, listed, percent
-from skthermo.monitoring import Monitor
+from skthermo.monitoring import Monitor, MonitorStatus
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
-LATE = pd.Timedelta(days=2)  # beyond the usual step, after which a record is missed
 Time: TypeAlias = str | datetime | None
 ALARM, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "attention", "healthy", "not evaluated"
 
@@ -42,7 +41,7 @@ class Standing:
     @classmethod
     def of(cls, monitor: Monitor, now: Time = None, limit: float = 0.1, error: str = "") -> Standing:
         """Now is by the clock where no time is given."""
-        return cls(monitor, time_of(now, monitor.last_.tz), limit, error)
+        return cls(monitor, as_moment(now, monitor.last_.tz), limit, error)
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -55,15 +54,19 @@ class Standing:
         return self.monitor.evaluations_
 
     @cached_property
+    def status(self) -> MonitorStatus:
+        """The facts by the time at which the page is written."""
+        return self.monitor.status(self.now)
+
+    @property
     def step(self) -> pd.Timedelta:
         """Usual time between records."""
-        stamps = self.monitor.baseline_.index.append(self.evaluations.index)
-        return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else ONE_DAY
+        return self.status.step
 
     @property
     def has_records(self) -> bool:
         """Whether any record has come since the baseline."""
-        return len(self.monitor.days_) > 0
+        return self.status.newest is not None
 
     @property
     def last(self) -> pd.Timestamp:
@@ -73,18 +76,18 @@ class Standing:
     @property
     def is_silent(self) -> bool:
         """Whether a new record has been missed for days."""
-        return self.now - self.last > self.step + LATE
+        return self.status.is_late
 
     @property
     def is_ahead(self) -> bool:
         """Whether the newest record is of a time to come."""
-        return self.last - self.now > ONE_DAY
+        return self.status.is_ahead
 
     @property
     def state(self) -> str:
-        """An alarm lasts until its event ends; nothing is healthy without new records, or with much stiffness lost."""
-        said = self.monitor.state()
-        if said == HEALTHY and (self.is_silent or self.is_ahead or not self.has_records or self.error):
+        """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
+        said = self.status.state
+        if said == HEALTHY and self.error:
             return NOT_EVALUATED
         return ATTENTION if said == HEALTHY and self.worn else said
 
@@ -192,19 +195,6 @@ class Standing:
         number, evaluated = int(days["n_records"].sum()), int(days["n_evaluated"].sum())
         which = f"{evaluated:,}" if evaluated < number else "all"
         return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were evaluated."
-
-
-def time_of(now: Time, zone: tzinfo | None = None) -> pd.Timestamp:
-    """A time in the zone of the records, by the clock where none is given."""
-    try:
-        time = pd.Timestamp.now(tz=zone) if now is None else pd.Timestamp(now)
-    except (TypeError, ValueError):
-        time = pd.NaT
-    if pd.isna(time) or (time.tz is not None and zone is None):
-        raise ValueError(f"now is {now!r:.100}; expected a time{' without a time zone' if zone is None else ''}")
-    if zone is not None:
-        time = time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
-    return time
 
 
 def moment(time: Time, *, is_short: bool = False) -> str:

@@ -1,0 +1,222 @@
+"""The state of a monitored structure at a given time, as plain facts for machines and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._tables.frames import DAY, as_moment, check_duration
+from skthermo._tables.text import duration_text
+
+LATE = 2 * DAY  # beyond the usual step, after which a record is missed
+AHEAD = DAY  # after now, beyond which the stamp of the newest record is wrong
+FAULT = ("column", "kind", "since", "detail")
+
+
+@dataclass(frozen=True)
+class MonitorStatus:
+    """The state of a monitored structure, and the facts behind it.
+
+    `Monitor.status` and `~skthermo.fleet.Fleet.status` give it; `as_dict` makes it plain values, as JSON has them.
+
+    Parameters
+    ----------
+    state : {"healthy", "alarm", "not evaluated"}
+        "alarm" while a damage event is open. Nothing is healthy if the newest record is too old, of a time to come, or
+        was not evaluated.
+    reason : str
+        Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
+    now : Timestamp or None
+        Time of which the status is.
+    baseline_end : Timestamp or None
+        Stamp of the last record of the baseline.
+    newest : Timestamp or None
+        Stamp of the newest record since the baseline; None if none has come.
+    evaluated : Timestamp or None
+        Stamp of the newest record that was evaluated.
+    age : Timedelta or None
+        From the newest record, or from the last one of the baseline if none has come since, to ``now``.
+    max_age : Timedelta or None
+        Age beyond which nothing is healthy.
+    step : Timedelta or None
+        Usual time between records.
+    index : float or None
+        Damage index of the newest record that was evaluated.
+    threshold, clear_threshold : float or None
+        A damage event opens with indices above the first, and closes at or below the second.
+    false_alarms_per_year : float or None
+        Number of false alarms a year for which the threshold was set.
+    events : tuple of dict
+        Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes`` and
+        ``acknowledged``.
+    faults : tuple of dict
+        Sensors that have failed and still do: ``column``, ``kind``, ``since`` and ``detail``.
+    counts : dict
+        As ``counts_`` of a monitor.
+    transition : int
+        Number of the newest entry in `Monitor.transitions`; 0 if there is none.
+
+    See Also
+    --------
+    Monitor.transitions : What has changed, one entry after the other.
+
+    Notes
+    -----
+    Keys of `as_dict` are the names above. Times are texts of ISO 8601, in the time zone of the records; ``age``,
+    ``max_age`` and ``step`` are in seconds; what is not known is None. Of a bridge without a monitor, ``state`` is "not
+    evaluated", with the reason, and the numbers are None.
+
+    Examples
+    --------
+    >>> from skthermo.monitoring import MonitorStatus
+    >>> status = MonitorStatus("not evaluated", "there is no monitor")
+    >>> status.as_dict()["state"], status.as_dict()["newest"]
+    ('not evaluated', None)
+    """
+
+    state: str
+    reason: str = ""
+    now: pd.Timestamp | None = None
+    baseline_end: pd.Timestamp | None = None
+    newest: pd.Timestamp | None = None
+    evaluated: pd.Timestamp | None = None
+    age: pd.Timedelta | None = None
+    max_age: pd.Timedelta | None = None
+    step: pd.Timedelta | None = None
+    index: float | None = None
+    threshold: float | None = None
+    clear_threshold: float | None = None
+    false_alarms_per_year: float | None = None
+    events: tuple[dict[str, Any], ...] = ()
+    faults: tuple[dict[str, Any], ...] = ()
+    counts: Mapping[str, int] | None = None
+    transition: int = 0
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the newest record is older than ``max_age``."""
+        return self.age is not None and self.max_age is not None and self.age > self.max_age
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether the newest record is of a time to come, by more than a day."""
+        return self.age is not None and self.age < -AHEAD
+
+    def at(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
+        """The status at a later time, with no record since.
+
+        Parameters
+        ----------
+        now : str or datetime, optional
+            The time. By default that of the computer's clock; if the records have no time zone, the local time.
+        max_age : str or timedelta, optional
+            Age of the newest record beyond which nothing is healthy. By default the usual time between records, and
+            two days more.
+
+        Returns
+        -------
+        MonitorStatus
+            An alarm stays one; "healthy" becomes "not evaluated" where the newest record is too old, or of a time to
+            come.
+
+        Raises
+        ------
+        ValueError
+            If ``now`` is no time, or has a time zone where the records have none; if ``max_age`` is no duration.
+        """
+        last = self.newest or self.baseline_end
+        if last is None:
+            return replace(self, now=as_moment(now, None))
+        now = as_moment(now, last.tz)
+        limit = (self.step or DAY) + LATE if max_age is None else check_duration(max_age, "max_age")
+        status = replace(self, now=now, age=now - last, max_age=limit)
+        doubt = _doubt(status, last)
+        if not doubt:
+            return status
+        return replace(status, state="alarm" if self.state == "alarm" else "not evaluated", reason=doubt)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values by name, as a JSON file holds them.
+
+        Returns
+        -------
+        dict
+            Texts, numbers, lists and dicts; None for what is not known.
+        """
+        return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
+
+
+def facts_of(monitor: Any) -> MonitorStatus:
+    """The status of a fitted monitor by its records alone, whatever the time is."""
+    evaluations, baseline = monitor.evaluations_, monitor.baseline_.index
+    known = evaluations[evaluations["state"] != "not evaluated"]
+    return MonitorStatus(
+        state=monitor.state(),
+        reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
+        baseline_end=baseline[-1],
+        newest=monitor.last_ if len(monitor.days_) else None,
+        evaluated=known.index[-1] if len(known) else None,
+        step=_usual_step(baseline.append(evaluations.index)),
+        index=float(known["index"].iloc[-1]) if len(known) else None,
+        threshold=float(monitor.threshold_),
+        clear_threshold=float(monitor.clear_threshold_),
+        false_alarms_per_year=float(monitor.false_alarms_per_year),
+        events=tuple(_open_events(monitor.events_)),
+        faults=tuple(_lasting_faults(monitor.faults_)),
+        counts=dict(monitor.counts_),
+        transition=len(monitor.transitions()),
+    )
+
+
+def _doubt(status: MonitorStatus, last: pd.Timestamp) -> str:
+    """Why nothing is known of the structure now; "" if its newest record is new enough."""
+    if status.newest is None:
+        return f"no record has come since the baseline, which ends on {last}"
+    if status.is_ahead:
+        return f"the newest record is of {last}, a time after {status.now}"
+    if status.is_late:
+        age, limit = duration_text(status.age), duration_text(status.max_age)
+        return f"the newest record, of {last}, is {age} old; expected one of the last {limit}"
+    return ""
+
+
+def _open_events(events: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    for number, event in events[events["end"].isna()].iterrows():
+        yield {
+            "event": int(number),
+            "kind": event["kind"],
+            "since": event["start"],
+            "peak": float(event["peak"]),
+            "modes": [mode for mode in event["modes"].split(", ") if mode],
+            "acknowledged": bool(event["acknowledged"]),
+        }
+
+
+def _lasting_faults(faults: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    for _, fault in faults[faults["until"].isna()].iterrows():
+        yield {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
+
+
+def _usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
+    """Median time between records; a day for one record alone."""
+    return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else DAY
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it: times as text, durations in seconds, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(one) for name, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    if isinstance(value, pd.Timestamp):
+        return None if pd.isna(value) else value.isoformat()
+    if isinstance(value, pd.Timedelta):
+        return value.total_seconds()
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value

@@ -1,0 +1,158 @@
+"""Status of a monitor and its transitions: plain facts that agree with its tables, at any time, in any batches."""
+
+import copy
+import json
+from collections import Counter
+from dataclasses import fields
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skthermo.monitoring import MonitorStatus, load_monitor
+from skthermo.monitoring._events import Event
+from skthermo.monitoring._transitions import event_changes
+from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
+
+SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value
+
+
+@pytest.fixture(scope="module")
+def records():
+    """Records with a thermometer that gets stuck for a while, and damage from some day on."""
+    table = truss_records().copy()
+    table.iloc[SPOILT, 0] = table.iloc[SPOILT.start, 0]
+    return table
+
+
+@pytest.fixture(scope="module")
+def fitted(records):
+    return fitted_monitor(records)
+
+
+@pytest.fixture
+def monitor(fitted):
+    return copy.deepcopy(fitted)
+
+
+@pytest.fixture(scope="module")
+def after(fitted, records):
+    """With all records, in one batch."""
+    monitor = copy.deepcopy(fitted)
+    monitor.update(records[FIRST:])
+    return monitor
+
+
+def test_a_status_is_plain_and_says_what_the_tables_say(after):
+    status = after.status(after.last_)
+    plain = status.as_dict()
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    assert list(plain) == [one.name for one in fields(MonitorStatus)]
+    assert status.state == after.state() == "alarm"
+    assert plain["newest"] == after.last_.isoformat()
+    assert status.age == pd.Timedelta(0)
+    known = after.evaluations_[after.evaluations_["state"] != "not evaluated"]
+    assert (status.evaluated, status.index) == (known.index[-1], known["index"].iloc[-1])
+    is_open = after.events_["end"].isna()
+    assert [one["event"] for one in plain["events"]] == after.events_.index[is_open].tolist()
+    assert [one["since"] for one in plain["events"]] == [t.isoformat() for t in after.events_.loc[is_open, "start"]]
+    assert len(plain["faults"]) == after.faults_["until"].isna().sum()
+    assert plain["counts"] == after.counts_
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_silence_is_never_healthy_and_never_ends_an_alarm(monitor, records, damaged):
+    assert monitor.status(monitor.last_).state == "not evaluated"  # no record yet
+    monitor.update(records[FIRST : DAMAGED + 8 if damaged else FIRST + 3])
+    said = "alarm" if damaged else "healthy"
+    limit = monitor.status().max_age
+    for age in (pd.Timedelta("1h"), limit, limit + pd.Timedelta("1s"), pd.Timedelta("700D")):
+        status = monitor.status(monitor.last_ + age)
+        assert (status.age, status.is_late) == (age, age > limit)
+        assert status.state == ("not evaluated" if status.is_late and not damaged else said)
+        assert (status.reason != "") or not status.is_late
+        assert status.at(monitor.last_ + pd.Timedelta("900D")) == monitor.status(monitor.last_ + pd.Timedelta("900D"))
+    early = monitor.status(monitor.last_ - pd.Timedelta("3D"))
+    assert early.is_ahead
+    assert early.state == ("alarm" if damaged else "not evaluated")
+    assert monitor.status(monitor.last_ + pd.Timedelta("2h"), max_age="1h").is_late
+    for wrong in ({"now": "yesterday"}, {"now": "2026-01-01T00:00+01:00"}, {"max_age": "-1D"}):
+        with pytest.raises(ValueError, match="expected"):
+            monitor.status(**wrong)
+
+
+def replayed(transitions):
+    """Events and faults that are open after some transitions."""
+    events, columns = set(), Counter()
+    for one in transitions:
+        if one["what"] == "opened":
+            events.add(one["event"])
+        elif one["what"] in ("closed", "withdrawn"):
+            events.remove(one["event"])
+        elif one["what"] in ("fault", "put back"):
+            columns[one["column"]] += 1 if one["what"] == "fault" else -1
+    return events, {column for column, number in columns.items() if number}
+
+
+def test_transitions_replay_what_the_tables_say(after, fitted):
+    found = after.transitions()
+    assert fitted.transitions() == []
+    assert json.loads(json.dumps(found)) == found
+    assert [one["id"] for one in found] == list(range(1, after.status().transition + 1))
+    assert {"opened", "fault", "put back"} <= {one["what"] for one in found}
+    events, columns = replayed(found)
+    assert events == set(after.events_.index[after.events_["end"].isna()])
+    assert columns == set(after.faults_.loc[after.faults_["until"].isna(), "column"])
+
+
+def test_batches_give_the_transitions_of_one_pass_each_once(monitor, records, after, tmp_path):
+    parts, known = [], 0
+    for start in range(FIRST, len(records), 25):
+        monitor.update(records[start : start + 25])
+        parts += monitor.transitions(known)
+        known = monitor.status().transition
+        monitor.save(tmp_path / "monitor.joblib")
+        monitor = load_monitor(tmp_path / "monitor.joblib")
+    assert monitor.transitions(known) == []
+    assert parts == monitor.transitions()
+
+    def said(transitions):
+        return sorted((one["time"], one["what"], one["event"], one["column"]) for one in transitions)
+
+    assert said(parts) == said(after.transitions())
+
+
+@pytest.mark.filterwarnings("ignore:.*far beyond")
+def test_what_an_owner_does_is_a_transition(monitor, records):
+    monitor.update(records[FIRST : DAMAGED + 8])
+    known = monitor.status().transition
+    monitor.acknowledge(1, harmless=True, note="a special transport")
+    monitor.refit(force=True)
+    monitor.rebaseline(records.index[DAMAGED])
+    found = monitor.transitions(known)
+    assert [one["what"] for one in found[:3]] == ["acknowledged", "refit", "rebaseline"]
+    assert found[0]["detail"] == "a special transport"
+    assert "closed" in {one["what"] for one in found[3:]}
+    for wrong in (-1, len(monitor.transitions()) + 1, True, "1"):
+        with pytest.raises(ValueError, match="after"):
+            monitor.transitions(wrong)
+
+
+@st.composite
+def events(draw):
+    """Events of one kind one after the other, the last of which may be open."""
+    times = sorted(draw(st.sets(st.integers(0, 40), max_size=8)))
+    pairs = [(start, end) for start, end in zip(times[::2], [*times[1::2], None], strict=False)]
+    return [Event("damage", start, end, 2.0, start, "f1", 3) for start, end in pairs]
+
+
+@given(events(), events())
+def test_changes_lead_from_one_list_of_events_to_the_other(before, after):
+    changes = list(event_changes(before, after, 50))
+    number = Counter(one.what for one in changes)
+    withdrawn = sum(before[one.event - 1].end is None for one in changes if one.what == "withdrawn")
+    n_open = [sum(event.end is None for event in some) for some in (before, after)]
+    assert n_open[1] == n_open[0] + number["opened"] - number["closed"] - withdrawn
+    assert len(after) <= len(before) - number["withdrawn"] + number["opened"]
+    assert not list(event_changes(before, before, 50))
