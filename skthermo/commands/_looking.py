@@ -99,11 +99,15 @@ def _look_at_csv(file: Path, zone: str | None) -> tuple[CsvFormat, dict[str, str
     stamp_columns, stamps, notes = _stamps_of(columns, file)
     units = {}
     for n in above[1:]:
-        units |= {name: UNITS[cell.lower()] for name, cell in zip(names, rows[n][1], strict=True) if cell.lower() in UNITS}
+        units |= {
+            name: UNITS[cell.lower()] for name, cell in zip(names, rows[n][1], strict=True) if cell.lower() in UNITS
+        }
     texts = {
         name: "it holds text"
         for name, cells in columns.items()
-        if name not in stamp_columns and _share_of_numbers(cells, decimal) < MOSTLY and set(map(str.lower, cells)) - MISSING
+        if name not in stamp_columns
+        and _share_of_numbers(cells, decimal) < MOSTLY
+        and set(map(str.lower, cells)) - MISSING
     }
     has_offsets = OFFSET.search(" ".join(columns[name][0] for name in stamp_columns)) is not None
     form = CsvFormat(
@@ -137,7 +141,7 @@ def _divided(text: str) -> tuple[str, str, list[tuple[int, list[str]]]]:
     for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
         rows = rows_of(text, separator)
         widths = np.array([len(row) for _, row in rows])
-        if not len(widths) or separator == decimal and '"' not in text:
+        if not len(widths) or (separator == decimal and '"' not in text):
             continue
         width = int(np.bincount(widths).argmax())
         if width < 2:
@@ -176,7 +180,9 @@ def _stamps_of(columns: dict[str, Sequence[str]], file: Path) -> tuple[list[str]
         if fitting:
             best = min(fitting, key=lambda form: (_irregularity(parsed(texts, form)), STAMPS.index(form)))
             others = [form for form in fitting if not parsed(texts, form).equals(parsed(texts, best))]
-            doubts = [f"stamps of {file.name} may also have the format {one}: see that {best} is right" for one in others]
+            doubts = [
+                f"stamps of {file.name} may also have the format {one}: see that {best} is right" for one in others
+            ]
             return used, best, doubts[:1]
     raise ValueError(
         f"{file}: no column holds times, such as 2026-01-31 13:00 or 31.01.2026 13:00; the first values are "

@@ -14,7 +14,7 @@ import pandas as pd
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import write_when_complete
 from skthermo._tables.text import counted
-from skthermo.commands._record_files import ENDINGS, CsvFormat, read_file
+from skthermo.commands._record_files import ENDINGS, PARQUET, CsvFormat, read_file
 from skthermo.commands._settings import Records
 from skthermo.exceptions import RecordsWarning
 
@@ -35,31 +35,35 @@ class NewFile:
 class Taken:
     """What has been taken in from which files, kept beside the monitor.
 
-    ``layouts`` are the sets of columns that the files of the baseline have. For each file there are its size, the time
+    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit. For each
+    file there are its size, the time
     of its last change, and how many of its first rows are done, with a checksum of these. If a command is killed after
     it has saved the monitor, rows come again, and the monitor knows them.
     """
 
     layouts: list[list[str]] = field(default_factory=list)
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
+    fitted: str = ""
 
     @classmethod
     def read(cls, file: Path) -> Taken:
         """What an earlier call has left; nothing if that cannot be read."""
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            return cls(content["layouts"], content["files"])
+            return cls(content["layouts"], content["files"], content["fitted"])
         except (OSError, ValueError, KeyError, TypeError):
             return cls()
 
     def write(self, file: Path) -> None:
         """Keep it for the next call."""
-        write_when_complete(file, json.dumps({"layouts": self.layouts, "files": self.files}, indent=1) + "\n")
+        write_when_complete(file, json.dumps(vars(self), indent=1) + "\n")
 
     def new_in(self, file: Path, read: Any) -> NewFile | None:
         """What is new in a file; None if it is as it was when all of it was taken in."""
         known = self.files.get(str(file), {})
         found = file.stat()
+        if not found.st_size:
+            return None
         seen = {"size": found.st_size, "changed": found.st_mtime_ns}
         is_as_before = all(known.get(name) == value for name, value in seen.items())
         if is_as_before and known.get("whole"):
@@ -67,7 +71,7 @@ class Taken:
         table = read(file, leave_unfinished=not is_as_before)  # a line that is not finished may be, the next time
         n_rows = known.get("rows", 0)
         n_done = n_rows if len(table) >= n_rows and _checksum(table[:n_rows]) == known.get("checksum") else 0
-        is_finished = is_as_before or file.read_bytes()[-1:] in (b"", b"\n", b"\r") or file.suffix.lower() not in ENDINGS[:4]
+        is_finished = is_as_before or file.suffix.lower() in PARQUET or file.read_bytes()[-1:] in (b"\n", b"\r", b"\0")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
     def note(self, file: NewFile, handed: pd.DatetimeIndex) -> None:
@@ -100,10 +104,17 @@ def read_columns(file: Path, form: CsvFormat, records: Records, *, leave_unfinis
             f"{file} has the columns {unknown}, which [records] does not name; expected {records.columns}, and other "
             "columns under ignore"
         )
-    for name, unit in records.convert.items():
-        if name in table:
-            table[name] = table[name] - ABSOLUTE_ZERO if unit == "K" else (table[name] - FREEZING) * FAHRENHEIT
-    return table
+    return in_celsius(table, records.convert)
+
+
+def in_celsius(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
+    """A table with columns that are in K or °F converted to degrees Celsius."""
+    found = {name: unit for name, unit in units.items() if name in table}
+    scaled = {
+        name: table[name] - ABSOLUTE_ZERO if unit == "K" else (table[name] - FREEZING) * FAHRENHEIT
+        for name, unit in found.items()
+    }
+    return table.assign(**scaled)
 
 
 def check_layout(table: pd.DataFrame, file: Path, records: Records, layouts: Sequence[Sequence[str]]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from datetime import datetime
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -79,7 +80,7 @@ def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str
         yield "open_events", (own | {"kind": kind}, sum(one["kind"] == kind for one in status["events"]))
     yield "failed_sensors", (own, len(status["faults"]))
     counts = status["counts"] or {}
-    newest = status["newest"] and pd.Timestamp(status["newest"]).timestamp()
+    newest = status["newest"] and datetime.fromisoformat(status["newest"]).timestamp()
     values = {
         "damage_index": status["index"],
         "threshold": status["threshold"],
@@ -96,7 +97,9 @@ def _escaped(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
-def append_transitions(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[str, str]) -> list[dict[str, Any]]:
+def append_transitions(
+    file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[str, str]
+) -> list[dict[str, Any]]:
     """Append those entries to a file of JSON lines that it does not have yet, and give them.
 
     ``own`` are the values that lines of this monitor have. A line that a killed command has left unfinished is

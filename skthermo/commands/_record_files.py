@@ -206,7 +206,7 @@ def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Seque
     if local.hasnans:
         place = int(np.argmax(local.isna()))
         raise ValueError(
-            f"{file}, line {lines[place]}: {index[place]} is no time in {zone}, as the clocks go forward then; expected "
-            "the time zone of the logger's clock, such as 'Etc/GMT-1' for central European winter time all year"
+            f"{file}, line {lines[place]}: {index[place]} is no time in {zone}, as the clocks go forward then; "
+            "expected the time zone of the logger's clock, such as 'Etc/GMT-1' for UTC+1 all year"
         )
     return local

@@ -22,8 +22,6 @@ from zoneinfo import ZoneInfo
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 
-import skthermo.detection
-import skthermo.preprocessing
 from skthermo.commands._record_files import CsvFormat
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import Monitor
@@ -148,7 +146,9 @@ CLASSES: dict[str, tuple[str, ...]] = {
 
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
     """Parameters of a class or function by name, with their descriptions."""
-    texts = dict(_descriptions(inspect.getdoc(maker) or ""))
+    doc = inspect.getdoc(maker) or ""
+    types = dict(_types(doc))
+    texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
     kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
     return {
         name: Setting(_default(one.default), texts.get(name, ""))
@@ -221,7 +221,9 @@ def _model(path: Path, settings: Path) -> Any:
     code = Path(f"{file}.py")
     exec(compile(code.read_text(encoding="utf-8"), str(code), "exec"), names)
     if not callable(names.get(function)):
-        raise ValueError(f"{settings}: [fem] model: {code} has no function {function!r}; expected one that gives a model")
+        raise ValueError(
+            f"{settings}: [fem] model: {code} has no function {function!r}; expected one that gives a model"
+        )
     return names[function]()
 
 
@@ -246,7 +248,7 @@ class _Reader:
         except FileNotFoundError as error:
             raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings that init writes") from error
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ValueError(f"{file} is no TOML: {error}; expected lines such as name = \"value\"") from error
+            raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
 
     def settings(self) -> Settings:
         """All that the file says."""
@@ -259,7 +261,9 @@ class _Reader:
                 expected = f"[[{name}]], once for each step" if wants_list else f"[{name}], once"
                 raise self.error(name, 0, "", f"{name!r} is no section; expected {expected}")
         files, records, form = (self._called(name) for name in ("files", "records", "csv"))
-        parts = {name: self._made(name, 0, self.content[name]) for name in ("regression", "detector") if self._has(name)}
+        parts = {
+            name: self._made(name, 0, self.content[name]) for name in ("regression", "detector") if self._has(name)
+        }
         steps = enumerate(self.content.get("features", ()))
         parts["features"] = [self._made("features", n, given) for n, given in steps]
         options = {name: self._values(name) for name in ("compensator", "monitor", "fem", "page")}
