@@ -196,7 +196,7 @@ def fit(bridge: Bridge, done: Done) -> None:
             old = bridge.monitor_file
             old.replace(old.with_name(f"{old.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{old.suffix}"))
         monitor.save(bridge.monitor_file)
-        Taken(layouts, {}, datetime.now(UTC).isoformat(timespec="seconds")).write(bridge.taken_file)
+        Taken(bridge.taken_file, layouts, {}, datetime.now(UTC).isoformat(timespec="seconds")).write()
     settings.path(settings.records.folder).mkdir(exist_ok=True)
     done.written.append(bridge.monitor_file)
     done.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
@@ -220,7 +220,7 @@ def update(bridge: Bridge, done: Done, files: Sequence[Path] = ()) -> None:
             for file in new:
                 if file.path in handed:
                     taken.note(file, handed[file.path])
-            taken.write(bridge.taken_file)
+            taken.write()
         _described_update(bridge, monitor, done, evaluated, before)
         bridge.append_transitions(monitor, done)
     bridge.write_page(monitor, done)

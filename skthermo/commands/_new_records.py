@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -41,26 +42,28 @@ class Taken:
     it has saved the monitor, rows come again, and the monitor knows them.
     """
 
+    file: Path
     layouts: list[list[str]] = field(default_factory=list)
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
     fitted: str = ""
 
     @classmethod
     def read(cls, file: Path) -> Taken:
-        """What an earlier call has left; nothing if that cannot be read."""
+        """What an earlier call has left in a file beside the monitor; nothing if that cannot be read."""
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            return cls(content["layouts"], content["files"], content["fitted"])
+            return cls(file, content["layouts"], content["files"], content["fitted"])
         except (OSError, ValueError, KeyError, TypeError):
-            return cls()
+            return cls(file)
 
-    def write(self, file: Path) -> None:
+    def write(self) -> None:
         """Keep it for the next call."""
-        write_when_complete(file, json.dumps(vars(self), indent=1) + "\n")
+        content = {name: value for name, value in vars(self).items() if name != "file"}
+        write_when_complete(self.file, json.dumps(content, indent=1) + "\n")
 
     def new_in(self, file: Path, read: Any) -> NewFile | None:
         """What is new in a file; None if it is as it was when all of it was taken in."""
-        known = self.files.get(str(file), {})
+        known = self.files.get(self._key(file), {})
         found = file.stat()
         if not found.st_size:
             return None
@@ -74,12 +77,16 @@ class Taken:
         is_finished = is_as_before or file.suffix.lower() in PARQUET or file.read_bytes()[-1:] in (b"\n", b"\r", b"\0")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
+    def _key(self, file: Path) -> str:
+        """How a file is called: by its path from the folder of the monitor, wherever the command is started."""
+        return os.path.relpath(file, self.file.parent)
+
     def note(self, file: NewFile, handed: pd.DatetimeIndex) -> None:
         """Rows of a file that are done: the first ones, up to one whose stamp was not handed over."""
         waiting = ~file.rows.index.isin(handed)
         n_done = int(waiting.argmax()) if waiting.any() else len(file.rows)
         done = pd.concat([file.before, file.rows[:n_done]])
-        self.files[str(file.path)] = dict(file.seen) | {
+        self.files[self._key(file.path)] = dict(file.seen) | {
             "rows": len(done),
             "checksum": _checksum(done),
             "whole": file.seen["whole"] and not waiting.any(),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from datetime import datetime
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
