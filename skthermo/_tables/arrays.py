@@ -5,7 +5,7 @@ return their argument, or raise a ValueError that says what was got and what was
 name.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time, timedelta
 from numbers import Integral, Real
 from os import PathLike
@@ -29,6 +29,7 @@ NO_NUMBERS = {
     "complex numbers": (complex, np.complexfloating),
 }
 KINDS = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
+HALF = "numbers of half precision (float16)"  # three digits
 HUGE = 1e150  # squares of larger numbers are infinite
 NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 Reduce: TypeAlias = bool | float | Literal["auto"]
@@ -218,14 +219,82 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     if isinstance(values, type) or callable(values):
         raise ValueError(f"{what} is {values!r:.100}; expected numbers")
     for name, part in _parts(values):
-        what, example = _no_number(part)
-        if what:
-            where = f"column {name!r}" if name is not None else what
-            hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
-            raise ValueError(
-                f"{where} holds {what}, such as {example!r:.60}; expected numbers"
-                f"{hint if name is not None and what == 'times' else ''}"
-            )
+        kind, example = _no_number(part)
+        if kind:
+            where, hint = what if name is None else f"column {name!r}", ""
+            if kind == HALF:
+                hint = " of type float64 or float32"
+            elif kind == "times" and name is not None:
+                hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
+            raise ValueError(f"{where} holds {kind}, such as {example!r:.60}; expected numbers{hint}")
+
+
+def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
+    """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
+    if scipy.sparse.issparse(values):
+        raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
+    if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
+        raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
+
+
+def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1) -> None:
+    """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
+    whose names are not all text or all numbers."""
+    expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
+    refuse_no_array(values, what, expected)
+    refuse_no_numbers(values, what)
+    array: Any = values if hasattr(values, "dtypes") else np.asarray(values)
+    shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])
+    if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
+        raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    if len(shape) == 1 and hasattr(values, "iloc"):
+        raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
+    if len(shape) < 2:
+        raise ValueError(
+            f"{what} has shape {tuple(shape)}; {expected}. Reshape your data by reshape(-1, 1) if it is one column, by "
+            "reshape(1, -1) if it is one row"
+        )
+    if len(shape) > 2:
+        raise ValueError(f"{what} has {len(shape)} dimensions, shape {tuple(shape)}; {expected}")
+    if shape[1] < least_columns:
+        raise ValueError(
+            f"{what} has {shape[1]} feature(s) (shape={tuple(shape)}) while a minimum of {least_columns} is required; "
+            f"{expected}"
+        )
+    if shape[0] < least_rows:
+        raise ValueError(
+            f"{what} has {shape[0]} sample(s) (shape={tuple(shape)}) while a minimum of {least_rows} is required; "
+            f"{expected}"
+        )
+    _refuse_names(getattr(values, "columns", ()), what)
+
+
+def _refuse_names(columns: Any, what: str) -> None:
+    """Raise an error for names of columns that stand twice, are of several levels, or are only partly text."""
+    names = list(columns)
+    if len(set(names)) < len(names):
+        raise ValueError(f"{what} has the columns {names}; expected each name once")
+    are_text = {isinstance(name, str) for name in names}
+    if len(are_text) > 1 or any(isinstance(name, tuple) for name in names):
+        kind = "tuples" if isinstance(names[0], tuple) else "partly text and partly not"
+        raise ValueError(
+            f"the names of the columns of {what} are {kind}, such as {names[0]!r}; expected text, as in "
+            f"{what}.columns = ['T1', 'T2', 'f1']"
+        )
+
+
+def refuse_infinite(values: NDArray, what: str, like: Any) -> None:
+    """Raise an error for infinite values, with the column and row of the first by the names of a table like them."""
+    infinite = np.isinf(values)
+    if infinite.any():
+        place = tuple(np.argwhere(infinite)[0])
+        index, columns = getattr(like, "index", None), getattr(like, "columns", None)
+        row = f"row {place[0]}" + ("" if index is None or is_numbered(index) else f" ({index[place[0]]})")
+        column = "" if len(place) < 2 else f" of column {int(place[1]) if columns is None else columns[place[1]]!r}"
+        raise ValueError(
+            f"{what} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; expected "
+            "finite numbers, and NaN where a value is missing"
+        )
 
 
 def refuse_huge(values: Any, what: str) -> None:
@@ -243,7 +312,7 @@ def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
         yield None, values
         return
     for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
-        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc":
+        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc" or dtype == np.float16:
             yield name, values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
 
 
@@ -256,7 +325,8 @@ def _no_number(values: Any) -> tuple[str, Any]:
     dtype = getattr(values, "dtype", None)
     if dtype is None:
         return _kind_of(values), values
-    kind = "categories" if str(dtype) == "category" else KINDS.get(getattr(dtype, "kind", ""), "")
+    named = {"category": "categories", "float16": HALF}.get(str(dtype), "")
+    kind = named or KINDS.get(getattr(dtype, "kind", ""), "")
     if kind:
         return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
     if getattr(dtype, "kind", "") == "O":
@@ -416,9 +486,12 @@ def check_path(path: Any, what: str = "path") -> Path:
     return Path(path)
 
 
-def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
-    """Different degrees of freedom of a model."""
-    array = integer_row(dofs, "dofs")
+Label: TypeAlias = tuple[Hashable, Hashable]
+
+
+def check_dofs(dofs: ArrayLike, n_dof: int, labels: Sequence[Label] = ()) -> NDArray[np.intp]:
+    """Different degrees of freedom of a model by position, from positions or from labels, such as (12, "x")."""
+    array = integer_row(_positions(dofs, labels, n_dof), "dofs")
     outside = array[(array < 0) | (array >= n_dof)]
     if outside.size:
         raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
@@ -426,6 +499,36 @@ def check_dofs(dofs: ArrayLike, n_dof: int) -> NDArray[np.intp]:
     if (counts > 1).any():
         raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
     return array.astype(np.intp)
+
+
+def _positions(dofs: Any, labels: Sequence[Label], n_dof: int) -> Any:
+    """Positions of labels among those of a model; anything but pairs is returned as it is."""
+    rows = dofs.tolist() if isinstance(dofs, np.ndarray) else dofs
+    if not isinstance(rows, list | tuple) or not rows:
+        return dofs
+    if not all(isinstance(row, list | tuple) and len(row) == 2 for row in rows):
+        return dofs
+    if not labels:
+        raise ValueError(
+            f"dofs holds {rows[0]!r:.100}, but the model's degrees of freedom have no labels; expected 0 to {n_dof - 1}"
+        )
+    places = {label: i for i, label in enumerate(labels)}
+    unknown = [row for row in map(tuple, rows) if not is_label(row) or row not in places]
+    if unknown:
+        raise ValueError(
+            f"dofs holds {unknown[0]!r:.100}; expected degrees of freedom of the model, such as {labels[0]!r} "
+            "(model.dofs lists all)"
+        )
+    return [places[tuple(row)] for row in rows]
+
+
+def is_label(dof: Any) -> bool:
+    """Whether something can be the label of a degree of freedom, (node, direction)."""
+    try:
+        hash(dof)
+    except TypeError:
+        return False
+    return isinstance(dof, tuple) and len(dof) == 2 and not any(isinstance(part, bool) for part in dof)
 
 
 def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:

@@ -10,9 +10,9 @@ from skthermo.fem._protocol import (
     ModalModel,
 )
 from skthermo.fem.affine import AffineModel, ReducedModel
-from skthermo.fem.assembly import Structure
+from skthermo.fem.assembly import ImportedStructure, Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
-from skthermo.fem.external import CallableModel, load_affine, probe, read_triplets
+from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "DifferentiableModel",
     "Element",
     "FEModel",
+    "ImportedStructure",
     "LocalModel",
     "LocalModes",
     "Membrane",
@@ -34,6 +35,7 @@ __all__ = [
     "Spring",
     "Structure",
     "add_noise",
+    "difference_terms",
     "evaluate",
     "evaluate_modes",
     "linearise",

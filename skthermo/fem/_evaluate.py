@@ -166,8 +166,9 @@ def evaluate_modes(
         With a method ``modes``.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
-    dofs : array-like of int of shape (n_dofs,)
-        Degrees of freedom, such as those of sensors; the first is 0.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction)
+        Degrees of freedom, such as those of sensors, by position, the first being 0, or by label, as in the model's
+        ``dofs``.
     n_jobs : int, optional
         Number of parallel jobs (joblib); each takes chunks of rows.
 
@@ -195,10 +196,17 @@ def evaluate_modes(
     rows = checked_rows(model, theta, n_jobs)
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
-    places = check_dofs(dofs, np.shape(model.modes(np.ones((1, rows.shape[1])))[1])[1])
+    places = _positions(model, dofs)
     expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
     frequencies, shapes = solve_rows(model, partial(_modes, dofs=places), rows, expected, n_jobs)
     return frequencies, shapes
+
+
+def _positions(model: ModalModel, dofs: ArrayLike) -> NDArray[np.intp]:
+    """Positions of degrees of freedom of a model, given by position or by label."""
+    nominal = np.ones((1, len(model.parameter_names)))
+    n_dof = model.n_dof if hasattr(model, "n_dof") else np.shape(model.modes(nominal)[1])[1]
+    return check_dofs(dofs, n_dof, getattr(model, "dofs", ()))
 
 
 def _frequencies(model: FEModel, theta: Array) -> tuple[Array]:
@@ -265,7 +273,12 @@ def linearise(
 
 
 def linearise_modes(
-    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, step: float = 0.001, n_jobs: int | None = None
+    model: ModalModel,
+    theta: ArrayLike,
+    dofs: ArrayLike,
+    *,
+    step: float = 0.001,
+    n_jobs: int | None = None,
 ) -> tuple[Array, Array, Array, Array]:
     """Frequencies and mode shapes of many rows of parameters, and their derivatives.
 
@@ -276,8 +289,9 @@ def linearise_modes(
         central differences of its method ``modes``, and those of the frequencies as from `linearise`.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
-    dofs : array-like of int of shape (n_dofs,)
-        Degrees of freedom, such as those of sensors; the first is 0.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction)
+        Degrees of freedom, such as those of sensors, by position, the first being 0, or by label, as in the model's
+        ``dofs``.
     step : float, default=0.001
         Relative step of central differences.
     n_jobs : int, optional
@@ -310,14 +324,15 @@ def linearise_modes(
     rows = checked_rows(model, theta, n_jobs)
     _check_step(step)
     if hasattr(model, "linearised_modes"):
-        n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], np.size(dofs)
+        places = _positions(model, dofs)
+        n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], len(places)
         expected = {
             "frequencies": (n_modes,),
             "derivatives": (n_modes, n_parameters),
             "shapes": (n_dofs, n_modes),
             "derivatives of shapes": (n_dofs, n_modes, n_parameters),
         }
-        solve = partial(_linearised_modes, dofs=dofs)
+        solve = partial(_linearised_modes, dofs=places)
         return tuple(solve_rows(model, solve, rows, expected, n_jobs))  # type: ignore[return-value]
     frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
     shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
@@ -336,7 +351,7 @@ def _linearised(model: Any, theta: Array) -> tuple[Array, Array]:
     return model.frequencies(theta), model.jacobian(theta)
 
 
-def _linearised_modes(model: Any, theta: Array, dofs: ArrayLike) -> tuple[Array, Array, Array, Array]:
+def _linearised_modes(model: Any, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
     return model.linearised_modes(theta, dofs)
 
 
@@ -420,7 +435,7 @@ def sample(
     method : {"uniform", "lhs", "sobol"}, default="uniform"
         Independent uniform draws, a Latin hypercube, or a scrambled Sobol sequence (balanced if ``n_samples`` is a
         power of 2).
-    dofs : array-like of int of shape (n_dofs,), optional
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
         Degrees of freedom where mode shapes are wanted too; the model needs a method ``modes``.
     n_jobs : int, optional
         Number of parallel jobs (joblib); each takes chunks of rows.

@@ -18,6 +18,7 @@ from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.scatter import Scatter
 from skthermo.residuals.weather import (
+    NearestPlaces,
     TrainingRange,
     WeatherFunctions,
     nearest_in_parts,
@@ -230,11 +231,15 @@ class BaselineResiduals:
 
     def _similar(self, weather: Array) -> scipy.sparse.csr_array:
         """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
-        places, some = self.coordinates.transform(weather), one_in_each_part(len(self.places), MOST_PLACES)
-        near = np.vstack([found for _, _, found in nearest_in_parts(self.places[some], places, DRAWN_FROM)])
+        some = one_in_each_part(len(self.places), MOST_PLACES)
+        near = self._drawn_from.of(self.coordinates.transform(weather))[1]
         ends = np.arange(0, near.size + 1, near.shape[1])
         weights = np.full(near.size, 1 / near.shape[1])
         return scipy.sparse.csr_array((weights, some[near].ravel(), ends), (len(near), len(self.places)))
+
+    @cached_property
+    def _drawn_from(self) -> NearestPlaces:
+        return NearestPlaces(self.places[one_in_each_part(len(self.places), MOST_PLACES)], DRAWN_FROM)
 
     def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of records in runs for rows with some similar records."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,9 @@ from skthermo.residuals.gaussian import (
 from skthermo.residuals.local_covariance import CANDIDATES, NEAR_IN_TIME, History, Smoothing, whitened
 from skthermo.residuals.weather import (
     FAR_OUTSIDE,
+    NearestPlaces,
     PredictionError,
     TrainingRange,
-    nearest,
     parts,
     weather_coordinates,
 )
@@ -52,9 +53,12 @@ class WeatherCovariance:
 
     def at(self, weather: Array, overall: Array) -> Array:
         """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
-        wanted = self.coordinates.transform(weather)
-        distances, near = nearest(self.places, wanted, self.smoothing.n_neighbors)
+        distances, near = self._searched.of(self.coordinates.transform(weather))
         return self.floored(self.covariances[near[:, 0]], weather, distances.mean(axis=1), overall)
+
+    @cached_property
+    def _searched(self) -> NearestPlaces:
+        return NearestPlaces(self.places, self.smoothing.n_neighbors)
 
     def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
         """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""

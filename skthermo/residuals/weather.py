@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from skthermo.residuals.gaussian import Gaussian
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
+MOST_KEPT = 4_000_000  # distances to nearest places that are kept, and as many positions
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
 MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
@@ -355,9 +357,67 @@ def weather_coordinates(weather: Array) -> Pipeline:
     return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(weather)
 
 
+class NearestPlaces:
+    """Places, of which a number is nearest to each wanted one; no wanted place is searched for twice.
+
+    Results are kept up to `MOST_KEPT` numbers, those asked for first. Copies, saved ones too, begin with none.
+    """
+
+    def __init__(self, places: Array, number: int) -> None:
+        self.places, self.number = places, min(number, len(places))
+        self.__setstate__({})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"places": self.places, "number": self.number}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _kept=None)
+
+    @cached_property
+    def _tree(self) -> NearestNeighbors:
+        return NearestNeighbors(n_neighbors=self.number).fit(self.places)
+
+    def of(self, wanted: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
+        distances, near = np.empty((len(wanted), self.number)), np.empty((len(wanted), self.number), dtype=np.intp)
+        keys, kept = _row_keys(wanted), self._kept
+        new = np.ones(len(wanted), dtype=bool)
+        if kept is not None:
+            at = np.minimum(np.searchsorted(kept.keys, keys), len(kept.keys) - 1)
+            new = kept.keys[at] != keys
+            distances[~new], near[~new] = kept.distances[at[~new]], kept.near[at[~new]]
+        for part in parts(int(new.sum()), self.number):
+            rows = np.flatnonzero(new)[part]
+            distances[rows], near[rows] = self._tree.kneighbors(wanted[rows])
+        if new.any() and (0 if kept is None else kept.near.size) + new.sum() * self.number <= MOST_KEPT:
+            found = _KeptPlaces(keys[new], distances[new], near[new])
+            self._kept = found.sorted() if kept is None else kept.with_more(found)
+        return distances, near
+
+
+class _KeptPlaces(NamedTuple):
+    """Bytes of the coordinates of wanted places, in order, and what was found for each."""
+
+    keys: NDArray[np.void]
+    distances: Array
+    near: NDArray[np.intp]
+
+    def sorted(self) -> _KeptPlaces:
+        first = np.unique(self.keys, return_index=True)[1]
+        return _KeptPlaces(*(part[first] for part in self))
+
+    def with_more(self, found: _KeptPlaces) -> _KeptPlaces:
+        return _KeptPlaces(*(np.concatenate(both) for both in zip(self, found, strict=True))).sorted()
+
+
+def _row_keys(rows: Array) -> NDArray[np.void]:
+    """One key for each row, equal where all bytes are."""
+    return np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
+
+
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
     """Distances and positions of the places nearest to each wanted one."""
-    return NearestNeighbors(n_neighbors=min(number, len(places))).fit(places).kneighbors(wanted)
+    return NearestPlaces(places, number).of(wanted)
 
 
 def nearest_in_parts(places: Array, wanted: Array, number: int) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:

@@ -231,9 +231,9 @@ def identifiability(
     noise : float or array-like of shape (n_modes,)
         Relative standard deviation of the measured frequencies. For a mean of n records, divide that of one record by
         sqrt(n).
-    dofs : array-like of int of shape (n_dofs,), optional
-        Degrees of freedom, the first being 0, where mode shapes are measured too. The model needs a method
-        ``local_modes``, as `~skthermo.fem.AffineModel` has.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        Degrees of freedom, by position, the first being 0, or by label, where mode shapes are measured too. The model
+        needs a method ``local_modes``, as `~skthermo.fem.AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 
@@ -312,7 +312,7 @@ def identifiability(
     return Identifiability(
         rank=int((values > np.sqrt(NO_INFORMATION) * values[0]).sum()),
         n_modes=model.n_modes,
-        n_dofs=np.size(dofs) if dofs is not None else 0,
+        n_dofs=0 if dofs is None else len(dofs),
         sensitivity=S,
         singular_values=values,
         condition_number=float(values[0] / smallest) if smallest else np.inf,

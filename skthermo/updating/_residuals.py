@@ -1,6 +1,6 @@
 """Measured modes, the model's modes paired with them, the residuals between them and the search for their minimum."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -10,7 +10,16 @@ from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_ass
 
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, by_name, central_differences, check_dofs, real_array, shape_array
+from skthermo._tables.arrays import (
+    Array,
+    Label,
+    as_floats,
+    by_name,
+    central_differences,
+    check_dofs,
+    real_array,
+    shape_array,
+)
 from skthermo.exceptions import RecordsWarning
 from skthermo.fem import FEModel, LocalModel
 
@@ -52,6 +61,7 @@ def read_measured(
     frequency_std: ArrayLike | None,
     shape_weight: ArrayLike,
     n_dof: int,
+    labels: Sequence[Label] = (),
 ) -> Measured:
     """Means over records, with shapes and weights, of the modes that were measured."""
     n_modes = F.shape[1]
@@ -63,7 +73,7 @@ def read_measured(
         )
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
-    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names)
+    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
     weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
@@ -106,13 +116,15 @@ def _given(shapes: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(shapes).any(axis=0))
 
 
-def _read_shapes(shapes, dofs, n_modes: int, n_dof: int, names: list[str]) -> tuple[NDArray[np.intp], Array]:
+def _read_shapes(
+    shapes, dofs, n_modes: int, n_dof: int, names: list[str], labels: Sequence[Label]
+) -> tuple[NDArray[np.intp], Array]:
     if (shapes is None) != (dofs is None):
         given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
         raise ValueError(f"{given} were given without {missing}; expected both, or neither")
     if shapes is None:
         return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
-    places = check_dofs(dofs, n_dof)
+    places = check_dofs(dofs, n_dof, labels)
     array = shape_array(shapes, "shapes")
     if array.shape != (len(places), n_modes):
         raise ValueError(

@@ -222,8 +222,9 @@ class ModelUpdater(Estimator):
         shapes : array-like of shape (n_dofs, n_modes), optional
             Measured mode shapes of any scale and sign; NaN throughout a column means not measured. Complex shapes
             are made real.
-        dofs : array-like of int of shape (n_dofs,), optional
-            The model's degree of freedom of each row, the first being 0.
+        dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+            The model's degree of freedom of each row, by position, the first being 0, or by label, as in
+            ``model.dofs``.
         frequency_std : float or array-like of shape (n_modes,), optional
             Standard deviations of the mean frequencies in Hz.
 
@@ -370,7 +371,7 @@ class ModelUpdater(Estimator):
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         check_model(self.model)
         table = F if isinstance(F, pd.DataFrame) else np.atleast_2d(real_array(F, "F"))
-        values = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan")
+        values = validate_data(self, table, dtype=np.float64)
         n_modes = self.model.n_modes
         if values.shape[1] > n_modes or (shapes is None and values.shape[1] != n_modes):
             raise ValueError(
@@ -383,9 +384,9 @@ class ModelUpdater(Estimator):
                 f"shapes were given, but {self.model!r} has no {' and no '.join(map(repr, missing))}; expected a model "
                 "with local_modes, n_dof and track, such as AffineModel"
             )
-        n_dof = getattr(self.model, "n_dof", 0)
+        n_dof, labels = getattr(self.model, "n_dof", 0), getattr(self.model, "dofs", ())
         names = column_names(table, "f")
-        return read_measured(values, names, shapes, dofs, frequency_std, self.shape_weight, n_dof)
+        return read_measured(values, names, shapes, dofs, frequency_std, self.shape_weight, n_dof, labels)
 
     def _read_bounds(self) -> Array:
         names = self.model.parameter_names

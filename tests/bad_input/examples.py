@@ -223,7 +223,19 @@ AFFINE = {
         },
     ),
     "track": (False, flag()),
-    "dof_names": (["x", "y"], names(["x", "y"], "unknown", "one unknown", "text that is no name") | bad(["x"])),
+    "dofs": (
+        [(1, "x"), (2, "x")],
+        {
+            "too few": [(1, "x")],
+            "repeated": [(1, "x"), (1, "x")],
+            "names": ["x", "y"],
+            "triples": [(1, "x", 0), (2, "x", 0)],
+            "true inside": [(True, "x"), (2, "x")],
+            "lists inside": [([1], "x"), ([2], "x")],
+            "text": "ab",
+            "a number": 2,
+        },
+    ),
 }
 use("fem.AffineModel", lambda **a: AffineModel(**a).frequencies([[1.0]]), **AFFINE)
 for owner in (TRUSS, REDUCED):
@@ -487,6 +499,26 @@ TARGETS = names(["rafters"], "a number") | {
     "None inside": {"p": None},
     "true inside": {"p": True},
 }
+ALONE = {name: [name] for name in BARS}
+EXPORTED = fem.Structure(NODES, BARS, SUPPORTS, ALONE).assemble(list(BARS), n_modes=1)
+ENDS = {name: bar.nodes for name, bar in BARS.items()}
+IMPORTED = fem.ImportedStructure(EXPORTED, NODES, ENDS, GROUPS)
+use(
+    "fem.ImportedStructure",
+    lambda **a: fem.ImportedStructure(**a).assemble(["rafters"], n_modes=1).frequencies([[1.0]]),
+    model=(
+        EXPORTED,
+        bad(None, "model", 3, True, fem.AffineModel, {}, FRAME) | {"another": FRAME.assemble(["rafters"], n_modes=1)},
+    ),
+    nodes=(NODES, bad(None, [(0, 0)], "xy", True, 3, {}) | {"None inside": NODES | {"apex": None}}),
+    members=(
+        ENDS,
+        bad(None, [("left", "right")], "bars", True, 3, {})
+        | {"None inside": ENDS | {"tie": None}, "unknown": ENDS | {"post": "apex"}, "nowhere": ENDS | {"tie": "foot"}},
+    ),
+    groups=(GROUPS, bad(["tie"], "tie", True, 3, {"rafters": ["post"]}, {"rafters": []}, {"rafters": [3]})),
+    supports=(SUPPORTS, bad(["left"], "left", True, {"pier": "xy"}, {"left": "xw"}, {"left": 1}, {"left": b"xy"})),
+)
 use(
     "fem.Structure.assemble",
     lambda **a: FRAME.assemble(**a).frequencies([[1.0]]),
@@ -628,6 +660,25 @@ use(
     n_modes=(1, count(3)),
     parameter_names=(["E"], names(["E"])),
     groups=({"all": ["E"]}, AFFINE["groups"][1]),
+)
+TWICE = {"k": STIFF * 2}
+use(
+    "fem.difference_terms",
+    lambda **a: fem.difference_terms(**a)["k",].toarray(),
+    nominal=(STIFF, matrix(STIFF)),
+    changed=(TWICE, {c: {"k": v} for c, v in matrix(STIFF * 2).items()} | bad(None, "K", {1: STIFF}, {}, True)),
+    factor=(2.0, {"one": 1.0, "zero": 0.0, "negative": -2.0, "text": "2", "infinite": np.inf, "unknown": {"x": 2.0}}),
+    check=(
+        None,
+        {
+            "a matrix": STIFF,
+            "unknown": ({"x": 2.0}, STIFF),
+            "text": ({"k": "2"}, STIFF),
+            "other stiffness": ({"k": 3.0}, STIFF),
+            "NaN inside": ({"k": 2.0}, STIFF * np.nan),
+            "None": ({"k": 2.0}, None),
+        },
+    ),
 )
 (FOLDER / "tower.sti").write_text("1 1 800.0\n1 2 -400.0\n2 2 400.0\n")
 for cause, text in {

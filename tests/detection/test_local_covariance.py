@@ -1,5 +1,6 @@
 """Which records tell the covariance in some weather, and how much."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.stats import multivariate_normal
 
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
+from skthermo.residuals.weather import NearestPlaces, nearest
 from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 
 
@@ -73,3 +75,34 @@ def test_the_smoothing_is_the_likeliest_for_records_that_were_left_out(history):
         return whitened(history.residuals, history.overall, covariances)[1]
 
     assert history.likeliest().smoothing == max([None, *CANDIDATES], key=likelihood)
+
+
+@pytest.mark.parametrize("n_dimensions", [1, 3, 20])
+def test_no_place_is_searched_for_twice(n_dimensions, monkeypatch):
+    random = np.random.default_rng(0)
+    places, wanted = random.normal(size=(300, n_dimensions)), random.normal(size=(200, n_dimensions))
+    searched = NearestPlaces(places, 7)
+    counts, search = [], type(searched._tree).kneighbors
+    monkeypatch.setattr(type(searched._tree), "kneighbors", lambda tree, X: counts.append(len(X)) or search(tree, X))
+    tables = [wanted[:100], wanted, wanted[::-1], np.vstack([wanted[:3], random.normal(size=(2, n_dimensions))])]
+    for table, n_new in zip(tables, [100, 100, 0, 2], strict=True):
+        counts.clear()
+        found = searched.of(table)
+        assert sum(counts) == n_new
+        for part, expected in zip(found, nearest(places, table, 7), strict=True):
+            np.testing.assert_allclose(part, expected, rtol=1e-12)
+    assert len(pickle.dumps(searched)) < places.nbytes + 1000
+    counts.clear()
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(searched)).of(wanted)[1], searched.of(wanted)[1])
+    assert counts == [len(wanted)]
+
+
+def test_what_is_kept_of_searches_is_bounded(monkeypatch):
+    monkeypatch.setattr("skthermo.residuals.weather.MOST_KEPT", 50)
+    places = np.arange(20.0)[:, np.newaxis]
+    searched = NearestPlaces(places, 5)
+    for first in (0.1, 0.2, 0.3):
+        wanted = places[:8] + first
+        for _ in range(2):
+            np.testing.assert_array_equal(searched.of(wanted)[1], nearest(places, wanted, 5)[1])
+    assert searched._kept.near.size == 40

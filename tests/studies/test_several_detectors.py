@@ -9,18 +9,28 @@ import pytest
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import (
     FusedDetector,
     MahalanobisDetector,
     OutlierDetector,
+    TemperatureCompensator,
     WindowedAlarm,
 )
 from skthermo.fem import AffineModel
 from skthermo.studies import Scenario, compare_extensions, sweep
 from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate.chain._stages import StructureInWeather, ThermalModel
 from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
 
+COUNTED = {
+    StructureInWeather: "simulated",
+    DataInformedFEM: "weather",
+    ThermalModel: "parameters",
+    AffineModel: "frequencies",
+}
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
 
@@ -118,15 +128,46 @@ def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
 
         monkeypatch.setattr(owner, name, count)
 
-    for owner, name in ((DataInformedFEM, "simulate"), (DataInformedFEM, "weather"), (AffineModel, "frequencies")):
-        counted(owner, name)
+    for owner in (StructureInWeather, DataInformedFEM, ThermalModel, AffineModel):
+        counted(owner, COUNTED[owner])
     found = []
     for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):
         counts.clear()
         study_of(fem, some, SCENARIOS).run(WEATHER)
         found.append(dict(counts))
     assert found[0] == found[1]
-    assert found[0]["simulate"] == len(SCENARIOS)
+    assert found[0]["simulated"] == len(SCENARIOS)
+    assert found[0]["parameters"] == 1
+
+
+def test_detectors_that_begin_alike_share_these_steps_and_their_residuals(fem, monkeypatch):
+    counts = Counter()
+
+    def counted(name):
+        original = getattr(TemperatureCompensator, name)
+
+        def count(self, *arguments):
+            counts[name] += 1
+            return original(self, *arguments)
+
+        monkeypatch.setattr(TemperatureCompensator, name, count)
+
+    lasts = {"single": MahalanobisDetector(), "few": MahalanobisDetector(0.01), "week": WindowedAlarm(7)}
+    several = {name: compensated(last) for name, last in lasts.items()}
+    in_hertz = TemperatureCompensator(LinearRegression(), targets=MODES, whiten=None)
+    several["other"] = make_pipeline(in_hertz, MahalanobisDetector())
+    alone = {name: study_of(fem, {name: one}, SCENARIOS).run(WEATHER) for name, one in several.items()}
+    counted("fit_transform")
+    counted("transform")
+    study = study_of(fem, several, SCENARIOS)
+    together = study.run(WEATHER)
+    for name, one in alone.items():
+        pd.testing.assert_frame_equal(together[together["detector"] == name].reset_index(drop=True), one)
+    assert counts["fit_transform"] == 2
+    n_damaged, n_repeats = len(SCENARIOS) - 1, study.n_repeats
+    assert counts["transform"] == n_repeats * (2 * (len(SCENARIOS) + 1) + n_damaged)  # calibration, and transitions
+    assert study.detectors_["single"][0] is study.detectors_["week"][0]
+    assert study.detectors_["single"][0] is not study.detectors_["other"][0]
 
 
 def test_the_truth_is_asked_once_for_all_detectors(fem):

@@ -7,7 +7,16 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, Bounds, MatrixLike, RandomState, check_flag, check_theta, positive_integer
+from skthermo._tables.arrays import (
+    Array,
+    Bounds,
+    Label,
+    MatrixLike,
+    RandomState,
+    check_flag,
+    check_theta,
+    positive_integer,
+)
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
 from skthermo.fem.affine._base import (
     AffineBase,
@@ -17,6 +26,7 @@ from skthermo.fem.affine._base import (
     Names,
     are_sparse,
     check_groups,
+    check_labels,
     check_names,
     exponents_of,
     read_terms,
@@ -64,8 +74,9 @@ class AffineModel(AffineBase):
     track : bool, default=False
         True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
         swap. False: column j is the j-th lowest mode.
-    dof_names : sequence of str, optional
-        Names of the degrees of freedom in error messages.
+    dofs : sequence of (node, direction), optional
+        Labels of the degrees of freedom, one for each row, all different. Error messages name them, and measured
+        shapes can be given at them.
     contents : sequence of sequence of (member, properties), optional
         The members of a `Structure` whose matrices each stiffness term sums, as `Structure.assemble` gives them, so
         that `Structure.divide` can take them apart.
@@ -116,7 +127,7 @@ class AffineModel(AffineBase):
         parameter_names: Sequence[str] | None = None,
         groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
         track: bool = False,
-        dof_names: Sequence[str] | None = None,
+        dofs: Sequence[Label] = (),
         contents: Sequence[Sequence[Content]] = (),
     ):
         stiffness_keys, stiffness_matrices = read_terms(stiffness, "stiffness")
@@ -135,7 +146,8 @@ class AffineModel(AffineBase):
         mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         n_dof = stiffness_terms.n_dof
         nominal = nominal_theta(len(self._parameter_names))
-        check_supported(stiffness_terms.assemble(nominal)[0], dof_names)
+        self._dofs = check_labels(dofs, n_dof)
+        check_supported(stiffness_terms.assemble(nominal)[0], self._dofs)
         available = count_modes(mass_terms.assemble(nominal)[0], at_least=n_modes)
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
         self._core = AffineCore.from_terms(

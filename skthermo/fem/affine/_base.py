@@ -16,6 +16,7 @@ from skthermo._estimators.threads import map_on_blas_threads
 from skthermo._tables.arrays import (
     Array,
     Bounds,
+    Label,
     Matrix,
     MatrixLike,
     RandomState,
@@ -24,6 +25,7 @@ from skthermo._tables.arrays import (
     check_flag,
     check_theta,
     integer_row,
+    is_label,
     is_real,
     real_array,
     shape_array,
@@ -183,6 +185,19 @@ def check_modes(modes: Sequence[int], available: int) -> NDArray[np.intp]:
     return ranks.astype(np.intp)
 
 
+def check_labels(dofs: Sequence[Label], n_dof: int) -> tuple[Label, ...]:
+    """Labels of all degrees of freedom, or none."""
+    if not isinstance(dofs, Sequence) or not all(is_label(dof) for dof in dofs):
+        raise ValueError(
+            f"dofs is {dofs!r:.200}; expected a tuple of node and direction for each row, such as (12, 'x')"
+        )
+    if dofs and len(dofs) != n_dof:
+        raise ValueError(f"dofs holds {len(dofs)} labels; expected {n_dof}, one for each row")
+    if len(set(dofs)) < len(dofs):
+        raise ValueError(f"dofs is {dofs!r:.200}; expected different labels")
+    return tuple(dofs)
+
+
 def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
     """How often each parameter occurs in each key, (n_terms, n_parameters)."""
     return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)
@@ -203,6 +218,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
     _parameter_names: tuple[str, ...]
     _groups: dict[str, tuple[int, ...]]
     _contents: tuple[tuple[Content, ...], ...] = ()
+    _dofs: tuple[Label, ...] = ()
     _core: AffineCore
     _basis: Array | None = None
     _is_quiet = False
@@ -231,6 +247,11 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
     @property
     def n_dof(self) -> int:
         return self._full_core.stiffness.n_dof
+
+    @property
+    def dofs(self) -> tuple[Label, ...]:
+        """Labels of the degrees of freedom, such as (node, direction), one for each row; empty if unknown."""
+        return self._dofs
 
     @property
     def track(self) -> bool:
@@ -302,8 +323,8 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
         ----------
         theta : array-like of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
-        dofs : array-like of int of shape (n_dofs,)
-            Degrees of freedom at which shapes are wanted, the first being 0.
+        dofs : array-like of int of shape (n_dofs,), or list of (node, direction)
+            Degrees of freedom at which shapes are wanted, by position, the first being 0, or by label.
 
         Returns
         -------
@@ -311,7 +332,7 @@ class AffineBase(ModalModel, DifferentiableModel, DamageableModel, LocalModel, B
             Frequencies, Jacobian, shapes of unit modal mass and their derivatives, as `linearise_modes` gives them;
             derivatives are arbitrary where eigenvalues repeat.
         """
-        places = check_dofs(dofs, self.n_dof)
+        places = check_dofs(dofs, self.n_dof, self.dofs)
         solve = partial(self._core.linearised_modes, dofs=places, basis=self._basis)
         return self._in_chunks(solve, theta)  # type: ignore[return-value]
 

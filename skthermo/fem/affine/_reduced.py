@@ -252,6 +252,7 @@ class ReducedModel(AffineBase):
         if not isinstance(tol, int | float | np.floating) or not 0 < tol < 1:
             raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
         self._parameter_names, self._groups, self._contents = full.parameter_names, full._groups, full._contents
+        self._dofs = full.dofs
         self._full = full
         self._bounds = check_bounds(bounds, full.parameter_names)
         self._tol = tol

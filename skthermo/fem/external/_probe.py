@@ -13,11 +13,11 @@ import scipy.sparse
 from skthermo._tables.arrays import Array, MatrixLike, RandomState, as_random_state
 from skthermo.fem._terms import by_name, failures_named
 from skthermo.fem.affine import AffineModel, check_different, read_terms
+from skthermo.fem.external._differences import SAME, relative, split
 
 Terms = list[tuple[tuple[str, ...], scipy.sparse.csc_array]]
 
 MATRICES = ("stiffness", "mass")
-SAME = 1e-6
 
 
 class Program:
@@ -43,12 +43,6 @@ class Program:
             self.n_dof = read.shape[0]
             matrices.append(scipy.sparse.csc_array(read))
         return matrices
-
-
-def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
-    """|entry_ij| / sqrt(d_i d_j)."""
-    size, scale = np.abs(entries.data), np.sqrt(np.abs(diagonal[entries.row] * diagonal[entries.col]))
-    return np.divide(size, scale, out=np.where(size > 0, np.inf, 0.0), where=scale > 0)
 
 
 def check_affine(program: Program, terms: tuple[Terms, Terms], row: Array) -> None:
@@ -88,9 +82,6 @@ def _refuse(names: str, found: tuple[str, float], where: str) -> None:
         f"K_0 + sum of theta_j K_j at {where}; expected each parameter to act alone and to the first power (let one "
         "stand for the power or product), or CallableModel for what is not affine"
     )
-
-
-ROUNDING = 16 * np.finfo(float).eps
 
 
 def probe(
@@ -168,7 +159,13 @@ def probe(
     program = Program(assemble, names)
     base = program(np.ones(len(names)))
     doubled = [program(row) for row in 1 + np.eye(len(names))]
-    stiffness, mass = (_terms(names, base[i], [matrices[i] for matrices in doubled]) for i in range(2))
+    factors = dict.fromkeys(names, 2.0)
+    stiffness, mass = (
+        list(
+            split(base[i], {name: matrices[i] for name, matrices in zip(names, doubled, strict=True)}, factors).items()
+        )
+        for i in range(2)
+    )
     for name in names:
         if (name,) not in [key for key, _ in stiffness + mass]:
             raise ValueError(
@@ -177,19 +174,3 @@ def probe(
     for row in as_random_state(random_state).uniform(0.5, 1.5, (n_checks, len(names))):
         check_affine(program, (stiffness, mass), row)
     return AffineModel(stiffness, mass, n_modes=n_modes, parameter_names=names, track=track)
-
-
-def _terms(names: Sequence[str], base: scipy.sparse.csc_array, doubled: Sequence[scipy.sparse.csc_array]) -> Terms:
-    """The term of each parameter, which is the change when it is doubled, and the constant part that remains."""
-    diagonal, rounding = base.diagonal(), ROUNDING * (len(names) + 1)
-    parts = [_without(rounding, matrix - base, diagonal) for matrix in doubled]
-    rest = _without(rounding, base - reduce(add, parts), diagonal)
-    pairs: Terms = [*(((name,), part) for name, part in zip(names, parts, strict=True)), ((), rest)]
-    return [(key, matrix) for key, matrix in pairs if matrix.nnz] or [((), rest)]
-
-
-def _without(rounding: float, matrix: scipy.sparse.csc_array, diagonal: Array) -> scipy.sparse.csc_array:
-    entries = matrix.tocoo()
-    matters = relative(entries, diagonal) > rounding
-    places = entries.row[matters], entries.col[matters]
-    return scipy.sparse.csc_array((entries.data[matters], places), shape=matrix.shape)

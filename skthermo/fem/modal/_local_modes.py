@@ -91,6 +91,8 @@ class LocalModes:
     ----------
     frequencies : ndarray of shape (n_candidates,)
         In Hz. There are more than the model's ``n_modes``, so that its modes are among them.
+    n_dof : int
+        Number of degrees of freedom.
 
     Examples
     --------
@@ -122,7 +124,7 @@ class LocalModes:
         self._theta = theta
         self._solve = solve
         self._basis = basis
-        self._n_dof = len(shapes if basis is None else basis)
+        self.n_dof = len(shapes if basis is None else basis)
 
     def shapes(self, dofs: ArrayLike) -> Array:
         """Mode shapes at some degrees of freedom.
@@ -137,7 +139,7 @@ class LocalModes:
         ndarray of shape (n_dofs, n_candidates)
             Of unit modal mass.
         """
-        return self._at_dofs(check_dofs(dofs, self._n_dof), self._shapes)
+        return self._at_dofs(check_dofs(dofs, self.n_dof), self._shapes)
 
     def derivatives(self, columns: ArrayLike, dofs: ArrayLike) -> tuple[Array, Array]:
         """Derivatives of some modes with respect to the parameters.
@@ -166,7 +168,7 @@ class LocalModes:
         columns = integer_row(columns, "columns").astype(np.intp)
         if ((columns < 0) | (columns >= len(self._eigenvalues))).any():
             raise ValueError(f"columns holds {columns.tolist()}; expected 0 to {len(self._eigenvalues) - 1}, the modes")
-        dofs = check_dofs(dofs, self._n_dof) if dofs is None or np.size(dofs) else np.empty(0, dtype=np.intp)
+        dofs = check_dofs(dofs, self.n_dof) if dofs is None or np.size(dofs) else np.empty(0, dtype=np.intp)
         stiffness, mass = self._stiffness, self._mass
         phi, eigenvalues = self._shapes[:, columns], self._eigenvalues[columns]
         forces = -stiffness.derivatives(self._theta, phi)
@@ -211,8 +213,8 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     theta : array-like of shape (n_parameters,) or (1, n_parameters)
         Multipliers of the nominal parameters. Where eigenvalues repeat, derivatives of single shapes do not
         exist and the part within the repeated space is left out.
-    dofs : array-like of int of shape (n_dofs,), optional
-        Degrees of freedom, the first being 0. All by default.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        Degrees of freedom, by position, the first being 0, or by label, as in ``model.dofs``. All by default.
 
     Returns
     -------
@@ -248,5 +250,5 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
     row = check_theta(theta, model.parameter_names, one_row=True)
     modes = model.local_modes(row, follow=True)
     columns = modes.ranks if model.track else np.arange(model.n_modes)
-    places = np.arange(model.n_dof) if dofs is None else check_dofs(dofs, model.n_dof)
+    places = np.arange(model.n_dof) if dofs is None else check_dofs(dofs, model.n_dof, getattr(model, "dofs", ()))
     return modes.shapes(places)[:, columns], modes.derivatives(columns, places)[1]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import Array, check_model, check_theta, real_array, shape_array, without_mask
+from skthermo._tables.arrays import Array, check_dofs, check_model, check_theta, real_array, shape_array, without_mask
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem._terms import nominal_theta
 
@@ -206,8 +206,9 @@ def match_modes(
         Measured frequencies in Hz, of which the mean over records counts. NaN is allowed.
     shapes : array-like of shape (n_dofs, n_measured), optional
         Measured mode shapes, real or complex, scaled in any way. The model needs a method ``local_modes``.
-    dofs : array-like of int of shape (n_dofs,), optional
-        The model's degrees of freedom that their rows are, the first being 0.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        The model's degrees of freedom that their rows are, by position, the first being 0, or by label, as in
+        ``model.dofs``.
 
     Returns
     -------
@@ -257,7 +258,8 @@ def match_modes(
         if local is None:
             raise ValueError(f"{model!r} has no method 'local_modes'; expected one where shapes are given")
         shapes = shape_array(shapes, "shapes")
-        expected = (np.size(dofs), len(measured))
+        places = check_dofs(dofs, local.n_dof, getattr(model, "dofs", ()))
+        expected = (len(places), len(measured))
         if np.shape(shapes) != expected:
             raise ValueError(
                 f"shapes have shape {np.shape(shapes)}; expected {expected}: a row for each of dofs and a column for "
@@ -265,7 +267,7 @@ def match_modes(
             )
         if not np.isfinite(shapes).all():
             raise ValueError("shapes hold values that are not finite; expected a measured shape in each column")
-        macs = mac(shapes, local.shapes(dofs))
+        macs = mac(shapes, local.shapes(places))
         cost += 1 - macs
     ranks: NDArray[np.intp] = linear_sum_assignment(cost)[1]
     table = pd.DataFrame({"mode": ranks, "measured": measured, "model": candidates[ranks]}, index=names)

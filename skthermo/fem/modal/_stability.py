@@ -1,12 +1,12 @@
 """Checks for mechanisms and missing mass."""
 
-from collections.abc import Sequence, Sized
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, Matrix, as_dense
+from skthermo._tables.arrays import Array, Label, Matrix, as_dense
 from skthermo.fem._factors import factorise
 from skthermo.fem.modal._sparse import seeded_start
 
@@ -16,19 +16,15 @@ FEW_DOFS = 500  # degrees of freedom up to which a mass matrix is examined as a 
 SMALL_SHIFT = 1e-10  # multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite
 
 
-def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> None:
+def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
     """Refuse a stiffness that is not positive definite within rounding, and name where the motion is largest.
 
     The energy x'Kx of a motion is a sum of entries that cancel where the motion is nearly rigid. Of a mechanism,
     rounding of these entries is all that is left; the softest motion of a fine mesh has more.
     """
     diagonal = stiffness.diagonal()
-    if names is not None and (isinstance(names, str | bytes) or not isinstance(names, Sized)):
-        raise ValueError(f"dof_names is {names!r:.200}; expected a list of names, one for each row")
-    if names is not None and len(names) != len(diagonal):
-        raise ValueError(f"dof_names holds {len(names)} names; expected {len(diagonal)}, one for each row")
     if (diagonal <= 0).any():
-        _refuse(np.flatnonzero(diagonal <= 0), names)
+        _refuse(np.flatnonzero(diagonal <= 0), dofs)
     scale = 1 / np.sqrt(diagonal)
     if isinstance(stiffness, np.ndarray):
         eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
@@ -40,7 +36,7 @@ def check_supported(stiffness: Matrix, names: Sequence[str] | None = None) -> No
     if lowest <= rounding:
         motion = np.abs(scale * vector)
         largest = np.argsort(-motion, kind="stable")
-        _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], names)
+        _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], dofs)
 
 
 def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> int:
@@ -89,8 +85,8 @@ def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     return float(eigenvalue[0]), vector[:, 0]
 
 
-def _refuse(free: NDArray[np.intp], names: Sequence[str] | None) -> None:
-    shown = [f"degree of freedom {i}" if names is None else names[i] for i in free[:6]]
+def _refuse(free: NDArray[np.intp], dofs: Sequence[Label]) -> None:
+    shown = [f"node {dofs[i][0]!r} along {dofs[i][1]}" if dofs else f"degree of freedom {i}" for i in free[:6]]
     listed = ", ".join(shown) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
     raise ValueError(
         f"the structure is a mechanism: {listed} can move without resistance; "

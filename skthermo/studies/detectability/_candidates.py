@@ -4,11 +4,14 @@ import warnings
 from collections.abc import Hashable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from pickle import PicklingError
 from typing import Any
 
+import joblib
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
+from sklearn.pipeline import Pipeline
 
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
@@ -149,9 +152,30 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     return curve.a90 if np.isfinite(curve.a90) else float(np.nan_to_num(np.mean(curve.bracket), nan=np.inf))
 
 
+class LearnedHeads:
+    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records."""
+
+    def __init__(self) -> None:
+        self._learned: dict[str, tuple[Pipeline, Table]] = {}
+
+    def of(self, pipeline: Pipeline, healthy: Table) -> tuple[Pipeline, Table]:
+        """The steps before the last one of a pipeline, fitted, and what they make of healthy records."""
+        head = pipeline[:-1]
+        try:
+            key = joblib.hash((head.steps, healthy))
+        except PicklingError:
+            return head, head.fit_transform(healthy)
+        if key not in self._learned:
+            self._learned[key] = head, head.fit_transform(healthy)
+        return self._learned[key]
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A detector that has learned the healthy structure, its name, and which columns it sees."""
+    """A detector that has learned the healthy structure, its name, and which columns it sees.
+
+    Its ``head``, the steps before its ``last`` one, may be those of other detectors too.
+    """
 
     name: str
     detector: BaseEstimator
@@ -166,12 +190,30 @@ class Candidate:
         fem: FittedChain,
         baseline: Table | None,
         random_state: np.random.RandomState | None,
+        heads: LearnedHeads,
     ) -> "Candidate":
         """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own."""
         view, healthy = read_baseline(fem, detector, baseline)
         fitted = clone(detector)
         seed_parts(fitted, deepcopy(random_state))
-        return cls(name, fitted.fit(healthy), view, _num_samples(healthy))
+        if isinstance(fitted, Pipeline) and len(fitted) > 1:
+            head, seen = heads.of(fitted, healthy)
+            fitted.steps[:-1] = head.steps
+            fitted[-1].fit(seen)
+        else:
+            fitted.fit(healthy)
+        return cls(name, fitted, view, _num_samples(healthy))
+
+    @property
+    def head(self) -> tuple[BaseEstimator, ...]:
+        """The fitted steps before the last one, none of what is no pipeline."""
+        steps = self.detector.steps if isinstance(self.detector, Pipeline) else []
+        return tuple(step for _, step in steps[:-1])
+
+    @property
+    def last(self) -> BaseEstimator:
+        """The detector, or the last step of its pipeline."""
+        return self.detector[-1] if self.head else self.detector
 
     @property
     def threshold(self) -> float | None:
@@ -195,11 +237,15 @@ class Candidate:
         columns = [self.view.names[i] for i in self.view.positions]
         return Arrangement(clone(self.detector), columns, self.n_baseline, self.view.is_frame)
 
-    def decisions(self, table: Table) -> Array:
-        """Decision function, NaN where there is none; float32 is as much as alarms and intervals need."""
-        return np.asarray(self.detector.decision_function(table), dtype=np.float32)
+    def entering(self, table: Table) -> Table:
+        """What the last step sees of a table of the columns that the detector sees."""
+        return self.detector[:-1].transform(table) if self.head else table
 
-    def damage_index(self, table: Table, rows: Table) -> pd.Series:
+    def decisions(self, entering: Table) -> Array:
+        """Decision function, NaN where there is none; float32 is as much as alarms and intervals need."""
+        return np.asarray(self.last.decision_function(entering), dtype=np.float32)
+
+    def damage_index(self, entering: Table, rows: Table) -> pd.Series:
         """Minus the detector's ``score_samples``, on the index of the records."""
         index = rows.index if isinstance(rows, pd.DataFrame) else None
-        return pd.Series(-np.asarray(self.detector.score_samples(table), dtype=float), index, name="damage_index")
+        return pd.Series(-np.asarray(self.last.score_samples(entering), dtype=float), index, name="damage_index")

@@ -174,6 +174,7 @@ class Records:
     T: Table
     rows: Table
     healthy: Array | None = None
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def has_onsets(self) -> bool:
@@ -183,8 +184,18 @@ class Records:
 
     def beginning(self, memory: int) -> Records:
         """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
-        damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
-        return replace(self, values=np.where(damaged, self.values, self.healthy))
+        if memory not in self._known:
+            damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
+            self._known[memory] = replace(self, values=np.where(damaged, self.values, self.healthy))
+        return self._known[memory]
+
+    def entering(self, candidate: Candidate) -> Table:
+        """What the last step of a detector sees, computed once for all whose steps before it are the same."""
+        if not candidate.head:
+            return self.seen_by(candidate)
+        if candidate.head not in self._known:
+            self._known[candidate.head] = candidate.entering(self.seen_by(candidate))
+        return self._known[candidate.head]
 
     def seen_by(self, candidate: Candidate) -> Table:
         """The columns that a detector sees."""
@@ -305,12 +316,12 @@ class Simulation:
     def _answer(self, records: Records, with_index: bool, name: str) -> tuple[Any, Array, Array | None]:
         """Damage index, decisions and those of transitions of one detector."""
         candidate = self.candidates[name]
-        seen, memory, during = records.seen_by(candidate), candidate.memory, None
+        entering, memory, during = records.entering(candidate), candidate.memory, None
         if memory > 1 and records.has_onsets:
             with without_warnings():
-                during = transitions_of(candidate.decisions(records.beginning(memory).seen_by(candidate)), memory)
-        index = candidate.damage_index(seen, records.rows) if with_index else None
-        return index, candidate.decisions(seen), during
+                during = transitions_of(candidate.decisions(records.beginning(memory).entering(candidate)), memory)
+        index = candidate.damage_index(entering, records.rows) if with_index else None
+        return index, candidate.decisions(entering), during
 
     def _calibrated(self, found: Evaluation, repeat: int, seeds: Sequence[int]) -> Evaluation:
         """The evaluation with decisions on healthy records with noise of other seeds."""
@@ -345,24 +356,12 @@ def clean_frequencies(
     fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
 ) -> dict[str, list[Array]]:
     """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
-    clean = {}
+    structure, clean = fem.thermal_.in_weather(fem.weather(T)), {}
     for scenario in scenarios:
         draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
         changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
-            clean[scenario.name] = _of_draws(fem, [change["damage"] for change in changes], T)
+            clean[scenario.name] = structure.with_each([change["damage"] for change in changes])
         else:
-            clean[scenario.name] = [as_floats(fem.simulate(T, **change)) for change in changes]
+            clean[scenario.name] = [structure.simulated(**change) for change in changes]
     return clean
-
-
-def _of_draws(fem: FittedChain, draws: Sequence[Mapping[str, float]], T: Table) -> list[Array]:
-    """Frequencies of the structure with one damage after the other, solved together by one model."""
-    groups = list(draws[0])
-    severities = np.array([[draw[group] for group in groups] for draw in draws])
-    simulator = fem.simulator_.with_damage_parameters(groups, severities.min(), severities.max())
-    theta = as_floats(fem.predict_parameters(T))
-    factors = np.repeat(1 - severities, len(theta), axis=0)
-    frequencies = simulator.frequencies(np.hstack([np.tile(theta, (len(draws), 1)), factors]), fem.n_jobs)
-    ratio = np.exp(fem.discrepancy_(T))
-    return [ratio * one for one in np.split(as_floats(fem.aligner_.inverse_transform(frequencies)), len(draws))]

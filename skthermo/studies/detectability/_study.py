@@ -19,7 +19,7 @@ from skthermo._tables.arrays import as_random_state, check_jobs, positive_intege
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
-from skthermo.studies.detectability._candidates import Candidate
+from skthermo.studies.detectability._candidates import Candidate, LearnedHeads
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
@@ -335,9 +335,9 @@ class DetectabilityStudy(BaseEstimator):
         T = replicates.years[0]
         stages = Stages(self, 4 + bool(replicates.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
-            parts = seeded(self.random_state)
+            parts, heads = seeded(self.random_state), LearnedHeads()
             candidates, errors = ask_each(
-                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts), {}
+                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts, heads), {}
             )
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):

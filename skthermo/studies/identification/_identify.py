@@ -89,8 +89,9 @@ def identify_damage(
         Measured mode shapes of the healthy and of the changed structure in similar weather, each of shape (n_dofs,
         n_modes) or, of several records, (n_records, n_dofs, n_modes). Scale, sign and phase do not matter, and complex
         shapes are turned to be real; NaN where a component was not measured.
-    dofs : array-like of shape (n_dofs,), optional
-        Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        Degrees of freedom of the shapes' rows, by position, counted from 0, or by label, as in ``fem.model.dofs``;
+        needed with ``shapes``.
     shape_noise : "fitted", float or array-like of shape (n_modes,), default=0.01
         Standard deviation of a component of one record's shape, relative to the shape's largest component. Where
         several records scatter more, their scatter counts; "fitted" takes the scatter alone.

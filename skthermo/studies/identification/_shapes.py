@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._effects import ChangedStructure, central_differences
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, check_noise
+from skthermo._tables.arrays import Array, as_floats, check_dofs, check_noise
 from skthermo.exceptions import RecordsWarning
 
 STATES = ("healthy", "damaged")
@@ -42,11 +42,7 @@ class ShapeEffects:
         if not hasattr(model, "modes"):
             raise ValueError(f"{model!r} has no method 'modes'; expected a model with one, to compare mode shapes")
         shapes = model.modes(mean)[1][0]
-        places = np.asarray(dofs)
-        if places.ndim != 1 or not np.issubdtype(places.dtype, np.integer) or not places.size:
-            raise ValueError(f"dofs is {dofs!r}; expected the degree of freedom of each sensor, counted from 0")
-        if places.min() < 0 or places.max() >= len(shapes):
-            raise ValueError(f"dofs reach from {places.min()} to {places.max()}; expected 0 to {len(shapes) - 1}")
+        places = check_dofs(dofs, len(shapes), getattr(model, "dofs", ()))
         reference = shapes[places] / np.abs(shapes[places]).max(axis=0)
         known = np.ones(reference.shape, dtype=bool)
         return cls(structure, mean, places, reference, known, []).at(known)

@@ -57,7 +57,7 @@ def locate_damage(
     fem : DataInformedFEM
         Fitted to healthy records; its model was assembled from the structure. It may have been calibrated since.
     structure : Structure
-        Nodes and members of the model.
+        Nodes and members of the model; an `ImportedStructure` for members that another program has assembled.
     T : array-like or DataFrame of shape (n_samples, n_sensors)
         Temperatures of the records to explain, in degrees Celsius.
     F : array-like or DataFrame of shape (n_samples, n_modes)
@@ -71,8 +71,9 @@ def locate_damage(
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the damaged structure, as in `identify_damage`. They tell mirrored
         places of a symmetric structure apart, which frequencies do not.
-    dofs : array-like of shape (n_dofs,), optional
-        Degrees of freedom of the shapes' rows, counted from 0; needed with ``shapes``.
+    dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
+        Degrees of freedom of the shapes' rows, by position, counted from 0, or by label, as in ``fem.model.dofs``;
+        needed with ``shapes``.
     shape_noise : float, array-like of shape (n_modes,) or "fitted", default=0.01
         Errors of the shapes, as in `identify_damage`.
     random_state : int, RandomState or None, default=None
@@ -121,7 +122,7 @@ def locate_damage(
     """
     check_chain(fem)
     if not isinstance(structure, Structure):
-        raise ValueError(f"structure is {structure!r:.200}; expected the Structure that the model was assembled from")
+        raise ValueError(f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model")
     contents = read_groups(fem.model, groups)
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)

@@ -428,31 +428,13 @@ class ThermalModel(SavesFrames):
         theta = as_columns(self.mapper.predict(weather.filled))
         return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
 
-    def simulated(
-        self,
-        weather: Weather,
-        modes: Sequence[int] | None = None,
-        *,
-        damage: Mapping[str, float | ArrayLike] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        stiffness: MatrixLike | None = None,
-        mass: MatrixLike | None = None,
-    ) -> Array:
-        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
-        simulator = self.simulator if modes is None else self.simulator.changed("with_modes", modes)
-        if stiffness is not None or mass is not None:
-            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
-        theta = self.parameters(weather) * factors_of(parameters, self.parameter_names)
-        fixed, growing = split_damage(damage, weather.given)
-        simulator = simulator.damaged(fixed)
-        if growing:
-            severities = np.column_stack(list(growing.values()))
-            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
-            theta = np.hstack([theta, 1 - severities])
-        frequencies = simulator.frequencies(theta, self.n_jobs)
-        if modes is not None:
-            return frequencies
-        return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(self.discrepancy.at(weather.inputs))
+    def simulated(self, weather: Weather, modes: Sequence[int] | None = None, **changes: Any) -> Array:
+        """Frequencies of the structure as `StructureInWeather` simulates it in this weather."""
+        return self.in_weather(weather).simulated(modes, **changes)
+
+    def in_weather(self, weather: Weather) -> StructureInWeather:
+        """The structure in this weather, in which several changes can be simulated."""
+        return StructureInWeather(self, weather)
 
     def propagated(self, theta: Array, covariances: Array) -> Array:
         """Covariances of ln f in the measured domain, G C G' with G = d ln f / d theta, (n, n_modes, n_modes)."""
@@ -486,6 +468,60 @@ class ThermalModel(SavesFrames):
             return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
         theta = as_columns(self.mapper.predict(weather.filled))
         return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
+
+
+@dataclass(frozen=True, eq=False)
+class StructureInWeather:
+    """A thermal model in one weather, whose parameters and discrepancy are computed once for whatever changes."""
+
+    model: ThermalModel
+    weather: Weather
+
+    @cached_property
+    def theta(self) -> Array:
+        """Parameters, with the warnings of `ThermalModel.parameters`."""
+        return self.model.parameters(self.weather)
+
+    @cached_property
+    def ratio(self) -> Array:
+        """Measured over modelled frequencies, as the discrepancy has it."""
+        return np.exp(self.model.discrepancy.at(self.weather.inputs))
+
+    def measured(self, frequencies: Array) -> Array:
+        """Frequencies of the FE model in the measured domain, with the discrepancy."""
+        return as_floats(self.model.aligner.inverse_transform(frequencies)) * self.ratio
+
+    def simulated(
+        self,
+        modes: Sequence[int] | None = None,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        model = self.model
+        simulator = model.simulator if modes is None else model.simulator.changed("with_modes", modes)
+        if stiffness is not None or mass is not None:
+            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
+        theta = self.theta * factors_of(parameters, model.parameter_names)
+        fixed, growing = split_damage(damage, self.weather.given)
+        simulator = simulator.damaged(fixed)
+        if growing:
+            severities = np.column_stack(list(growing.values()))
+            simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+            theta = np.hstack([theta, 1 - severities])
+        frequencies = simulator.frequencies(theta, model.n_jobs)
+        return frequencies if modes is not None else self.measured(frequencies)
+
+    def with_each(self, draws: Sequence[Mapping[str, float]]) -> list[Array]:
+        """Frequencies with one damage of the same groups after the other, solved together by one model."""
+        groups, n_rows = list(draws[0]), len(self.theta)
+        severities = np.array([[draw[group] for group in groups] for draw in draws])
+        simulator = self.model.simulator.with_damage_parameters(groups, severities.min(), severities.max())
+        theta = np.hstack([np.tile(self.theta, (len(draws), 1)), np.repeat(1 - severities, n_rows, axis=0)])
+        return [self.measured(one) for one in np.split(simulator.frequencies(theta, self.model.n_jobs), len(draws))]
 
 
 def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:

@@ -68,10 +68,11 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         a `DataInformedFEM` from temperatures and frequencies; without temperatures, from what the model leaves
         unexplained of the records that `fit` sees, if estimates are refined and there are more modes than parameters;
         otherwise it is 0.
-    dofs : array-like of int of shape (n_sensors,), optional
-        Degrees of freedom of the model, the first being 0, where mode shapes are measured. Rows of X are then the
-        frequencies followed by the shapes' components at the sensors, mode by mode: n_modes * (1 + n_sensors) columns.
-        Components are real, of any scale and sign; `~skthermo.fem.shape_components` makes them of complex shapes.
+    dofs : array-like of int of shape (n_sensors,), or list of (node, direction), optional
+        Degrees of freedom of the model where mode shapes are measured, by position, the first being 0, or by label, as
+        in ``model.dofs``. Rows of X are then the frequencies followed by the shapes' components at the sensors, mode by
+        mode: n_modes * (1 + n_sensors) columns. Components are real, of any scale and sign;
+        `~skthermo.fem.shape_components` makes them of complex shapes.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of the measured components of a shape as a share of their root mean square.
     refine : int, optional

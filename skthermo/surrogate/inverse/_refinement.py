@@ -50,7 +50,7 @@ class ShapeInputs:
         if not hasattr(model, "modes"):
             raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
         shapes = np.asarray(model.modes(np.ones((1, len(model.parameter_names))))[1])[0]
-        places = check_dofs(dofs, len(shapes))
+        places = check_dofs(dofs, len(shapes), getattr(model, "dofs", ()))
         largest = np.abs(shapes[places]).max(axis=0) / np.abs(shapes).max(axis=0)
         if (largest < NODE).any():
             raise ValueError(
