@@ -93,7 +93,7 @@ class Proposal:
         steps = np.diff(self.baseline.index.as_unit("ns").asi8)
         return pd.Timedelta(int(np.median(steps)) if len(steps) else 0, "ns")
 
-    def sentences(self) -> Iterator[str]:
+    def account(self) -> Iterator[str]:
         """What was found in the files."""
         for look in self.looks:
             form, index = look.form, look.records.index
@@ -132,7 +132,7 @@ class Proposal:
 
     def text(self, name: str | None = None) -> str:
         """The settings as TOML, with what each means."""
-        found = [*self.sentences(), *self.findings.summary().splitlines()]
+        found = [*self.account(), *self.findings.summary().splitlines()]
         per_unit: Any = next(iter(self.units.values())) if len(set(self.units.values())) == 1 else dict(self.units)
         is_dense = self.step <= DENSE
         means = self.memory.features

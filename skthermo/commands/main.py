@@ -315,7 +315,7 @@ def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     found = Proposal.of(options)
     facts["findings"] = found.findings.table.to_dict("records")
     if not options.json:
-        print("\n".join([*found.sentences(), found.findings.summary()]))
+        print("\n".join([*found.account(), found.findings.summary()]))
     return HEALTHY if found.findings.table.empty else ALARM
 
 
@@ -327,6 +327,6 @@ def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     file = found.write(options.into, options.bridge)
     facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
     if not options.json:
-        print("\n".join([*found.sentences(), found.findings.summary(), f"written: {file}"]))
+        print("\n".join([*found.account(), found.findings.summary(), f"written: {file}"]))
         print(f"read it, then: skthermo fit {file}")
     return HEALTHY
