@@ -11,6 +11,7 @@ return [...document.querySelectorAll("a[href], button, input, select, textarea, 
   .filter((one) => one.checkVisibility({visibilityProperty: true}) && !one.disabled && !one.closest("[inert]"))
 """
 FOCUS = """
+for (const motion of document.getAnimations()) motion.finish();
 const focused = document.activeElement, one = focused.closest(".sd-card") ?? focused;  // a card is the place of its link
 const box = one.getBoundingClientRect(), style = getComputedStyle(one);
 return {place: arguments[0].indexOf(focused), is_marked: style.outlineStyle !== "none" || style.boxShadow !== "none",
