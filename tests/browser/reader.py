@@ -12,7 +12,7 @@ return [...document.querySelectorAll("a[href], button, input, select, textarea, 
 """
 FOCUS = """
 for (const motion of document.getAnimations()) motion.finish();
-const focused = document.activeElement, one = focused.closest(".sd-card") ?? focused;  // a card is the place of its link
+const focused = document.activeElement, one = focused.closest(".sd-card") ?? focused; // a card is its link
 const box = one.getBoundingClientRect(), style = getComputedStyle(one);
 return {place: arguments[0].indexOf(focused), is_marked: style.outlineStyle !== "none" || style.boxShadow !== "none",
         is_seen: box.bottom > 0 && box.top < innerHeight && box.width > 0 && box.height > 0}
