@@ -8,7 +8,7 @@ span have lost a part of their stiffness. :func:`~skthermo.studies.identify_dama
 symmetric, so that frequencies alone cannot tell the first span from the last; measured mode shapes can.
 
 Run it with ``python examples/plot_located_damage.py``; figures go to the folder ``figures``. It needs
-:download:`page_recipes.py` beside it. The guide is :doc:`/guide/studies`.
+:download:`page_recipes.py` beside it. The guide is :doc:`/guide/identify`.
 """
 
 # sphinx_gallery_thumbnail_number = 2

@@ -4,6 +4,7 @@ may be missing."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from importlib import import_module
 from numbers import Integral
 from types import ModuleType
@@ -39,7 +40,9 @@ from skthermo._tables.arrays import (
     as_columns,
     is_model,
     refuse_huge,
+    refuse_infinite,
     refuse_no_numbers,
+    refuse_no_table,
     without_mask,
     without_missing,
 )
@@ -137,8 +140,7 @@ class Estimator(BaseEstimator):
         return self
 
     def _validated(self, X: ArrayLike, *, reset: bool, **options: Any) -> NDArray[np.float64]:
-        options |= {"dtype": [np.float64, np.float32], "ensure_all_finite": "allow-nan"}
-        return validate_data(self, X, reset=reset, **options)
+        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], **options)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -155,27 +157,34 @@ class Interval(sklearn.utils._param_validation.Interval):
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data`; masked or missing values in X become NaN, and repeated column names and what is
-    no number are errors."""
-    values = sklearn.utils.validation.validate_data(estimator, with_nan(X), **options)
-    refuse_huge(values, "X")
-    return values
+    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN."""
+    return _as_numbers(partial(sklearn.utils.validation.validate_data, estimator), X, "X", options)
 
 
-def check_array(values: Any, **options: Any) -> Any:
-    """scikit-learn's `check_array`; masked or missing values become NaN, and what is no number is an error."""
-    array = sklearn.utils.check_array(with_nan(values), **options)
-    refuse_huge(array, options.get("input_name") or "y")
+def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
+    """scikit-learn's `check_array` of numbers, of which some may be missing: masked ones become NaN."""
+    return _as_numbers(sklearn.utils.check_array, values, input_name, options)
+
+
+def _as_numbers(check: Callable[..., Any], values: Any, what: str, options: dict[str, Any]) -> Any:
+    """An array that one of scikit-learn's checks makes; what is wrong with a table is said first, in one sentence."""
+    if options.get("ensure_2d", True):
+        least = {"least_rows": options.get("ensure_min_samples", 1)}
+        refuse_no_table(values, what, **least, least_columns=options.get("ensure_min_features", 1))
+    try:
+        array = check(with_nan(values), ensure_all_finite=False, **options)
+    except TypeError as error:
+        raise TypeError(f"{what} holds what is no number; expected numbers ({error})") from error
+    refuse_infinite(array, what, values)
+    refuse_huge(array, what)
     return array
 
 
 def with_nan(X: Any) -> Any:
     """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
 
-    Times, text, booleans, bytes and repeated column names are errors.
+    Times, text, booleans and bytes are errors.
     """
-    if isinstance(X, pd.DataFrame) and X.columns.has_duplicates:
-        raise ValueError(f"the input has the columns {list(X.columns)}; expected each name once")
     refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)

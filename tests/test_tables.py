@@ -234,3 +234,40 @@ def test_objects_fitted_on_frames_are_saved_by_skops(estimator):
     assert all(name.startswith("skthermo.") for name in unknown)
     later = RECORDS.shift(freq="30h")
     np.testing.assert_array_equal(output(io.loads(file, trusted=unknown), later), output(fitted, later))
+
+
+# What is no table
+
+
+def no_tables(frame):
+    """Bad tables, each with a word of the one sentence that says what is wrong."""
+    levels = pd.MultiIndex.from_product([["a"], frame.columns])
+    return {
+        "infinite": (frame.mask(frame == frame.iloc[5, 1], np.inf), repr(frame.columns[1])),
+        "infinite in an array": (frame.mask(frame == frame.iloc[5, 1], np.inf).to_numpy(), "row 5"),
+        "levels": (frame.set_axis(levels, axis=1), "tuples"),
+        "tuples": (frame.set_axis(pd.Index(list(levels), tupleize_cols=False), axis=1), "tuples"),
+        "numbers and text": (frame.set_axis([0, *frame.columns[1:]], axis=1), "partly"),
+        "a series": (frame.iloc[:, 0], "Series"),
+        "one dimension": (frame.to_numpy()[:, 0], "shape"),
+        "three dimensions": (frame.to_numpy()[np.newaxis], "dimensions"),
+        "half precision": (frame.astype(np.float16), "float16"),
+        "a mapping": (frame.to_dict("list"), "dict"),
+        "complex": (frame + 1j, "complex"),
+        "no columns": (frame.iloc[:, :0], "feature"),
+        "no rows": (frame[:0], "sample"),
+        "a generator": ((row for row in frame.to_numpy()), "generator"),
+        "a class": (pd.DataFrame, "type"),
+        "text": ("records.csv", "'records.csv'"),
+        "None": (None, "None"),
+    }
+
+
+@each_estimator
+@pytest.mark.parametrize("cause", no_tables(RECORDS))
+def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
+    values, word = no_tables(RECORDS)[cause]
+    with pytest.raises(ValueError, match=word) as refused:
+        estimator.fit(values)
+    assert "\n" not in str(refused.value)
+    assert "sklearn" not in refused.traceback[-1].path.parts

@@ -29,6 +29,7 @@ NO_NUMBERS = {
     "complex numbers": (complex, np.complexfloating),
 }
 KINDS = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
+HALF = "numbers of half precision (float16)"  # three digits
 HUGE = 1e150  # squares of larger numbers are infinite
 NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 Reduce: TypeAlias = bool | float | Literal["auto"]
@@ -218,14 +219,82 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     if isinstance(values, type) or callable(values):
         raise ValueError(f"{what} is {values!r:.100}; expected numbers")
     for name, part in _parts(values):
-        what, example = _no_number(part)
-        if what:
-            where = f"column {name!r}" if name is not None else what
-            hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
-            raise ValueError(
-                f"{where} holds {what}, such as {example!r:.60}; expected numbers"
-                f"{hint if name is not None and what == 'times' else ''}"
-            )
+        kind, example = _no_number(part)
+        if kind:
+            where, hint = what if name is None else f"column {name!r}", ""
+            if kind == HALF:
+                hint = " of type float64 or float32"
+            elif kind == "times" and name is not None:
+                hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
+            raise ValueError(f"{where} holds {kind}, such as {example!r:.60}; expected numbers{hint}")
+
+
+def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
+    """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
+    if scipy.sparse.issparse(values):
+        raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
+    if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
+        raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
+
+
+def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1) -> None:
+    """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
+    whose names are not all text or all numbers."""
+    expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
+    refuse_no_array(values, what, expected)
+    refuse_no_numbers(values, what)
+    array: Any = values if hasattr(values, "dtypes") else np.asarray(values)
+    shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])
+    if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
+        raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    if len(shape) == 1 and hasattr(values, "iloc"):
+        raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
+    if len(shape) < 2:
+        raise ValueError(
+            f"{what} has shape {tuple(shape)}; {expected}. Reshape your data by reshape(-1, 1) if it is one column, by "
+            "reshape(1, -1) if it is one row"
+        )
+    if len(shape) > 2:
+        raise ValueError(f"{what} has {len(shape)} dimensions, shape {tuple(shape)}; {expected}")
+    if shape[1] < least_columns:
+        raise ValueError(
+            f"{what} has {shape[1]} feature(s) (shape={tuple(shape)}) while a minimum of {least_columns} is required; "
+            f"{expected}"
+        )
+    if shape[0] < least_rows:
+        raise ValueError(
+            f"{what} has {shape[0]} sample(s) (shape={tuple(shape)}) while a minimum of {least_rows} is required; "
+            f"{expected}"
+        )
+    _refuse_names(getattr(values, "columns", ()), what)
+
+
+def _refuse_names(columns: Any, what: str) -> None:
+    """Raise an error for names of columns that stand twice, are of several levels, or are only partly text."""
+    names = list(columns)
+    if len(set(names)) < len(names):
+        raise ValueError(f"{what} has the columns {names}; expected each name once")
+    are_text = {isinstance(name, str) for name in names}
+    if len(are_text) > 1 or any(isinstance(name, tuple) for name in names):
+        kind = "tuples" if isinstance(names[0], tuple) else "partly text and partly not"
+        raise ValueError(
+            f"the names of the columns of {what} are {kind}, such as {names[0]!r}; expected text, as in "
+            f"{what}.columns = ['T1', 'T2', 'f1']"
+        )
+
+
+def refuse_infinite(values: NDArray, what: str, like: Any) -> None:
+    """Raise an error for infinite values, with the column and row of the first by the names of a table like them."""
+    infinite = np.isinf(values)
+    if infinite.any():
+        place = tuple(np.argwhere(infinite)[0])
+        index, columns = getattr(like, "index", None), getattr(like, "columns", None)
+        row = f"row {place[0]}" + ("" if index is None or is_numbered(index) else f" ({index[place[0]]})")
+        column = "" if len(place) < 2 else f" of column {int(place[1]) if columns is None else columns[place[1]]!r}"
+        raise ValueError(
+            f"{what} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; expected "
+            "finite numbers, and NaN where a value is missing"
+        )
 
 
 def refuse_huge(values: Any, what: str) -> None:
@@ -243,7 +312,7 @@ def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
         yield None, values
         return
     for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
-        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc":
+        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc" or dtype == np.float16:
             yield name, values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
 
 
@@ -256,7 +325,8 @@ def _no_number(values: Any) -> tuple[str, Any]:
     dtype = getattr(values, "dtype", None)
     if dtype is None:
         return _kind_of(values), values
-    kind = "categories" if str(dtype) == "category" else KINDS.get(getattr(dtype, "kind", ""), "")
+    named = {"category": "categories", "float16": HALF}.get(str(dtype), "")
+    kind = named or KINDS.get(getattr(dtype, "kind", ""), "")
     if kind:
         return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
     if getattr(dtype, "kind", "") == "O":

@@ -1,7 +1,7 @@
 """Tables of records: pandas frames in and out, checks of rows and columns, stamps, durations and times of rows."""
 
 import re
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping, Set
 from datetime import timedelta, tzinfo
 from numbers import Integral, Real
 from typing import Any, TypeAlias
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, refuse_no_array, robust_deviation
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
@@ -61,6 +61,7 @@ def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
 
 def check_positions_are_names(targets: Any, columns: Any) -> None:
     """Refuse integer targets where they could be names of columns as well as positions."""
+    targets = as_targets(targets)
     integers = all(isinstance(name, Integral) for name in (*columns, *targets))
     if integers and list(columns) not in ([], list(range(len(columns)))):
         raise ValueError(
@@ -69,9 +70,20 @@ def check_positions_are_names(targets: Any, columns: Any) -> None:
         )
 
 
+def as_targets(targets: Any) -> list[Any]:
+    """Targets as a list; a single name or number, or what has no order, is an error."""
+    if isinstance(targets, str | bytes | type | Mapping | Set) or not isinstance(targets, Iterable):
+        hint = f", such as [{targets!r}]" if isinstance(targets, str | Integral) else ""
+        raise ValueError(
+            f"targets is {targets!r:.100}, of type {type(targets).__name__}; expected a list of names of columns or "
+            f"of positions from 0{hint}"
+        )
+    return list(targets)
+
+
 def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
     """Positions of the targets, which are given by name or by position."""
-    targets = list(targets)
+    targets = as_targets(targets)
     if targets and all(isinstance(target, str) for target in targets):
         if names is None:
             raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
@@ -193,6 +205,8 @@ def first_disorder(X: Any) -> int:
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     """Raise an error if two tables differ in length or, where both are frames, in index."""
+    for what, table in zip(names, (X, y), strict=True):
+        refuse_no_array(table, what)
     if _num_samples(X) != _num_samples(y):
         raise ValueError(
             f"{names[0]} has {_num_samples(X)} rows and {names[1]} {_num_samples(y)}; expected the same number"

@@ -15,7 +15,7 @@ from sklearn.utils.metaestimators import available_if
 from skthermo._estimators.warnings import explain_rows, explained_rows, warn_user
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import frame_like, row_times, warn_of_implausible, warn_of_markers
-from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
@@ -135,7 +135,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             or too few records for the rate of false alarms that is asked for; if the threshold is far above the
             indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
-        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
+        F = self._validated(X, reset=True, order="C", ensure_min_samples=2)
         warn_of_markers(frame_like(X, F))
         warn_of_implausible(frame_like(X, F))
         n_rows = int((~np.isnan(F)).any(axis=1).sum())
@@ -171,7 +171,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             If no record at all can be evaluated.
         """
         check_is_fitted(self)
-        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
+        F = self._validated(X, reset=False, order="C")
         index = self._index(self._records(X, F))
         told = explained_rows(X) | explained_rows(index)
         untold = np.isnan(index) & ~told
@@ -262,7 +262,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             they are fewer than half.
         """
         check_is_fitted(self)
-        F = validate_data(self, X, order="C", ensure_all_finite="allow-nan", reset=False)
+        F = self._validated(X, reset=False, order="C")
         densities = self._log_densities(F) + log_volumes(X)
         return mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
 

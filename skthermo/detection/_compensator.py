@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._estimators.warnings import explain_rows, explained_rows, findings_of, warn_user, warnings_once
+from skthermo._estimators.warnings import (
+    explain_rows,
+    explained_rows,
+    findings_of,
+    warn_each,
+    warn_user,
+    warnings_once,
+)
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
     check_columns,
@@ -45,6 +52,7 @@ from skthermo.preprocessing import RecordFindings, check_records
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
+from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.spread import Spread
 from skthermo.residuals.weather import (
     BEYOND,
@@ -56,7 +64,7 @@ from skthermo.residuals.weather import (
     warn_of_unseen,
 )
 
-AS_FLOATS = {"order": "C", "dtype": np.float64, "ensure_all_finite": "allow-nan"}
+AS_FLOATS = {"order": "C", "dtype": np.float64}
 
 
 class TemperatureCompensator(TransformerMixin, Estimator):
@@ -195,7 +203,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     _parameter_constraints: dict = {
         "estimator": [HasMethods(["fit", "predict"])],
-        "targets": ["array-like"],
+        "targets": "no_validation",
         "cv": ["cv_object", StrOptions({"contiguous"})],
         "whiten": [StrOptions({"auto", "global", "local"}), None],
     }
@@ -241,7 +249,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -----
         UserWarning
             If another column looks like kelvin; if there are numbers that stand for a missing value, such as -999; for
-            each kind of fault that `~skthermo.preprocessing.check_records` finds; if stamps are not in order; if
+            each kind of fault that `~skthermo.preprocessing.check_records` finds; if another column behaves like the
+            targets, as a mode that was left out of them does, or a target like a temperature; if stamps are not in
+            order; if
             temperatures are missing, with what they were filled with; if a fold has weather that the others do not
             know; if rows without stamps have lags inside an estimator.
         """
@@ -438,7 +448,13 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, values, self.targets_)
         warn_of_disorder(X)
         named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
-        return temperatures, frequencies, findings_of(check_records, pd.DataFrame(temperatures), named)
+        others = np.delete(_check_feature_names_in(self, None), self.targets_)
+        warn_each(misplaced_columns(pd.DataFrame(temperatures, copy=False).set_axis(others, axis=1), named))
+        return (
+            temperatures,
+            frequencies,
+            findings_of(partial(check_records, unit=""), pd.DataFrame(temperatures), named),
+        )
 
     def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""

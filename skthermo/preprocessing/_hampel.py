@@ -92,7 +92,7 @@ class HampelFilter(RecordTransformer):
             pd.offsets.BaseOffset,
         ],
         "n_deviations": [Interval(Real, 0, None, closed="neither")],
-        "targets": ["array-like", None],
+        "targets": "no_validation",
     }
 
     def __init__(

@@ -148,6 +148,7 @@ class KNNGapImputer(KNNImputer):
             raise ValueError(f"n_neighbors is {self.n_neighbors}; expected an integer")
         if isinstance(self.weights, type) or isinstance(self.metric, type):
             raise ValueError(f"weights is {self.weights!r} and metric {self.metric!r}; expected no class")
+        values = check_array(X, input_name="X", copy=True)
         X = with_nan(X)
         super().fit(X, y)
         kept = set(super().get_feature_names_out())
@@ -160,7 +161,7 @@ class KNNGapImputer(KNNImputer):
             )
         self.donors_ = None
         if self.metric == "nan_euclidean" and isinstance(self.missing_values, float) and np.isnan(self.missing_values):
-            values = check_array(X, dtype=np.float64, ensure_all_finite="allow-nan", copy=True)
+            values = values.astype(float, copy=False)
             warn_of_markers(frame_like(X, values))
             self.donors_ = Donors(values)
         return self
@@ -183,10 +184,11 @@ class KNNGapImputer(KNNImputer):
             A frame gives a frame on its own index.
         """
         check_is_fitted(self)
+        check_array(X, input_name="X")
         X, values = with_nan(X), None
         names = [*getattr(X, "columns", ()), *self.get_feature_names_out()[self.n_features_in_ :]]
         if self.donors_ is not None:
-            values = validate_data(self, X, dtype=FLOATS, ensure_all_finite="allow-nan", reset=False)
+            values = validate_data(self, X, dtype=FLOATS, reset=False)
         if values is None or not self.donors_.trees_are_faster(np.isnan(values)):
             return frame_like(X, np.asarray(super().transform(X)), names)
         filled = self._filled(values)

@@ -397,7 +397,7 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     """
     check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
     T, F = (
-        check_array(table, dtype=np.float64, ensure_all_finite="allow-nan", input_name=name)
+        check_array(table, dtype=np.float64, input_name=name)
         for table, name in ((temperatures, "temperatures"), (frequencies, "frequencies"))
     )
     nothing = MemoryFindings(pd.DataFrame(columns=COLUMNS), None, 0.0)

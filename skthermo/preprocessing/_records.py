@@ -477,7 +477,7 @@ class BiasAligner(RecordTransformer):
         if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):
             F = self._validated(X, reset=False)
         else:  # frequencies of a model have no column names
-            F = check_array(X, dtype=[np.float64, np.float32], ensure_all_finite="allow-nan")
+            F = check_array(X, dtype=[np.float64, np.float32])
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
         if self.method == "scale":

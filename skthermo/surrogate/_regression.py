@@ -285,8 +285,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
                 f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
                 f"expected {names[1]}"
             )
-        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
-        targets = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
+        inputs = validate_data(self, X, dtype=np.float64)
+        targets = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, targets if plain_rows else y, names)
         self.y_is_vector_ = targets.ndim == 1
@@ -457,5 +457,5 @@ class TemperatureMapper(MultiplierRegressor):
 
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         check_is_fitted(self)
-        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        inputs = validate_data(self, X, dtype=np.float64, reset=False)
         return self._regress(inputs, return_std)

@@ -371,7 +371,7 @@ class ModelUpdater(Estimator):
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         check_model(self.model)
         table = F if isinstance(F, pd.DataFrame) else np.atleast_2d(real_array(F, "F"))
-        values = validate_data(self, table, dtype=np.float64, ensure_all_finite="allow-nan")
+        values = validate_data(self, table, dtype=np.float64)
         n_modes = self.model.n_modes
         if values.shape[1] > n_modes or (shapes is None and values.shape[1] != n_modes):
             raise ValueError(

@@ -77,7 +77,7 @@ def test_rows_with_some_modes_enter_the_baseline():
         (np.column_stack([F, F[:, 0]]), r"400 baseline rows and 4 modes is singular \(rank 3\)"),
         (F[:1], "1 sample"),
         (np.vstack([F[:1], np.full((5, 3), np.nan)]), "1 of 6 rows have a value"),
-        (np.where(F[5] == F, np.inf, F), "infinity"),
+        (np.where(F[5] == F, np.inf, F), "row 5"),
     ],
 )
 def test_bad_baselines_are_named(X, message):

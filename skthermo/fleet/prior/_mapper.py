@@ -304,8 +304,8 @@ class FleetMapper(RegressorMixin, Estimator):
     def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         if y is None:
             raise ValueError("This FleetMapper estimator requires y to be passed, but the target y is None")
-        inputs = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan")
-        values = check_array(y, dtype=np.float64, ensure_all_finite="allow-nan", ensure_2d=False)
+        inputs = validate_data(self, X, dtype=np.float64)
+        values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
         check_temperatures(frame_like(X, inputs))
@@ -341,7 +341,7 @@ class FleetMapper(RegressorMixin, Estimator):
 
     def _inputs(self, X: ArrayLike) -> Array:
         check_is_fitted(self)
-        return validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        return validate_data(self, X, dtype=np.float64, reset=False)
 
     def _posterior_at(self, X: ArrayLike, with_covariance: bool) -> tuple[Array, Array]:
         """Median of the posterior, and its covariance; NaN where an input is missing."""

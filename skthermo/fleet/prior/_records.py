@@ -193,7 +193,7 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
 
 def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     """Two tables, checked."""
-    options = {"dtype": np.float64, "ensure_all_finite": "allow-nan"}
+    options = {"dtype": np.float64}
     T = T.to_frame() if isinstance(T, pd.Series) else T
     inputs = check_array(T, ensure_2d=False, **options)
     values = as_columns(check_array(Y, ensure_2d=False, **options))

@@ -160,6 +160,7 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
 
 
 LARGEST_SEED = np.iinfo(np.int32).max
+YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,8 +231,7 @@ class Measurement:
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
-    every scenario; ``reference`` gives true frequencies for a scenario and a seed, and the FE model is asked for
-    frequencies of ``n_years`` such weathers in all."""
+    every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
 
     fem: FittedChain
     candidates: Mapping[str, Candidate]
@@ -240,7 +240,6 @@ class Simulation:
     clean: Mapping[str, Sequence[Array]]
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
-    n_years: int = 1
 
     def first_repeat(
         self, measured: Mapping[str, Table], seeds: Sequence[int], errors: Mapping[str, Exception]
@@ -355,7 +354,7 @@ def transitions_of(decisions: Array, n_window: int) -> Array:
 
 
 def clean_frequencies(
-    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0, n_years: int = 1
+    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0, n_years: int = YEARS
 ) -> dict[str, list[Array]]:
     """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on.
 

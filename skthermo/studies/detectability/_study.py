@@ -341,10 +341,9 @@ class DetectabilityStudy(BaseEstimator):
             )
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
-                n_years = 1 + len(replicates.seeds) * len([part for part in replicates.parts if part != "model"])
-                clean = clean_frequencies(self.fem, scenarios, T, n_repeats, n_years=n_years)
+                clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
-            simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function, n_years)
+            simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
                 first = simulation.first_repeat(measured, seeds[0], errors)
         progress = max(self.verbose - 1, 0)

@@ -207,7 +207,7 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
     names = getattr(F, "columns", None)
     if names is not None and list(names) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
-    frequencies = as_floats(check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+    frequencies = as_floats(check_array(F, dtype=np.float64))
     if frequencies.shape[1] != len(fem.mode_names_):
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"

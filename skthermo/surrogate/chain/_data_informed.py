@@ -66,6 +66,7 @@ from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
 from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._regression import TemperatureMapper, remembered
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
@@ -317,6 +318,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             check_takes_weights(self.mapper_)
         mended = {"outliers", "memory"} if self.mapper is None else {"outliers"}
         findings = findings_of(self._findings, T, F, mended=mended)
+        warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
         self.sensors_ = SensorRegression.of(T)
         filled = frame_like(T, self.sensors_.fill(T)[0])
@@ -492,7 +494,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             If the number or the names of the modes differ from `fit`, or a frequency is not positive.
         """
         check_is_fitted(self)
-        measured = frame_like(F, check_array(F, dtype=np.float64, ensure_all_finite="allow-nan"))
+        measured = frame_like(F, check_array(F, dtype=np.float64))
         inputs = ChainInverse(self.inverse_).with_shapes(self.aligner_.transform(measured), shapes)
         theta = as_floats(self.inverse_.transform(inputs))
         return frame_like(F, theta, self.parameter_names_)
@@ -743,7 +745,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             With the temperatures that are ``given`` and ``filled`` from the other sensors, and the ``inputs`` of M2.
         """
         check_is_fitted(self)
-        values = validate_data(self, X, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        values = validate_data(self, X, dtype=np.float64, reset=False)
         filled, deviations = self.sensors_.fill(values)
         return Weather(X, frame_like(X, filled), deviations, self.mapper_)
 
@@ -875,7 +877,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_model(self.model)
         if y is None:
             raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-        options = {"dtype": np.float64, "ensure_all_finite": "allow-nan", "copy": True}
+        options = {"dtype": np.float64, "copy": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         self.y_is_vector_ = np.ndim(y) == 1
         if self.y_is_vector_:

@@ -53,7 +53,7 @@ class InverseColumns:
         """Check number and names of the columns; without X, they are those of an array."""
         n_columns = len(self.names())
         names_only = np.ones((1, n_columns)) if X is None else X
-        found = validate_data(inverse, names_only, ensure_all_finite="allow-nan").shape[1]
+        found = validate_data(inverse, names_only).shape[1]
         if found != n_columns:
             more = f" and their shapes at {self.shapes.n_sensors} sensors, {n_columns} columns" if self.shapes else ""
             raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}{more}")
@@ -62,7 +62,7 @@ class InverseColumns:
         """Measured columns, with shapes normalised."""
         has_names = hasattr(inverse, "feature_names_in_") or not hasattr(X, "columns")
         values = X if has_names else as_floats(X)
-        inputs = validate_data(inverse, values, dtype=np.float64, ensure_all_finite="allow-nan", reset=False)
+        inputs = validate_data(inverse, values, dtype=np.float64, reset=False)
         frequencies = inputs if self.shapes is None else inputs[:, : self.shapes.n_modes]
         if inverse.inputs_.log and (frequencies <= 0).any():
             row, column = np.argwhere(frequencies <= 0)[0]
