@@ -175,8 +175,8 @@ class PODCurveDisplay(Display):
         pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
-        share = 100 * getattr(self.curve, "confidence", 0.95)
-        band = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": None if number else f"its {share:g} % interval"}
+        label = None if number else f"its {100 * getattr(self.curve, 'confidence', 0.95):g} % interval"
+        band = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
         self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, **band)
         self.replicates_ = self._draw_campaigns(drawn, colour)
         self.marks_ = self._draw_marks(colour) if marks else {}
