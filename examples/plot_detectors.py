@@ -44,7 +44,7 @@ print(f"{len(detectors)} detectors:", *detectors, sep="\n")
 
 # %%
 # One simulation, evaluated by all
-# -----------------------------
+# --------------------------------
 # A :class:`~skthermo.studies.DetectabilityStudy` simulates each scenario once in every repeat. ``reference`` gives it
 # true records, which a real bridge does not have.
 

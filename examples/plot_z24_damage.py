@@ -171,7 +171,7 @@ IdentifiedDamageDisplay.from_predictions(found)
 #          average severities of five groups with 90 % bands, that of the soil the largest; shifts of four modes
 #
 # Simulated rates beside measured ones
-# --------------------------------------
+# ------------------------------------
 # The identified damage, drawn with its uncertainty, is put into the FE model, which simulates the weather of the test
 # and of the last month with noise like that of the records. The detectors of :doc:`plot_z24_detection` learn the
 # measured baseline and evaluate them. Rates of alarms in percent, measured, and the mean and the band that holds 95 %
@@ -237,7 +237,7 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 # of the simulation.
 #
 # A prediction before the damage
-# ---------------------------
+# ------------------------------
 # The same with nothing that came later: a chain that has learned the baseline alone, and a damage that one might have
 # assumed of a pier that is to be lowered, a loss of 18 % in the soil below it. The weather is still that of the test
 # and of the last month. Since the severity is fixed, only noise is in the band.
