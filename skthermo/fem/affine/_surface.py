@@ -209,7 +209,7 @@ class FrequencySurface:
         served : ndarray of bool, shape (n_samples,)
             Which rows have frequencies.
         """
-        rows = check_theta(theta, range(len(self._box.centre)))
+        rows = check_theta(theta, [f"{i}" for i in range(len(self._box.centre))], allow_nan=True)
         frequencies, estimates = self._estimated(rows)
         served = estimates <= self._limit
         frequencies[~served] = np.nan
@@ -241,12 +241,12 @@ class FrequencySurface:
         """Frequencies and estimates of the largest relative error of each row, infinite where none is served."""
         frequencies = np.full((len(theta), self._coefficients.shape[1] // 2), np.nan)
         estimates = np.full(len(theta), np.inf)
-        inside = ~np.isnan(theta).any(axis=1)
-        places = self._box.places(theta[inside])
-        is_held = self._box.holds(theta[inside], places)
-        inside[inside] = is_held
-        if inside.any():
-            logs, differences = np.split(self._features.transform(places[is_held]) @ self._coefficients, 2, axis=1)
+        known = np.flatnonzero(~np.isnan(theta).any(axis=1))
+        places = self._box.places(theta[known])
+        is_inside = self._box.holds(theta[known], places)
+        inside = known[is_inside]
+        if len(inside):
+            logs, differences = np.split(self._features.transform(places[is_inside]) @ self._coefficients, 2, axis=1)
             frequencies[inside] = np.exp(logs)
             is_apart = smallest_gap(frequencies[inside]) > CLOSE
             estimates[inside] = np.where(is_apart, np.abs(differences).max(axis=1), np.inf)
