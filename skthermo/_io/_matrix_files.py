@@ -88,8 +88,8 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
 
 
 BEGINNING = 65536  # bytes by which a form is recognised
-NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd]?[+-]\d+|[EeDd]\d+)?"
-ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + NUMBER
+REAL = rb"[+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EeDd]))(?:[EeDd][+-]?\d+)?"
+ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + REAL
 FORMS = {
     "MATLAB v5": rb".{124}(?:\x00\x01IM|\x01\x00MI)|\x89HDF",
     ".npz": rb"PK",
