@@ -146,16 +146,22 @@ def _nodes(pairs: Numbers, least: int = -MOST) -> Integers:
     return np.column_stack([_whole(pairs[:, 0], "a node", least), _whole(pairs[:, 1], "a direction", 0)])
 
 
-def _symmetric(
-    rows: Integers, columns: Integers, values: Numbers, size: int, *, in_order: bool
-) -> scipy.sparse.csc_array:
-    """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
+def _square(rows: Integers, columns: Integers, values: Numbers, size: int) -> scipy.sparse.csc_array:
+    """A matrix each entry of which is given once."""
     bytearray(2 * BYTES_FOR_EACH_ROW * size)  # an error here if that is too much memory
     matrix = scipy.sparse.coo_array((values, (rows, columns)), shape=(size, size)).tocsc()
     if matrix.nnz < len(values):
         keys = np.sort(rows * size + columns)
         row, column = divmod(int(keys[:-1][keys[1:] == keys[:-1]][0]), size)
         raise ValueError(f"the entry of row {row + 1} and column {column + 1} is given more than once")
+    return matrix
+
+
+def _symmetric(
+    rows: Integers, columns: Integers, values: Numbers, size: int, *, in_order: bool
+) -> scipy.sparse.csc_array:
+    """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
+    matrix = _square(rows, columns, values, size)
     below, above = int((rows > columns).sum()), int((rows < columns).sum())
     if below and above:
         ones = np.ones(matrix.nnz, dtype=np.int8)
@@ -274,7 +280,7 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
     columns = np.repeat(np.arange(n_columns), np.diff(pointers))
     if kind[1] == "S":
         return _symmetric(rows, columns, found[2], n_rows, in_order=True)
-    return scipy.sparse.csc_array(scipy.sparse.coo_array((found[2], (rows, columns)), shape=(n_rows, n_columns)))
+    return _square(rows, columns, found[2], n_rows)
 
 
 def _block(text: Text, lines: Integers, words: Integers, n_numbers: int, n: int, width: int) -> Numbers:

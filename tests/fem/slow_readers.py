@@ -115,12 +115,13 @@ def read_harwell_boeing(content):
     if any(row % 1 or not 1 <= row <= size for row in rows):
         raise ValueError("rows")
     entries = {(int(i) - 1, j): value for i, j, value in zip(rows, columns, values, strict=True)}
-    if kind[1] == "S" and len(entries) < n_entries:
+    if len(entries) < n_entries:
         raise ValueError("given twice")
     if kind[1] == "S":
         return mirrored(entries, range(size), in_order=True), ()
     matrix = np.zeros((size, size))
-    np.add.at(matrix, (np.array(rows, dtype=int) - 1, columns), values)
+    for (i, j), value in entries.items():
+        matrix[i, j] = value
     return matrix, ()
 
 
