@@ -105,9 +105,11 @@ for ax, name in zip(axes, names, strict=True):
         bars = 2 * scatter["scatter, other days"][name]
         ax.errorbar(kind.index, kind, bars, fmt="none", ecolor=GREY, elinewidth=1, zorder=0)
     ax.axhline(0, color="black", lw=0.7)
-    ax.set_ylabel(f"{name.replace('_', ' ')}\n(%)")
+    ax.set_title(f"stiffness of {name.replace('_', ' ')}", fontsize="medium")
+fig.supylabel("change from what the weather explains (%)")
 axes[-1].set_xlabel("day, by the hour counter of the records")
-fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+bars = axes[0].errorbar([], [], [], fmt="none", ecolor=GREY, label="± 2 standard deviations of healthy days")
+fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
 
 # %%
 # .. image:: /images/z24_changes.png
