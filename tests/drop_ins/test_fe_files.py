@@ -298,14 +298,14 @@ def test_civil_nx(civil_nx, tmp_path, monkeypatch):
 
 
 def test_a_study_with_an_emulator_of_a_program():
-    """Damage by parameters is detected as often as with the exact model, within the noise of the rates."""
+    """Damage of parameters is detected as often as with the exact model, within the noise of the rates."""
     truss, year = make_truss(), make_truss_campaign(random_state=0)
     program = CallableModel(lambda row: truss.frequencies([row])[0], truss.parameter_names, 6)
     fast = run_recipe(PAGE, "recipe-emulator", model=program)["fast"]
     test = sample(truss, 0.3, 500, random_state=1)
     errors = fast.frequencies(test.theta) / test.frequencies - 1
     assert np.sqrt(np.mean(errors**2)) < 1e-3
-    scenarios = [Scenario("healthy"), Scenario("a tenth", parameters={"bottom": 0.9})]
+    scenarios = [Scenario("healthy"), Scenario("a tenth", {"bottom": 0.1})]
     rates = []
     for model in (fast, truss):
         fem = DataInformedFEM(model, random_state=0).fit(year.temperatures, year.frequencies)

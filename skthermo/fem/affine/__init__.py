@@ -1,7 +1,7 @@
 """Affine models: the full and the reduced model, and the terms and eigensolver that both use."""
 
 from skthermo.fem.affine._affine import AffineModel
-from skthermo.fem.affine._base import check_different, read_matrix, read_terms
+from skthermo.fem.affine._base import check_different, check_severities, read_matrix, read_terms
 from skthermo.fem.affine._reduced import ReducedModel
 
-__all__ = ["AffineModel", "ReducedModel", "check_different", "read_matrix", "read_terms"]
+__all__ = ["AffineModel", "ReducedModel", "check_different", "check_severities", "read_matrix", "read_terms"]
