@@ -17,7 +17,7 @@ from skthermo.fem import AffineModel, Bar, CallableModel, Structure, sample
 from skthermo.studies import DetectabilityStudy, Scenario
 from skthermo.surrogate import DataInformedFEM
 from tests.drop_ins.recipes import run_recipe
-from tests.fem.exported_files import TERMS, TOTAL
+from tests.fem.exported_files import coordinates_text, matrix_input_text
 
 PAGE = "fe_programs.rst"
 THETA = np.random.default_rng(0).uniform(0.7, 1.3, (4, 2))
@@ -41,14 +41,40 @@ def model(tower):
     return tower.assemble(["E_deck", "E_arch"], n_modes=4)
 
 
-def doubled(model, group):
-    """Stiffness of the whole with the modulus of one group doubled."""
-    row = [2.0 if name == group else 1.0 for name in model.parameter_names]
-    return model.matrices(row)[0]
+JOBS = "nominal", "E_deck", "E_arch"
+
+
+def whole(model, job):
+    """Stiffness of the whole with the modulus of one group doubled, or as built."""
+    return model.matrices([2.0 if name == job else 1.0 for name in model.parameter_names])[0]
 
 
 def assert_same(found, model):
     np.testing.assert_allclose(found.frequencies(THETA), model.frequencies(THETA), rtol=1e-8)
+
+
+# Texts
+
+
+def abaqus(folder, job, K, M, labels):
+    (folder / f"{job}_STIF1.mtx").write_text(matrix_input_text(K, labels))
+    if job == "nominal":
+        (folder / f"{job}_MASS1.mtx").write_text(matrix_input_text(M, labels))
+
+
+def sap2000(folder, job, K, M, labels):
+    for suffix, matrix in ({"TXK": K} | ({"TXM": M} if job == "nominal" else {})).items():
+        (folder / f"{job}.{suffix}").write_text("Note: the heading of a version\n" + coordinates_text(matrix))
+
+
+@pytest.mark.parametrize("program", [abaqus, sap2000])
+def test_a_folder_of_jobs(program, model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bridge").mkdir()
+    labels = [(i + 1, 1) for i in range(model.n_dof)]
+    for job in JOBS:
+        program(tmp_path / "bridge", job, whole(model, job).toarray(), model.matrices([1, 1])[1].toarray(), labels)
+    assert_same(run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"]), model)
 
 
 # ANSYS
@@ -68,7 +94,7 @@ def test_terms_from_full_files(model):
     pytest.importorskip("ansys.mapdl.reader", reason="ansys-mapdl-reader is not installed")
     recipe = run_recipe(PAGE, "recipe-ansys-full")
     M = model.matrices([1.0, 1.0])[1]
-    recipe["matrices"] = lambda file: (doubled(model, file.removesuffix(".full")), M, model.dofs)
+    recipe["matrices"] = lambda file: (whole(model, file.removesuffix(".full")), M, model.dofs)
     recipe = run_recipe(PAGE, "recipe-ansys-terms", **recipe)
     assert_same(recipe["model"], model)
     assert recipe["model"].dofs == model.dofs
@@ -129,19 +155,43 @@ def test_element_matrices_of_ansys(tower, model, tmp_path, monkeypatch):
 # Nastran
 
 
-def test_matrices_that_pynastran_writes(model, tmp_path, monkeypatch):
+def test_output4_that_pynastran_writes(model, tmp_path, monkeypatch):
+    """Its own reader, and ours, which needs no other package."""
     op4 = pytest.importorskip("pyNastran.op4.op4", reason="pyNastran is not installed")
     from pyNastran.op2.result_objects.matrix import Matrix
 
     monkeypatch.chdir(tmp_path)
-    for group in ("K0", "E_deck", "E_arch"):
-        matrices = {"KGG": Matrix("KGG", 6), "MGG": Matrix("MGG", 6)}
-        matrices["KGG"].data, matrices["MGG"].data = (
-            doubled(model, group).toarray(),
-            model.matrices([1, 1])[1].toarray(),
-        )
-        op4.OP4().write_op4(f"{group}.op4", matrices, is_binary=False)
+    (tmp_path / "bridge").mkdir()
+    for job in JOBS:
+        for form, place in ((np.asarray, "."), (scipy.sparse.coo_matrix, "bridge")):
+            matrices = {"KGG": Matrix("KGG", 6), "MGG": Matrix("MGG", 6)}
+            K, M = whole(model, job), model.matrices([1, 1])[1]
+            matrices["KGG"].data, matrices["MGG"].data = form(K.toarray()), form(M.toarray())
+            op4.OP4().write_op4(f"{place}/{job}.op4", matrices, is_binary=False)
     assert_same(run_recipe(PAGE, "recipe-nastran-op4")["model"], model)
+    assert_same(run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"]), model)
+
+
+@pytest.mark.parametrize("size", [8, 16])
+def test_dmig_that_pynastran_writes(model, tmp_path, monkeypatch, size):
+    try:
+        from pyNastran.bdf.bdf import BDF
+    except (ImportError, AttributeError):  # version 1.4.1 wants NumPy below 2
+        pytest.skip("pyNastran is not installed, or not for this NumPy")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bridge").mkdir()
+    nodes = list(dict.fromkeys(node for node, _ in model.dofs))
+    labels = [(10 * nodes.index(node) + 1, "xyz".index(direction) + 1) for node, direction in model.dofs]
+    for job in JOBS:
+        bdf = BDF(debug=None)
+        for name, matrix in (("KAAX", whole(model, job)), ("MAAX", model.matrices([1, 1])[1])):
+            lower = scipy.sparse.tril(matrix).tocoo()
+            rows, columns = ([labels[i] for i in place] for place in (lower.row, lower.col))
+            bdf.add_dmig(name, 6, 2, 0, 0, len(labels), columns, rows, lower.data.tolist())
+        bdf.write_bdf(f"bridge/{job}.pch", size=size, is_double=size == 16)
+    found = run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"])
+    assert set(found.dofs) == set(labels)
+    np.testing.assert_allclose(found.frequencies(THETA), model.frequencies(THETA), rtol=1e-3 if size == 8 else 1e-8)
 
 
 # Code_Aster
@@ -167,34 +217,20 @@ def test_code_aster(tower, model, tmp_path, monkeypatch):
     labels = sorted({*free, *held})
     places = [labels.index(label) for label in free]
 
-    def whole(matrix):
+    def with_held(matrix):
         embedded = 1e5 * np.eye(len(labels))  # the held ones too, which are no part of the model
         embedded[np.ix_(places, places)] = matrix.toarray()
         return AsterMatrix(embedded)
 
     numbering = SimpleNamespace(getNodeAndComponentFromDOF=lambda: labels)
     save = run_recipe(PAGE, "recipe-code-aster", held=held)["save"]
-    for group in ("K0", "E_deck", "E_arch"):
-        save(group, whole(doubled(model, group)), numbering)
-    save("M", whole(model.matrices([1, 1])[1]), numbering)
+    for job in JOBS:
+        save(job, with_held(whole(model, job)), numbering)
+    save("M", with_held(model.matrices([1, 1])[1]), numbering)
     assert_same(run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"]), model)
 
 
 # SAP2000
-
-
-def test_sap2000s_text_files(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    deck, arch, base = TERMS.values()
-    files = {"bridge.TXK": TOTAL, "bridge.TXM": np.diag([1.0, 2, 3, 4, 5, 0])}
-    files |= {"bridge_E_deck_doubled.TXK": TOTAL + deck, "bridge_E_arch_doubled.TXK": TOTAL + arch}
-    for name, matrix in files.items():
-        half = np.tril(matrix)
-        lines = [f"{i + 1}\t{j + 1}\t{float(half[i, j])!r}" for i, j in zip(*np.nonzero(half), strict=True)]
-        (tmp_path / name).write_text("\n".join(["Note: the heading of a version", *lines]))
-    expected = AffineModel({("E_deck",): deck, ("E_arch",): arch, (): base}, files["bridge.TXM"], n_modes=4)
-    recipe = run_recipe(PAGE, "recipe-sap2000")
-    np.testing.assert_allclose(recipe["model"].frequencies(THETA), expected.frequencies(THETA), rtol=1e-9)
 
 
 class StandIn:
