@@ -176,7 +176,11 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
     of_rows = [file for file in files if forms[file] == "labels of rows"]
     used = [name for name in named if is_used(name)]
     contents = read_files([(file, forms[file]) for file in (*(named[name] for name in used), *of_rows)])
-    labels = {file.stem: rows for file, rows in zip(of_rows, contents[len(used) :], strict=True)}
+    labels = {
+        file.stem: rows
+        for file, rows in zip(of_rows, contents[len(used) :], strict=True)
+        if len(set(rows)) == len(rows)  # of beams and shells, CalculiX writes labels that occur more than once
+    }
     matrices: dict[str, Any] = dict.fromkeys(named)
     for name, content in zip(used, contents[: len(used)], strict=True):
         if isinstance(content, dict) and len(named) == 1:

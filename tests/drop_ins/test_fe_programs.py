@@ -134,7 +134,7 @@ def test_calculix_by_hand(job):
     by_hand = run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"])
     recipe = run_recipe(PAGE, "recipe-calculix")
     np.testing.assert_allclose(by_hand.frequencies(THETA), recipe["model"].frequencies(THETA), rtol=1e-8)
-    assert {node for node, _ in by_hand.dofs} >= {2, 3, 4}
+    assert by_hand.dofs == ()  # rows of beams have labels that occur more than once
 
 
 def test_scikit_fem():

@@ -120,3 +120,23 @@ def test_one_file_of_whole_matrices(tmp_path):
     scipy.sparse.save_npz(tmp_path / "other.npz", scipy.sparse.csc_array(M))
     with pytest.raises(ValueError, match=r"bridge\.npz holds .*; expected one stiffness K"):
         load_affine(tmp_path, factor=5.0, n_modes=4)
+
+
+def test_labels_that_occur_more_than_once_are_left_out(tmp_path):
+    """CalculiX writes such labels for beams: rows that share one are still different rows."""
+    write(calculix, tmp_path)
+    for job in ("nominal", *TERMS):
+        (tmp_path / f"{job}.dof").write_text("1.1\n1.2\n1.1\n2.1\n2.2\n2.3\n")
+    model = load_affine(tmp_path, factor=2.0, n_modes=4)
+    assert_same(model, EXPECTED)
+    assert model.dofs == ()
+
+
+def test_names_may_stand_anywhere_in_their_field(tmp_path):
+    """pyNastran writes names of matrices at the right end of large fields."""
+    write(nastran, tmp_path)
+    for file in tmp_path.iterdir():
+        lines = file.read_text().splitlines()
+        moved = [line[:8] + line[8:24].strip().rjust(16) + line[24:] if line[:5] == "DMIG*" else line for line in lines]
+        file.write_text("\n".join(moved) + "\n")
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, 1e-8)  # nine digits
