@@ -140,3 +140,27 @@ def test_names_may_stand_anywhere_in_their_field(tmp_path):
         moved = [line[:8] + line[8:24].strip().rjust(16) + line[24:] if line[:5] == "DMIG*" else line for line in lines]
         file.write_text("\n".join(moved) + "\n")
     assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, 1e-8)  # nine digits
+
+
+def ansys_binary(number):
+    return np.array([100, -(2**31), number, *[0] * 98, 100], dtype="<i4").tobytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "program"),
+    [
+        (ansys_binary(4), "ANSYS"),
+        (ansys_binary(2), "ANSYS"),
+        (np.array([24, 6, 6, 6, 2], dtype="<i4").tobytes() + b"KGG     ", "Nastran"),
+        (np.array([24, 6, 6, 6, 2], dtype=">i4").tobytes() + b"KGG     ", "Nastran"),
+        (np.array([4, 3, 4, 12], dtype="<i4").tobytes(), "Nastran"),
+    ],
+)
+def test_binary_files_of_programs_are_named(tmp_path, content, program):
+    file = tmp_path / "nominal.bin"
+    file.write_bytes(content)
+    for path in (file, tmp_path):
+        with pytest.raises(ValueError, match=f"nominal.bin is a binary file of {program}; expected text"):
+            load_affine(path)
+    write(abaqus, tmp_path)
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED)  # beside texts, they are ignored
