@@ -150,6 +150,9 @@ def test_element_matrices_of_ansys(tower, model, tmp_path, monkeypatch):
     recipe = run_recipe(PAGE, "recipe-ansys-emat", components=tower.groups, held=held)
     assert_same(recipe["model"], model)
     assert set(recipe["model"].dofs) == {(number[node], direction) for node, direction in model.dofs}
+    deck = {"E_deck": tower.groups["E_deck"]}  # elements of no component have constant stiffness
+    found = run_recipe(PAGE, "recipe-ansys-emat", components=deck, held=held)["model"].frequencies(THETA[:, :1])
+    np.testing.assert_allclose(found, model.with_parameters(["E_deck"]).frequencies(THETA[:, :1]), rtol=1e-8)
 
 
 # Nastran
