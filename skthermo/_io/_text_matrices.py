@@ -365,10 +365,10 @@ def _dmig_lines(text: Text, wide: int) -> tuple[Cards, tuple[Integers, Numbers]]
 
 
 def _cards(grid: Grid, lines: Integers, width: int) -> Cards:
-    names = grid[:, 8:16].tobytes()
+    names = grid[:, 8 : 8 + width].tobytes()
     fields = [grid[:, i : i + width].copy() for i in range(8 + width, 8 + 4 * width, width)]
     numbers = [_fields(field, lines, b"0") for field in fields]
-    stripped = [names[i : i + 8].strip() for i in range(0, len(names), 8)]
+    stripped = [names[i : i + width].strip() for i in range(0, len(names), width)]
     return Cards(lines, np.array(stripped, dtype="S8"), np.column_stack(numbers))
 
 
