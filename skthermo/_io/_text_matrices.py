@@ -389,10 +389,13 @@ def _dmig_lines(text: Text, wide: int) -> tuple[Cards, tuple[Integers, Numbers]]
 
 
 def _cards(grid: Grid, lines: Integers, width: int) -> Cards:
-    names = grid[:, 8:16].tobytes()
+    names = grid[:, 8 : 8 + width].tobytes()
     fields = [grid[:, i : i + width].copy() for i in range(8 + width, 8 + 4 * width, width)]
     numbers = [_fields(field, lines, blank) for field, blank in zip(fields, (b"nan", b"0", b"0"), strict=True)]
-    stripped = [names[i : i + 8].strip() for i in range(0, len(names), 8)]
+    stripped = [names[i : i + width].strip() for i in range(0, len(names), width)]
+    for name, line in zip(stripped, lines, strict=True):
+        if not 0 < len(name) <= 8:
+            raise ValueError(f"line {line + 1}: {name.decode('latin-1')!r} is no name of one to eight characters")
     return Cards(lines, np.array(stripped, dtype="S8"), np.column_stack(numbers))
 
 

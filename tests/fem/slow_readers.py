@@ -136,7 +136,9 @@ def read_dmig(content):
             if not is_ours:
                 continue
             width = 16 if line[4] == "*" else 8
-            name = line[8:16].strip()
+            name = line[8 : 8 + width].strip()
+            if not 0 < len(name) <= 8:
+                raise ValueError("name")
             first = [
                 number(line[i : i + width].strip() or ("nan" if i == 8 + width else "0"), bare=True)
                 for i in range(8 + width, 8 + 4 * width, width)
