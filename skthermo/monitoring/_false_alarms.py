@@ -284,10 +284,11 @@ def estimate_false_alarms(
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     n_years = _years(known.index, hold)
-    if len(known) < 2 or np.isinf(known).any():
+    infinite = known.index[np.isinf(known)]
+    if len(known) < 2 or len(infinite):
         raise ValueError(
-            f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
-            "expected at least 2, all of them finite"
+            f"{len(known)} baseline records have a damage index, {len(infinite)} of them an infinite one"
+            f"{f' (the first at {infinite[0]})' if len(infinite) else ''}; expected at least 2, all of them finite"
         )
     scale = seasonal_scale(known)
     standard = known / np.sqrt(scale)

@@ -14,7 +14,7 @@ import pandas as pd
 from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_flag
+from skthermo._tables.arrays import check_flag, robust_deviation
 from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
@@ -42,7 +42,9 @@ from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring._status import MonitorStatus, facts_of
 from skthermo.monitoring._transitions import Transition
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
+from skthermo.preprocessing.checks import gross_errors
 
+TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
 MOST_CAUSES = 3  # in a warning
 MOST_EVENTS = 5  # in a summary, the latest ones
 
@@ -272,7 +274,8 @@ class Monitor(SavesFrames, Estimator):
         ------
         ValueError
             If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the responses are not known, or
-            not those of the compensator; if the detector looks at later records, farther back than its parts tell, or
+            not those of the compensator; if values make the baseline useless, such as kelvin or a frequency of 1e6, all
+            of which the error lists; if the detector looks at later records, farther back than its parts tell, or
             drops large changes.
 
         Warns
@@ -322,6 +325,7 @@ class Monitor(SavesFrames, Estimator):
                 RecordsWarning,
                 "markers",
             )
+        _refuse_meaningless(trained, self.targets_, self.units_)
         trained, columns = trained[inputs], inputs if compensators else self.targets_
         active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
         active.check()
@@ -892,6 +896,30 @@ class Monitor(SavesFrames, Estimator):
         if unknown or not all(isinstance(unit, str) for unit in given.values()):
             raise ValueError(f"units are {given}; expected a text for some of the columns {list(columns)}")
         return {name: of_targets if name in self.targets_ else "°C" for name in columns} | given
+
+
+def _refuse_meaningless(baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str]) -> None:
+    """Raise an error that lists all that makes a baseline useless: gross errors, and responses of another size."""
+    F, T = baseline[targets], baseline.drop(columns=targets)
+    unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
+    wrong = []
+    try:
+        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless()
+    except ValueError as error:
+        wrong.append(str(error))
+    values = F.to_numpy()
+    level, deviation = np.nanmedian(values, axis=0), robust_deviation(values)
+    limit = np.where(deviation > 0, np.maximum(TIMES_DEVIATION * deviation, TIMES_LEVEL * np.abs(level)), np.inf)
+    far = np.abs(values - level) > limit
+    for column in np.flatnonzero(far.any(axis=0)):
+        rows = np.flatnonzero(far[:, column])
+        wrong.append(
+            f"{targets[column]!r} is {values[rows[0], column]:.4g} at {F.index[rows[0]]}"
+            + (f", and as far off in {len(rows) - 1} other records" if len(rows) > 1 else "")
+            + f"; expected values near its median {level[column]:.4g}, and NaN where a value is wrong"
+        )
+    if wrong:
+        raise ValueError("; ".join(wrong))
 
 
 def _among(names: Any, columns: list[Any], what: str) -> list[Any]:

@@ -100,10 +100,10 @@ class MonitorStatus:
     watch_threshold: float | None = None
     false_alarms_per_year: float | None = None
     watch_per_year: float | None = None
-    smallest_change: dict[str, Any] | None = None
-    events: tuple[dict[str, Any], ...] = ()
-    faults: tuple[dict[str, Any], ...] = ()
-    counts: Mapping[str, int] | None = None
+    smallest_change: dict | None = None
+    events: tuple = ()
+    faults: tuple = ()
+    counts: dict | None = None
     transition: int = 0
 
     @property
