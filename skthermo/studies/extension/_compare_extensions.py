@@ -22,7 +22,6 @@ from skthermo._tables.arrays import (
     as_random_state,
     check_noise,
     integer_row,
-    positive_integer,
     real_array,
 )
 from skthermo._tables.frames import Table, check_same_rows, column_names
@@ -248,7 +247,7 @@ def compare_extensions(
         ranks,
         check_noise(scatter, len(ranks), [mode_name(rank) for rank in ranks]),
     )
-    n_repeats = positive_integer(study.n_repeats, "n_repeats")
+    n_repeats = int(study.results_["n_repeats"].max())
     seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
     with warnings_once("in the simulations of this study"):
