@@ -12,9 +12,9 @@ measured in each state, and the user's own detectors evaluate it. Structures:
 
 Bands: of the noise alone; with other weather; with other training records too, of all replicates and of as many as a
 study has by default; with an ensemble of models, too, ``models=updater.sample_models(20)``. The model is calibrated to
-the mean of the records by `ModelUpdater`, or only its offset is removed ("aligned"). States of which the measured share is
-between 5 and 95 % are counted apart: of the others, nearly every band holds. The exit code is 1 if the ensemble's bands hold
-less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the share.
+the mean of the records by `ModelUpdater`, or only its offset is removed ("aligned"). States of which the measured share
+is between 5 and 95 % are counted apart: of the others, nearly every band holds. The exit code is 1 if the ensemble's
+bands hold less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the share.
 """
 
 import argparse
