@@ -387,7 +387,7 @@ def test_the_time_is_estimated_before_the_work(fem, capsys):
     assert "2 replicates about" in lines[place]
 
 
-@pytest.mark.parametrize("detector", [MahalanobisDetector(), OutlierDetector(IsolationForest(20)), WindowedAlarm(7)])
+@pytest.mark.parametrize("detector", [MahalanobisDetector(), OutlierDetector(IsolationForest()), WindowedAlarm(7)])
 def test_records_evaluated_together_have_the_decisions_of_each_alone(fem, detector, monkeypatch):
     study = study_of(fem, compensated(detector), sweep(fem, (0.1, 0.2), ["bottom", "top"]))
     together = study.run(WEATHER)

@@ -84,7 +84,7 @@ class CampaignSimulator:
 
     def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Table]:
         """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
-        measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
+        measured, seen = self.measurement.of(self.fem, self.fem.weather(T), int(seeds[0]))
         further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
         further[np.isnan(measured).all(axis=1)] = np.nan
         return 1 + np.hstack([measured, further]), seen
