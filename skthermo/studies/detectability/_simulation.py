@@ -337,9 +337,12 @@ class Simulation:
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
     ) -> Evaluation:
-        """Decisions of every detector that has not failed and, if asked, its damage indices, on some after others."""
+        """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another.
+
+        Without indices, as in later repeats, whose warnings are not given, some are evaluated together.
+        """
         decisions, transitions, indices = {}, {}, {}
-        for some in _together(records):
+        for some in ([one] for one in records) if with_indices else _together(records):
             answers, errors = ask_each(self.candidates, partial(self._answers, some, with_indices), errors)
             for name, found in answers.items():
                 for one, (index, decided, during) in zip(some, found, strict=True):
