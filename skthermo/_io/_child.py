@@ -21,6 +21,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
+from skthermo._io._binary_matrices import read_binary_op4
 from skthermo._io._text_matrices import (
     BYTES_FOR_EACH_ROW,
     numbers_of,
@@ -182,7 +183,7 @@ def read_matrix_market(content: bytes) -> Any:
         raise ValueError(f"{n_rows} x {n_columns}, {field}, {symmetry}; expected numbers, and a square if symmetric")
     start = SIZE_LINE.match(content).end()  # type: ignore[union-attr]
     body = COMMENTS.sub(b"", content[start:])
-    numbers = numbers_of(body)
+    numbers = numbers_of(body, content.count(b"\n", 0, start))
     width = (3 if layout == "coordinate" else 1) + (field == "complex")
     if layout == "array" and symmetry != "general":
         n_entries = n_rows * (n_rows - 1) // 2 + (0 if symmetry == "skew-symmetric" else n_rows)
@@ -206,6 +207,7 @@ READERS = {
     "Harwell-Boeing": read_harwell_boeing,
     "Nastran's DMIG": read_dmig,
     "Nastran's OUTPUT4": read_op4,
+    "Nastran's binary OUTPUT4": read_binary_op4,
     "lines of entries": read_entries,
     "labels of rows": read_dofs,
 }

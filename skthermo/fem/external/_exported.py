@@ -35,15 +35,17 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     Returns
     -------
     csc_array of shape (n_dof, n_dof)
-        The whole matrix, in the units of the program; ``n_dof`` is the largest row or column that occurs.
+        The whole matrix, of which the file may hold one half or all, in the units of the program; ``n_dof`` is the
+        largest row or column that occurs.
 
     Raises
     ------
     FileNotFoundError
         If the path does not exist.
     ValueError
-        Names the file, if a line does not hold three numbers, rows or columns are not positive integers, there are
-        entries on both sides of the diagonal, or the matrix would need too much memory (see `load_affine`).
+        Names the file, and the line that does not hold three numbers; if rows or columns are not positive integers, an
+        entry is given twice, entries are on both sides of the diagonal but not in pairs, or the matrix would need too
+        much memory (see `load_affine`).
 
     See Also
     --------
@@ -162,7 +164,7 @@ def load_affine(
     ANSYS                  Harwell-Boeing, as ``HBMAT`` writes it in ASCII, real, symmetric (RSA) or not (RUA), and its
                            mapping file, which labels the rows; Rutherford-Boeing
     Nastran, OptiStruct    DMIG in a punch file (small, large and free field; form 6 or 1), whose grid points and
-                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big
+                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big, or binary and dense
     CalculiX, SAP2000      lines of row, column and value (``.sti``, ``.mas``; ``.TXK``, ``.TXM``), and CalculiX's
                            ``.dof``, which labels the rows
     MATLAB, Python         MATLAB v5 (``save -v7``), ``.npz`` of named arrays or of `scipy.sparse.save_npz`, Matrix
