@@ -166,6 +166,15 @@ def test_one_op4_file_holds_a_whole_model(tmp_path):
     assert_same(load_affine(tmp_path / "bridge.op4", n_modes=4), expected)
 
 
+def test_square_matrices_may_be_unsymmetric_where_they_are_not_used(tmp_path):
+    skew = np.triu(np.ones((N, N)), 1) * 7.0
+    unsymmetric = op4_text(skew, name="G").replace(f"{6:8d}{2:8d}G ", f"{1:8d}{2:8d}G ")
+    (tmp_path / "bridge.op4").write_text(unsymmetric + op4_text(TOTAL) + op4_text(M, name="MAA"))
+    model = load_affine(tmp_path / "bridge.op4", n_modes=4, stiffness=["KAA"])
+    assert_same(model, AffineModel({("KAA",): TOTAL}, M, n_modes=4))
+    np.testing.assert_array_equal(read_all(tmp_path / "bridge.op4").matrices["G"].toarray(), skew)
+
+
 def test_scipy_writes_what_is_read(tmp_path):
     scipy.io.hb_write(tmp_path / "K.hb", scipy.sparse.csc_array(TOTAL))
     np.testing.assert_array_equal(read_all(tmp_path / "K.hb").matrices["K"].toarray(), TOTAL)
