@@ -96,8 +96,8 @@ class Bridge:
 
     @property
     def taken_file(self) -> Path:
-        """What was taken in from which files."""
-        return self.monitor_file.with_suffix(".taken.json")
+        """What was taken in from which files; named after the monitor, whose lock it is under."""
+        return self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json")
 
     @property
     def metrics_file(self) -> Path | None:
