@@ -44,7 +44,8 @@ def run(*arguments):
     code = (
         "import sys, resource; from skthermo.commands.main import main; code = main(sys.argv[1:]); "
         "used = resource.getrusage(resource.RUSAGE_SELF); "
-        "print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, file=open('cost.txt', 'w')); sys.exit(code)"
+        "peak = next(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')); "
+        "print(used.ru_utime + used.ru_stime, int(peak) / 1024, file=open('cost.txt', 'w')); sys.exit(code)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False
