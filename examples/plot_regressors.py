@@ -9,8 +9,8 @@ boosting. The small network is M1's default, and piecewise-linear regression is 
 
 Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
 its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
-minutes, and :doc:`/guide/regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the file
-that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
+minutes, and :doc:`/accuracy_regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the
+file that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
 :download:`page_recipes.py` beside it.
 """
 
@@ -87,9 +87,9 @@ for ax, name in zip(axes, models, strict=True):
         colour, marker = STYLES[regressor]
         ax.plot(row["training, s"], row["error"], marker, color=colour, ms=9, label=regressor)
         ax.plot(row["training, s"], row["refined"], marker, color=colour, ms=9, mfc="none")
-    ax.set(xscale="log", yscale="log", xlabel="training time (s)", title=f"{name}, noise-free")
+    ax.set(xscale="log", yscale="log", xlabel="training time (s, log scale)", title=f"{name}, noise-free")
     ax.grid(alpha=0.3)
-axes[0].set_ylabel("mean error of the parameters (%)")
+axes[0].set_ylabel("mean error of the parameters (%, log scale)")
 fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(STYLES))
 
 # %%
@@ -146,6 +146,6 @@ ax.set(xlabel=label, ylabel=f"$f_{mode + 1}$ (Hz)")
 ax.legend(ncols=2)
 
 # %%
-# :doc:`/guide/regressors` says which regressor to choose, with means of five seeds.
+# :doc:`/accuracy_regressors` says which regressor to choose, with means of five seeds.
 
 save_figures(options.figures)

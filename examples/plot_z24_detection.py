@@ -59,19 +59,19 @@ for expected in (
 ):
     warnings.filterwarnings("ignore", expected)
 records = Records.of(bridge)
-print(f"Baseline: {len(records.baseline)} healthy records. Judged: {len(records.later)} later healthy ones and the")
+print(f"Baseline: {len(records.baseline)} healthy records. Evaluated: {len(records.later)} later healthy ones and the")
 print(f"{len(records.damaged)} after damage began. Every detector is asked for 2 % false alarms.")
 
 # %%
 # .. code-block:: none
 #
-#    Baseline: 2240 healthy records. Judged: 560 later healthy ones and the
+#    Baseline: 2240 healthy records. Evaluated: 560 later healthy ones and the
 #    130 after damage began. Every detector is asked for 2 % false alarms.
 #
 # The field's detectors
 # ---------------------
 # "Raw" ones see frequencies only. For the others, a :class:`~skthermo.detection.TemperatureCompensator` explains the
-# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance judges what is left, the
+# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates what is left, the
 # residuals; "whitened", residuals are divided by their spread in similar weather. Each threshold comes from the
 # baseline by one rule: its records are scored by what was learned without them and without their neighbours in time.
 # (:doc:`plot_detectors` explains each detector.) The last two columns count as others do: another publication takes the
@@ -126,15 +126,15 @@ for name, estimator in (("piecewise-linear", TemperatureMapper()), ("boosted tre
 fig, ax = plt.subplots(figsize=(10, 4.6), layout="constrained")
 pavement = records.each(lambda frame: frame[PAVEMENT])
 plot_kinds(ax, pavement, inputs["piecewise-linear", PLAIN].each(lambda frame: frame["f2"]), ms=3)
-for whiten, style, label in (("global", "--", "2 deviations, all weather"), ("local", "-", "2 deviations, by weather")):
+for whiten, style, label in (("global", "--", "of all records"), ("local", "-", "of records in similar weather")):
     compensator = compensate(records, TemperatureMapper(), whiten)[1]
     weather = records.baseline.drop(columns=FREQUENCIES)
     deviation = pd.Series(compensator.spread_.deviations(weather)[:, 1], weather.index)
     deviation = deviation.groupby(pavement.baseline.round()).median()
-    ax.plot(2 * deviation, style, color="black", label=label)
+    ax.plot(2 * deviation, style, color="black", label=f"± 2 standard deviations {label}")
     ax.plot(-2 * deviation, style, color="black")
-ax.set(xlabel="pavement (°C)", ylabel=f"residual of {MODES[1]} (Hz)")
-fig.legend(loc="outside right upper", markerscale=3)
+ax.set(xlabel="pavement temperature (°C)", ylabel=f"residual of {MODES[1]} (Hz)")
+fig.legend(loc="outside upper center", markerscale=3, ncols=3)
 
 # %%
 # .. image:: /images/z24_spread.png
@@ -163,15 +163,15 @@ plot_indices(
         "raw frequencies": (MahalanobisDetector(), inputs["none", "raw frequencies"]),
         "raw frequencies, 20 neighbours": (candidates["raw, 20 neighbours"], inputs["none", "raw frequencies"]),
         "piecewise-linear residuals": (MahalanobisDetector(), inputs["piecewise-linear", PLAIN]),
-        "the same, whitened by weather": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
+        "piecewise-linear residuals, whitened": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
     },
     label="damage index",
 )
 
 # %%
 # .. image:: /images/z24_detection.png
-#    :alt: Damage index over time in four panels: of raw frequencies, the Mahalanobis distance leaves all damaged
-#          records below the threshold; by neighbours and by residuals, nearly all lie above it
+#    :alt: Damage index over time in four panels: of raw frequencies, the Mahalanobis distance leaves nearly all
+#          damaged records below the threshold; by neighbours and by residuals, nearly all lie above it
 #
 # Does it depend on the threshold?
 # --------------------------------
@@ -241,8 +241,8 @@ print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 #
 # A day's records together
 # ------------------------
-# A :class:`~skthermo.detection.WindowedAlarm` judges the records of a day together, and a day by its last window. For
-# comparison, one of the compensators has learned forward in time, from the past alone.
+# A :class:`~skthermo.detection.WindowedAlarm` evaluates the records of a day together, and a day by its last window.
+# For comparison, one of the compensators has learned forward in time, from the past alone.
 
 forward = compensate(records, TemperatureMapper(), "local", TimeSeriesSplit(5))[0]
 seen = {name: inputs[name, WHITENED] for name in ("piecewise-linear", "boosted trees")}
@@ -351,7 +351,7 @@ print(pd.DataFrame(rows).round(1).to_string())
 #    beyond known weather       36.4       48.2       34.5       65.7
 #    far beyond                  3.2        6.6        0.5       46.2
 #
-# :doc:`plot_z24_damage` asks where the damage is, and whether simulation alone would have told the same of all these
-# detectors; :doc:`/guide/detection` explains them.
+# :doc:`plot_z24_damage` asks where the damage is, and whether simulation alone would have given the same rates of all
+# these detectors; :doc:`/guide/detection` explains them.
 
 save_figures(folder)
