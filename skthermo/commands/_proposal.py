@@ -178,7 +178,7 @@ class Proposal:
     def text(self, name: str | None = None) -> str:
         """The settings as TOML, with what each means."""
         found = [*self.account(), *self.findings.summary().splitlines()]
-        found += [one.in_words(self.units) for one in self.detectors]
+        found += [str(one) for one in self.detectors]
         best = self.detectors[0]
         calls: list[tuple[str, str | None, Mapping[str, Any], str]] = [
             ("files", None, {"name": name} if name else {}, "What is written."),
