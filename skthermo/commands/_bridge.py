@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+import skthermo
 from skthermo._estimators.warnings import told_around
 from skthermo._io import alone_with
 from skthermo.commands._new_records import (
@@ -113,12 +114,19 @@ class Bridge:
         return alone_with(self.monitor_file, self.options.wait)
 
     def load(self) -> Monitor:
-        """The monitor as it was saved."""
+        """The monitor as it was saved; one that another version of skthermo has fitted can be fitted anew."""
         if not self.monitor_file.exists() and self.settings is not None:
             raise FileNotFoundError(
                 f"there is no monitor {str(self.monitor_file)!r}; expected: skthermo fit {self.file}"
             )
-        return load_monitor(self.monitor_file)
+        monitor = load_monitor(self.monitor_file)
+        version = monitor.versions_["skthermo"]
+        if self.settings is not None and version != skthermo.__version__:
+            raise ValueError(
+                f"{self.monitor_file} was fitted with skthermo {version}, and this is {skthermo.__version__}; expected "
+                f"that version, or: skthermo fit {self.file} --replace, then update, which takes all records anew"
+            )
+        return monitor
 
     def status(self, monitor: Monitor) -> MonitorStatus:
         """The facts by the clock, or at the time that was asked for."""
