@@ -31,7 +31,8 @@ from skthermo.commands._settings import Settings, read_settings
 from skthermo.monitoring import Monitor, MonitorStatus, load_monitor
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+NO_ALARM = ("healthy", "watch")
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
@@ -335,7 +336,8 @@ def _described_update(
     states = {state: int((new["state"] == state).sum()) if len(new) else 0 for state in CODES}
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts().to_dict() if len(new) else {}
     n_revised, n_ahead = len(evaluated) - len(new), after["n_ahead"]
-    shown = f" ({', '.join(f'{number} {state}' for state, number in states.items())})" if len(evaluated) else ""
+    counted = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
+    shown = f" ({', '.join(counted)})" if len(evaluated) else ""
     done.lines.append(f"new: {len(new)}{shown}; {others}")
     done.lines += [f"evaluated anew, as records came late: {n_revised}"] if n_revised else []
     done.lines += [f"set aside, stamped too far ahead: {n_ahead}"] if n_ahead else []
@@ -347,9 +349,9 @@ def _described_update(
     state = bridge.status(monitor).state
     if has_alarm or state == "alarm":
         bridge.described(monitor, done, "alarm", "" if state == "alarm" else "an event has opened and closed again")
-    elif state == "healthy" and n_ahead > before["n_ahead"]:
+    elif state in NO_ALARM and n_ahead > before["n_ahead"]:
         bridge.described(monitor, done, "not evaluated", "records are stamped too far ahead")
-    elif state == "healthy" and not states["healthy"]:
+    elif state in NO_ALARM and not any(states[one] for one in NO_ALARM):
         bridge.described(monitor, done, "not evaluated", "no new record could be evaluated")
     else:
         bridge.described(monitor, done)

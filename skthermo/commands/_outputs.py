@@ -15,12 +15,13 @@ import pandas as pd
 
 from skthermo._io import write_when_complete
 
-STATES = ("healthy", "alarm", "not evaluated")
+STATES = ("healthy", "watch", "alarm", "not evaluated")
 GAUGES = {
     "up": "1 if the last command could do its work on this bridge, else 0",
     "state": "1 for the state that the bridge is in, 0 for the others",
     "damage_index": "Damage index of the newest record that was evaluated",
     "threshold": "Damage index above which a damage event opens",
+    "watch_threshold": "Damage index above which the level watch begins",
     "newest_record_timestamp_seconds": "Time of the newest record, in seconds since 1970",
     "record_age_seconds": "Age of the newest record when the metrics were written",
     "open_events": "Number of events that are open, by kind",
@@ -31,7 +32,7 @@ GAUGES = {
 }
 """Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
 
-KINDS = ("damage", "stiffening", "measurement or structure")
+KINDS = ("damage", "watch", "stiffening", "measurement or structure")
 
 
 def plain(value: Any) -> Any:
@@ -84,6 +85,7 @@ def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str
     values = {
         "damage_index": status["index"],
         "threshold": status["threshold"],
+        "watch_threshold": status["watch_threshold"],
         "newest_record_timestamp_seconds": newest,
         "record_age_seconds": status["age"],
         "records": counts.get("n_records"),

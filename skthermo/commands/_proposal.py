@@ -156,7 +156,7 @@ class Proposal:
         """Settings of the monitor."""
         several = len(set(self.units.values())) > 1
         units = dict(self.units) if several else next(iter(self.units.values()))
-        return {"false_alarms_per_year": 1.0, "units": units, "random_state": 0}
+        return {"false_alarms_per_year": 1.0, "watch_per_year": 12.0, "units": units, "random_state": 0}
 
     def write(self, folder: Path, name: str | None) -> Path:
         """Write the settings into a folder, with copies of the files and a folder for new ones."""

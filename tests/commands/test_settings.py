@@ -47,7 +47,10 @@ def by_python(detector, *steps, compensator=None, **parameters):
     regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
     options = {"targets": MODES} | (compensator or {})
     detector = make_pipeline(TemperatureCompensator(regression, **options), detector)
-    return Monitor(detector, **{"false_alarms_per_year": 1.0, "units": "Hz", "random_state": 0} | parameters)
+    return Monitor(
+        detector,
+        **{"false_alarms_per_year": 1.0, "watch_per_year": 12.0, "units": "Hz", "random_state": 0} | parameters,
+    )
 
 
 @pytest.mark.parametrize("section", ["compensator", "monitor"])
