@@ -186,7 +186,8 @@ def test_commands_that_an_engineer_uses(bridge, records):
     now = write_day(records, bridge, FIRST, DAMAGED + 30)
     run("update", settings(bridge), "--now", now)
     status = run("status", settings(bridge), "--now", now, "--json")
-    (event,) = valid(status.json)["bridges"][0]["status"]["events"]
+    opened = valid(status.json)["bridges"][0]["status"]["events"]
+    (event,) = [one for one in opened if one["kind"] == "damage"]
     said = run("acknowledge", settings(bridge), event["event"], "--harmless", "--note", "a repair", "--json")
     assert [one["what"] for one in valid(said.json)["bridges"][0]["transitions"]] == ["acknowledged"]
     new = run("rebaseline", settings(bridge), "--since", str(records.index[DAMAGED]), "--now", now, "--json")
