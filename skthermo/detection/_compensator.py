@@ -450,7 +450,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
         others = np.delete(_check_feature_names_in(self, None), self.targets_)
         warn_each(misplaced_columns(pd.DataFrame(temperatures, copy=False).set_axis(others, axis=1), named))
-        return temperatures, frequencies, findings_of(check_records, pd.DataFrame(temperatures), named)
+        return (
+            temperatures,
+            frequencies,
+            findings_of(partial(check_records, unit=""), pd.DataFrame(temperatures), named),
+        )
 
     def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""

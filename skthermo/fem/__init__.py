@@ -10,7 +10,7 @@ from skthermo.fem._protocol import (
     ModalModel,
 )
 from skthermo.fem.affine import AffineModel, ReducedModel
-from skthermo.fem.assembly import Structure
+from skthermo.fem.assembly import ImportedStructure, Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
 from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
@@ -25,6 +25,7 @@ __all__ = [
     "DifferentiableModel",
     "Element",
     "FEModel",
+    "ImportedStructure",
     "LocalModel",
     "LocalModes",
     "Membrane",

@@ -112,6 +112,8 @@ class ModeShapesDisplay(Display):
             unknown.
         """
         check_structure(structure, groups)
+        if not structure.dofs:
+            raise ValueError(f"{structure!r} has no labels of degrees of freedom; expected (node, direction) of each")
         if model is None:
             if not structure.groups:
                 raise ValueError("structure has no groups; expected model, such as structure.assemble(...)")
@@ -203,7 +205,7 @@ def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashab
     nodes, axes = view.nodes, view.directions
     moves = {node: np.zeros(len(axes)) for node in nodes}
     for (node, direction), value in zip(view.structure.dofs, shape, strict=True):
-        if direction in axes:
+        if direction in list(axes) and node in moves:
             moves[node][axes.index(direction)] = value
     largest = max(np.linalg.norm(move) for move in moves.values())
     places = np.array(list(nodes.values()))

@@ -59,7 +59,7 @@ class Projection:
     @property
     def supports(self) -> dict[Hashable, bool]:
         """Nodes that are held in a direction in which others move, and whether in every such direction."""
-        moving = {direction for _, direction in self.structure.dofs}.intersection(self.directions)
+        moving = ({direction for _, direction in self.structure.dofs} or set(AXES)).intersection(self.directions)
         held = {node: moving.intersection(along) for node, along in self.structure.supports.items()}
         return {node: fixed == moving for node, fixed in held.items() if fixed}
 

@@ -11,7 +11,7 @@ from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
 from skthermo.reporting._findings import COLUMNS, LEVEL, REFERENCE, SIMULATED, Finding
-from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, joined, paragraphs, section, table
+from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage
 
 MOST_NAMED = 12  # largest number of scenarios that are named or drawn in a section
@@ -23,39 +23,48 @@ WITHIN = {"1D": "a day", "7D": "a week", "30D": "30 days"}
 def answer(study: DetectabilityStudy, findings: Sequence[Finding], identified: Sequence[str]) -> Section:
     """The answer in a few sentences, those on identified damage first."""
     rows = study.results_[study.results_["source"] == SIMULATED]
-    confidence = percent(study.confidence_)
-    words = paragraphs(
-        "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
-        "learned from measurements how temperature moves this structure, simulated it in the same weather without "
-        f"damage and with damage. {_share_evaluated(study)}"
-    )
-    meaning = paragraphs(
-        "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
-        "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as detected reliably if "
-        f"at least {share_text(LEVEL)} of the records of the damaged structure raise an alarm. Bounds of rates hold "
-        f"with {confidence} confidence; they cover the scatter of the measurements, but neither weather of another "
-        f"kind nor errors of the model. {_expected(study)}"
-    )
-    parts = [words]
+    parts = []
     if identified:
         parts += [element("h3", "The structure as it is now"), bullets(identified)]
-    parts += [element("h3", "Time to detection"), how_soon(study)]
+    parts += [element("h3", "Smallest damage that would be detected reliably"), _smallest(rows, findings)]
     parts += [element("h3", "False alarms"), _false_alarms(rows)]
-    parts += [element("h3", "Smallest change that is detected reliably"), _smallest(rows, findings)]
-    parts += [element("h3", "What would not be detected"), _missed(rows), element("h3", "What the words mean"), meaning]
+    parts += [element("h3", "Time to detection"), _how_soon(study)]
+    parts += [element("h3", "What would not be detected"), _missed(rows)]
+    parts += [element("h3", "What the words mean"), _meaning(study)]
     return section("answer", "The answer", *parts)
 
 
-def how_soon(study: DetectabilityStudy) -> Html:
-    """Sentences on the smallest damage of each family, and a table of all scenarios."""
-    waits = study.time_to_detection(level=RELIABLE)
+def _meaning(study: DetectabilityStudy) -> Html:
+    """How the answer was found, and what its words mean."""
+    return paragraphs(
+        "Temperature moves the natural frequencies of a structure, and so does damage. A computer model, which has "
+        "learned from measurements how temperature moves this structure, simulated it in the same weather without "
+        f"damage and with damage. {_share_evaluated(study)}",
+        "A record is one measurement of temperatures and natural frequencies. Damage of 20 % means that the members of "
+        "a group lose 20 % of their stiffness, their resistance to deformation. Damage counts as detected reliably if "
+        f"at least {share_text(LEVEL)} of the records of the damaged structure raise an alarm.",
+        f"Bounds of rates cover the true rate with {percent(study.confidence_)} confidence, as far as the scatter of "
+        "the measurements is concerned. They cover neither weather of another kind nor errors of the model. "
+        f"{_expected(study)}",
+    )
+
+
+def _how_soon(study: DetectabilityStudy) -> Html:
+    """Sentences on the smallest damage of each family that is soon detected, and on the healthy structure."""
     is_healthy = dict(zip(study.results_["scenario"], study.results_["measure"] == "PFA", strict=True))
     smallest = study.time_to_detection(level=RELIABLE, smallest=True)
     smallest = smallest.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable")
-    items = [
-        element("span", element("strong", f"{row['scenario']}:"), f" {row['text']}.") for _, row in smallest.iterrows()
-    ]
-    times = [name for name in waits if f"{name} healthy" in waits and waits[name].notna().any()]
+    return bullets(_named(row["scenario"], f"{row['text']}.") for _, row in smallest.iterrows())
+
+
+def _named(name: object, text: str) -> Html:
+    return element("span", element("strong", f"{name}:"), f" {text}")
+
+
+def times(study: DetectabilityStudy) -> list[Html]:
+    """What the time to detection is, and a table of it for all scenarios."""
+    waits = study.time_to_detection(level=RELIABLE)
+    shown = [name for name in waits if f"{name} healthy" in waits and waits[name].notna().any()]
     meaning = (
         "Damage may begin on any day of the simulated weather, and is detected with the first alarm after that. The "
         "chance of a false alarm of the healthy structure within the same time grows, too."
@@ -63,18 +72,17 @@ def how_soon(study: DetectabilityStudy) -> Html:
     delayed = float(waits["not_evaluated"].max())
     if delayed:
         meaning += f" In {share_text(delayed)} of the time no record can be evaluated, which delays detection."
-    labels = (WITHIN.get(name, f"{name} records" if name.isdigit() else name) for name in times)
+    labels = (WITHIN.get(name, f"{name} records" if name.isdigit() else name) for name in shown)
     columns = ["Scenario", *(f"Alarm within {label}" for label in labels), "In half of the cases", "In 95 of 100"]
     cells = [
-        [row["scenario"], *(_chance(row, name) for name in times), _time(row["median"]), _time(row["reliable"])]
+        [row["scenario"], *(_chance(row, name) for name in shown), _time(row["median"]), _time(row["reliable"])]
         for _, row in waits.iterrows()
     ]
     caption = (
-        f"Chance of an alarm within a time from the beginning of the damage, with {percent(study.confidence_)} bounds"
+        "Chance of an alarm within a time from the beginning of the damage, with bounds of "
+        f"{percent(study.confidence_)} confidence, and time to the first alarm."
     )
-    return joined(
-        [bullets(items), paragraphs(meaning), table(f"{caption}, and time to the first alarm.", columns, cells)]
-    )
+    return [element("h3", "How soon damage would be detected"), paragraphs(meaning), table(caption, columns, cells)]
 
 
 def _chance(row: pd.Series, name: str) -> str:
@@ -98,10 +106,20 @@ def _expected(study: DetectabilityStudy) -> str:
 
 
 def _smallest(rows: pd.DataFrame, findings: Sequence[Finding]) -> Html:
-    """A row for each family with severities, also for those that have no smallest one."""
-    tested = rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
+    """A sentence for each family with severities, also for those that have no smallest one."""
+    tested = _with_severities(rows)
     if not len(tested):
         return paragraphs("No damage group was tested on its own, so that there is no smallest damage to report.")
+    sentences = {found.family: found.sentence() for found in findings}
+    unclear = "not defined, as damage and strengthening, or one severity twice, were tested together."
+    return bullets(_named(family, sentences.get(str(family), unclear)) for family in tested["family"].unique())
+
+
+def _smallest_table(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[Html]:
+    """The smallest severities with their bounds, and those on the fitted curves; nothing without any."""
+    tested = _with_severities(rows)
+    if not len(tested):
+        return []
     cells = {found.family: found.cells() for found in findings}
     unclear = ["not defined", "", "", "", "damage and strengthening together, or one severity twice"]
     families = (str(family) for family in tested["family"].unique())
@@ -110,7 +128,11 @@ def _smallest(rows: pd.DataFrame, findings: Sequence[Finding]) -> Html:
         "the rates. On a curve through the tested severities, a90 is detected in 90 % of the records, and a90/95 so "
         "with 95 % confidence."
     )
-    return table(caption, COLUMNS, [cells.get(family, [family, *unclear]) for family in families])
+    return [table(caption, COLUMNS, [cells.get(family, [family, *unclear]) for family in families], is_cards=True)]
+
+
+def _with_severities(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
 
 
 def _share_evaluated(study: DetectabilityStudy) -> str:
@@ -141,10 +163,13 @@ def found_and_missed(study: DetectabilityStudy, findings: Sequence[Finding]) -> 
     distance = " The index is the Mahalanobis distance, not squared." if is_distance else ""
     parts = [
         paragraphs(introduction),
+        *_smallest_table(results[results["source"] == SIMULATED], findings),
         _alarms(study, scenarios),
+        *times(study),
         figure(
-            "Share of records in alarm over the severity of the damage: tested severities with 95 % bounds, and a "
-            "curve through them with its bounds. The axes are linear.",
+            "Share of records in alarm over the severity of the damage, in percent of the stiffness. Dots with bars: "
+            "tested severities with intervals of 95 % confidence. Line and band: a curve through them, with its "
+            "interval of 95 % confidence.",
             [draw_curve(found, found.curve) for found in findings if found.curve is not None],
             "How the share of alarms grows with damage",
         ),

@@ -10,8 +10,9 @@ import pandas as pd
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import significant
 from skthermo.reporting._html import Html, element, joined
+from skthermo.reporting._readable import Values, readable
 
-WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 640, 220, 44, 24, 20  # of a chart, and its margins, in units of its view box
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 420, 190, 44, 24, 20  # of a chart, and its margins, in units of its view box
 LINE_WIDTH, LINE_HEIGHT = 132, 30  # of a line of a table
 HIGHEST = 5.0  # times the threshold, beyond which points stand at the upper edge
 WEEK = 7
@@ -26,7 +27,7 @@ def chart(
 ) -> Html:
     """Highest damage index of each day as dots over its threshold; ticks for days not evaluated, events shaded.
 
-    ``index`` has a row for each day, NaN where none was judged, on midnights without a time zone.
+    ``index`` has a row for each day, NaN where none was evaluated, on midnights without a time zone.
     """
     days, values = index.index, index.to_numpy(dtype=float)
     top = _highest(values, threshold)
@@ -55,11 +56,13 @@ def chart(
         *_months(days, step),
     ]
     box = {"viewBox": f"0 0 {WIDTH} {HEIGHT}", "class_": "chart", "role": "img", "aria_label": alt}
-    return element("svg", joined(part for part in parts if part), **box)
+    picture = element("svg", joined(part for part in parts if part), **box)
+    table = pd.DataFrame({"highest of the day": values, "threshold": threshold}, pd.Index(days, name="date"))
+    return readable(picture, Values("damage index of the last year", table), x / WIDTH)
 
 
 def line(index: Sequence[float], threshold: float) -> Html:
-    """Highest index of each week as a line, with its threshold; nothing where none was judged."""
+    """Highest index of each week as a line, with its threshold; nothing where none was evaluated."""
     values = np.asarray(index, dtype=float)
     values = np.pad(values, (-len(values) % WEEK, 0), constant_values=np.nan).reshape(-1, WEEK)
     weeks = np.fmax.reduce(values, axis=1, initial=-np.inf)
@@ -73,7 +76,7 @@ def line(index: Sequence[float], threshold: float) -> Html:
     above = weeks > threshold
     drawn = [
         _path("threshold", f"M0 {level}H{LINE_WIDTH}"),
-        _path("course", _line(places, heights)),
+        _path("line", _line(places, heights)),
         _path("dots above", _dots(places[above], heights[above])),
     ]
     box = {"viewBox": f"0 0 {LINE_WIDTH} {LINE_HEIGHT}", "class_": "spark", "aria_hidden": "true"}
@@ -91,9 +94,9 @@ def _heights(values: Array, top: float) -> Array:
 
 
 def _months(days: pd.DatetimeIndex, step: float) -> list[Html]:
-    """Names of months below the axis, every second or third one of a longer time, with the year at the first."""
+    """Names of months below the axis, every third one of a year, with the year at the first."""
     firsts = np.flatnonzero(days.day == 1)
-    chosen = firsts[:: max(1, -(-len(firsts) // 7))]
+    chosen = firsts[:: max(1, -(-len(firsts) // 5))]
     months = days[chosen]
     names = [
         f"{day:%b %Y}" if number == 0 or day.year != months[number - 1].year else f"{day:%b}"

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
-from skthermo._tables.arrays import as_floats
+from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.text import chance_text, counted, percent, printable, share_text, significant
 from skthermo._validation import import_optional
 from skthermo.fem import Structure
@@ -25,9 +26,11 @@ from skthermo.plotting import (
 )
 from skthermo.reporting._findings import Finding
 from skthermo.reporting._html import Html, image
+from skthermo.reporting._readable import Values, readable
 from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -37,18 +40,25 @@ class HasFigure(Protocol):
     figure_: Figure
 
 
-WIDTH, HEIGHT = 4.8, 2.9  # inches; a telephone shows them at full size
+WIDTH, HEIGHT = 4.2, 2.8  # inches; a telephone shows them at nearly full size
 LONGEST_LABEL = 28  # number of letters above which labels of a legend stand below each other
 MANY_POINTS = 1000  # number of points of one line from which on it is drawn as pixels
 SETTINGS = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
 
 
 def draw(
-    make: Callable[[], HasFigure], alt: str, title: str = "", *, height: float | None = HEIGHT, width: float = WIDTH
+    make: Callable[[], HasFigure],
+    alt: str,
+    title: str = "",
+    *,
+    height: float | None = HEIGHT,
+    width: float = WIDTH,
+    values: Values | None = None,
 ) -> Html:
-    """A display as an image of fixed width, in matplotlib's own style and on white.
+    """A display as an image of fixed width, in matplotlib's own style and on white; its values can be read.
 
-    Width and height are in inches; without a height, the drawing keeps its proportions.
+    Width and height are in inches; without a height, the drawing keeps its proportions. The index of the values is in
+    the unit of the horizontal axis.
     """
     plt = import_optional("matplotlib.pyplot", extra="plot")
     others = set(plt.get_fignums())
@@ -60,7 +70,8 @@ def draw(
             if title:
                 text = textwrap.shorten(printable(title), 50, placeholder=" ...")
                 display.figure_.axes[0].set_title(text, fontsize="medium", parse_math=False)
-            return image(_svg(display.figure_), alt)
+            picture = image(_svg(display.figure_), alt)
+            return picture if values is None else readable(picture, values, *_places(display.figure_.axes[0], values))
     finally:
         for number in set(plt.get_fignums()) - others:
             plt.close(number)
@@ -93,6 +104,18 @@ def _svg(figure: Figure) -> bytes:
     return drawn
 
 
+def _places(ax: Axes, values: Values) -> tuple[Array, Array | None]:
+    """Where the rows of values are drawn, as shares of the figure from its top left corner."""
+    index = values.table.index
+    if isinstance(index, pd.DatetimeIndex):
+        index = index.tz_localize(None)
+    across = index if isinstance(index, pd.DatetimeIndex) or is_numeric_dtype(index) else np.arange(len(index))
+    up = values.table.iloc[:, 0].to_numpy(dtype=float) if values.is_scatter else np.zeros(len(index))
+    pixels = ax.transData.transform(np.column_stack([ax.convert_xunits(np.asarray(across)), up]))
+    x, y = ax.figure.transFigure.inverted().transform(pixels).T
+    return x, np.clip(1 - y, 0, 1) if values.is_scatter else None
+
+
 def draw_modes(
     measured: pd.DataFrame, predicted: pd.DataFrame | None = None, temperature: pd.Series | None = None
 ) -> list[Html]:
@@ -105,7 +128,16 @@ def draw_modes(
         alt = f"Measured frequency {name} over {over}: between {low} and {high} Hz."
         other = None if predicted is None else predicted.iloc[:, [number]]
         make = partial(PredictionDisplay.from_predictions, table, other, temperature=temperature)
-        drawn.append(draw(make, alt, height=2.2 if temperature is None else HEIGHT))
+        if other is None or temperature is None:
+            values = Values(
+                f"frequency {name} over time",
+                table.set_axis([f"{name} (Hz)"], axis=1).rename_axis(table.index.name or "date"),
+            )
+        else:
+            both = pd.DataFrame({f"{name} measured (Hz)": table.iloc[:, 0], f"{name} predicted (Hz)": other.iloc[:, 0]})
+            both = both.set_axis(pd.Index(temperature, name=f"{temperature.name} (°C)"))
+            values = Values(f"frequency {name} over temperature", both, is_scatter=True)
+        drawn.append(draw(make, alt, height=2.2 if temperature is None else HEIGHT, values=values))
     return drawn
 
 
@@ -128,7 +160,12 @@ def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
             display.ax_.get_legend().remove()
         return display
 
-    return draw(make, alt, title, height=3.2)
+    observed = 100 * np.asarray(fitted.n_detected) / np.asarray(fitted.n_records)
+    columns = ["observed", "fitted", "lowest", "highest"] if is_curve else ["observed"]
+    shares = [observed, *(100 * np.asarray(share) for share in fitted.predict(fitted.severities))][: len(columns)]
+    index = pd.Index(100 * np.asarray(fitted.severities), name="severity (%)")
+    table = pd.DataFrame({f"detected, {name} (%)": share for name, share in zip(columns, shares, strict=True)}, index)
+    return draw(make, alt, title, height=3.2, values=Values(f"detection of {finding.family}", table))
 
 
 def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series], onset: object = None) -> Html:
@@ -145,7 +182,9 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
         fold_legend(display.figure_, "outside upper center", n_columns=2)
         return display
 
-    return draw(make, f"Damage index over time. {above}.", height=3.4)
+    table = pd.DataFrame(dict(shown)).assign(threshold=threshold)
+    values = Values(f"damage index {list(shown)[-1]}", table.rename_axis("date"))
+    return draw(make, f"Damage index over time. {above}.", height=3.2, values=values)
 
 
 def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
@@ -156,11 +195,11 @@ def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
     def make() -> StructureDisplay:
         display = StructureDisplay.from_structure(structure, groups=known)
         fold_legend(
-            display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=3
+            display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=2
         )
         return display
 
-    return draw(make, alt, height=None, width=6.5)
+    return draw(make, alt, height=None, width=5.2)
 
 
 def draw_identified_damage(identified: IdentifiedDamage) -> Html:

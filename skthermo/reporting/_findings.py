@@ -40,6 +40,16 @@ class Finding:
         """Whether some tested severity is detected reliably."""
         return bool(np.isfinite(self.smallest))
 
+    def sentence(self) -> str:
+        """The smallest severity that is detected reliably, in words."""
+        kind = "a loss of stiffness" if self.severities[0] > 0 else "a gain of stiffness"
+        least, largest = percent(abs(self.severities[0])), percent(abs(self.severities[-1]))
+        if not self.is_found:
+            return f"{kind} of up to {largest} would not be detected reliably."
+        if self.smallest == self.severities[0]:
+            return f"{kind} of {least} or more would be detected reliably; less was not tested."
+        return f"{kind} of {percent(abs(self.smallest))} or more would be detected reliably."
+
     def cells(self) -> list[str]:
         """Family, smallest severity, its bounds, severities on the curve, and remark."""
         kind = "damage" if self.severities[0] > 0 else "strengthening"

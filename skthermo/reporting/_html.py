@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
+from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from typing import NamedTuple
@@ -17,8 +18,15 @@ class Html(str):
     __slots__ = ()
 
 
-VOID = {"img", "meta"}  # elements without content
-STYLE = "\n" + files("skthermo.reporting").joinpath("page.css").read_text(encoding="utf-8")
+VOID = {"img", "input", "meta"}  # elements without content
+STYLE, SCRIPT = (
+    "\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
+)
+POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+    f"script-src 'sha256-{b64encode(sha256(SCRIPT.encode()).digest()).decode()}'"
+)
+"""What a browser may load: drawings within the page, and the page's own script; nothing from a network."""
 
 
 def element(tag: str, *content: object, **attributes: object) -> Html:
@@ -103,6 +111,7 @@ def page(title: str, introduction: Html, sections: Sequence[Section], ending: Ht
     head = (
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
         element("title", title),
         element("style", Html(STYLE)),
     )
@@ -112,6 +121,7 @@ def page(title: str, introduction: Html, sections: Sequence[Section], ending: Ht
         ),
         element("main", joined(one.html for one in sections)),
         element("footer", ending),
+        element("script", Html(SCRIPT)),
     )
     document = element("html", element("head", joined(head)), Html("\n"), element("body", joined(body)), lang="en")
     return f"<!DOCTYPE html>\n{document}\n"

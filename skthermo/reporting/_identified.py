@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from skthermo._tables.text import bounds_text, chance_text, share_text
+from skthermo._tables.text import SPACE, bounds_text, chance_text, share_text
 from skthermo.reporting._figures import draw_identified_damage
 from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
+from skthermo.reporting._readable import Values, csv_link
 from skthermo.studies import IdentifiedDamage
 
 LEAST = 0.005  # probability from which on an explanation has a row
@@ -44,6 +45,10 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
             "each natural frequency, measured and explained.",
             [draw_identified_damage(identified)],
         ),
+        element(
+            "p",
+            csv_link(Values("identified damage", identified.table.rename_axis("group")), "Table of all groups (CSV)"),
+        ),
     ]
     return section("identified", "Identified damage", *parts)
 
@@ -67,8 +72,8 @@ def _shifts(identified: IdentifiedDamage) -> Html:
     shifts = [
         [
             mode,
-            *(f"{100 * row[name]:+.2f} %" for name in ("measured", "explained")),
-            f"± {200 * row['standard_error']:.2f} %",
+            *(f"{100 * row[name]:+.2f}{SPACE}%" for name in ("measured", "explained")),
+            f"±{SPACE}{200 * row['standard_error']:.2f}{SPACE}%",
         ]
         for mode, row in identified.shifts.iterrows()
     ]

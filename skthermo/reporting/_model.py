@@ -9,7 +9,7 @@ import pandas as pd
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import as_floats, spread_evenly
 from skthermo._tables.frames import column_names
-from skthermo._tables.text import counted, duration_text, period_text, share_text, significant
+from skthermo._tables.text import SPACE, counted, duration_text, period_text, share_text, significant
 from skthermo.fem import Structure
 from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_modes
 from skthermo.reporting._findings import REFERENCE, SIMULATED
@@ -42,12 +42,12 @@ def monitored(study: DetectabilityStudy, structure: Structure | None, families: 
     simulated = f"The simulated weather has {counted(len(weather), 'record')}{f' {then}' if then else ''}."
     parts = [
         paragraphs(text, simulated, "A lag is the temperature of a sensor some time before." if has_lags else ""),
-        table("Temperatures.", ["Sensor", "Lowest", "Mean", "Highest", "Missing"], _ranges(sensors, "°C", 3)),
+        table("Temperatures (°C).", ["Sensor", "Lowest", "Mean", "Highest", "Missing"], _ranges(sensors, 3)),
         paragraphs(
             "A mode is one shape in which the structure vibrates; each has its own natural frequency, in vibrations "
             "per second (Hz). Where a frequency is missing, the mode could not be identified in that record."
         ),
-        table("Natural frequencies.", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, "Hz", 4)),
+        table("Natural frequencies (Hz).", ["Mode", "Lowest", "Mean", "Highest", "Missing"], _ranges(F, 4)),
         figure("Measured natural frequencies over time.", draw_modes(F)),
     ]
     if structure is not None:
@@ -75,8 +75,9 @@ def learned(report: FitReport) -> list[Html]:
     error, mean = (significant(report.errors[name].mean()) for name in ("MAPE", "MAPE of the mean"))
     return [
         paragraphs(
-            f"The model predicts the frequencies of these records with a mean error of {error} %; the mean frequency "
-            f"as prediction has {mean} %. Errors of records that the model has not learned from are usually larger.",
+            f"The model predicts the frequencies of these records with a mean error of {error}{SPACE}%; the mean "
+            f"frequency as prediction has {mean}{SPACE}%. Errors of records that the model has not learned from are "
+            "usually larger.",
             f"Of {counted(report.n_rows, 'record')}, {report.n_trained:,} were complete enough to learn from.",
         ),
         table(
@@ -108,7 +109,7 @@ def stiffnesses(report: FitReport) -> list[Html]:
 def _modes(report: FitReport) -> list[list[str]]:
     errors = report.errors[["MAPE", "MAPE of the mean"]].to_numpy()
     return [
-        [name, *(f"{significant(error)} %" for error in pair), f"{offset:+.1f} %"]
+        [name, *(f"{significant(error)}{SPACE}%" for error in pair), f"{offset:+.1f}{SPACE}%"]
         for (name, offset), pair in zip(report.offsets.items(), errors, strict=True)
     ]
 
@@ -160,9 +161,9 @@ def _sensors(T: pd.DataFrame) -> pd.DataFrame:
     return T[shown].set_axis([f"{name}, with {counted(n, 'lag')}" if n else first for name, first, n in whole], axis=1)
 
 
-def _ranges(values: pd.DataFrame, unit: str, digits: int) -> list[list[str]]:
+def _ranges(values: pd.DataFrame, digits: int) -> list[list[str]]:
     return [
-        [name, *(f"{significant(v, digits)} {unit}" for v in (c.min(), c.mean(), c.max())), share_text(c.isna().mean())]
+        [name, *(significant(v, digits) for v in (c.min(), c.mean(), c.max())), share_text(c.isna().mean())]
         for name, c in values.items()
     ]
 

@@ -448,6 +448,26 @@ TARGETS = names(["rafters"], "a number") | {
     "None inside": {"p": None},
     "true inside": {"p": True},
 }
+ALONE = {name: [name] for name in BARS}
+EXPORTED = fem.Structure(NODES, BARS, SUPPORTS, ALONE).assemble(list(BARS), n_modes=1)
+ENDS = {name: bar.nodes for name, bar in BARS.items()}
+IMPORTED = fem.ImportedStructure(EXPORTED, NODES, ENDS, GROUPS)
+use(
+    "fem.ImportedStructure",
+    lambda **a: fem.ImportedStructure(**a).assemble(["rafters"], n_modes=1).frequencies([[1.0]]),
+    model=(
+        EXPORTED,
+        bad(None, "model", 3, True, fem.AffineModel, {}, FRAME) | {"another": FRAME.assemble(["rafters"], n_modes=1)},
+    ),
+    nodes=(NODES, bad(None, [(0, 0)], "xy", True, 3, {}) | {"None inside": NODES | {"apex": None}}),
+    members=(
+        ENDS,
+        bad(None, [("left", "right")], "bars", True, 3, {})
+        | {"None inside": ENDS | {"tie": None}, "unknown": ENDS | {"post": "apex"}, "nowhere": ENDS | {"tie": "foot"}},
+    ),
+    groups=(GROUPS, bad(["tie"], "tie", True, 3, {"rafters": ["post"]}, {"rafters": []}, {"rafters": [3]})),
+    supports=(SUPPORTS, bad(["left"], "left", True, {"pier": "xy"}, {"left": "xw"}, {"left": 1}, {"left": b"xy"})),
+)
 use(
     "fem.Structure.assemble",
     lambda **a: FRAME.assemble(**a).frequencies([[1.0]]),

@@ -7,7 +7,7 @@ import pytest
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from skthermo.datasets import kw51_structure, make_kw51
-from skthermo.fem import Bar, Beam, CallableModel, PointMass, Spring, Structure
+from skthermo.fem import AffineModel, Bar, Beam, CallableModel, ImportedStructure, PointMass, Spring, Structure
 from skthermo.plotting import ModeShapesDisplay, StructureDisplay
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
@@ -47,6 +47,31 @@ def test_a_group_colours_its_members_and_a_member_its_own_line():
     by_group = {"ties": 1.0, "rafters": 2.0, "post": 3.0}
     for values in (by_group, pd.Series(by_group), [1, 1, 2, 2, 3]):
         np.testing.assert_array_equal(StructureDisplay.from_structure(structure, values).values, [1, 1, 2, 2, 3])
+
+
+@pytest.mark.parametrize("has_labels", [True, False])
+def test_members_from_another_program_are_drawn_as_our_own(has_labels):
+    own = king_post()
+    alone = Structure(own.nodes, own.members, own.supports, {name: [name] for name in own.members})
+    exported = alone.assemble(list(own.members), n_modes=2)
+    if not has_labels:
+        terms = {(name,): K for name, K in zip(own.members, exported.stiffness_terms, strict=True)}
+        exported = AffineModel(terms, exported.matrices(np.ones(5))[1], n_modes=2)
+    ends = {name: bar.nodes for name, bar in own.members.items()}
+    imported = ImportedStructure(exported, own.nodes, ends, own.groups, supports=own.supports)
+    values = {"rafters": 2.0, "post": 1.0}
+    displays = [StructureDisplay.from_structure(one, values) for one in (own, imported)]
+    assert colours(displays[1]) == pytest.approx(colours(displays[0]), nan_ok=True)
+    assert len(displays[1].ax_.lines) == len(displays[0].ax_.lines) == 2
+    if has_labels:
+        ours, theirs = (ModeShapesDisplay.from_structure(one, modes=[0]).lines_[0][0] for one in (own, imported))
+        shapes = [np.array(lines.get_segments()) for lines in (ours, theirs)]
+        rest = np.array([[own.nodes[node] for node in pair] for pair in ends.values()])
+        sign = np.sign(np.sum((shapes[0] - rest) * (shapes[1] - rest)))
+        np.testing.assert_allclose(shapes[1] - rest, sign * (shapes[0] - rest), atol=1e-9)
+    else:
+        with pytest.raises(ValueError, match="labels"):
+            ModeShapesDisplay.from_structure(imported)
 
 
 def test_supports_are_drawn_where_they_are_and_filled_where_nothing_can_move():

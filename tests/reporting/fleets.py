@@ -11,9 +11,8 @@ class FakeFleet:
     def __init__(self, monitors=(), chains=(), errors=(), warned=(), significant=()):
         self.monitors, self.chains = dict(monitors), dict(chains)
         names = list(dict.fromkeys([*self.monitors, *self.chains, *dict(errors)]))
-        self.errors = pd.DataFrame(
-            [(name, "fit", text) for name, text in dict(errors).items()], columns=["bridge", "stage", "error"]
-        )
+        rows = [(name, "update" if name in self.monitors else "fit", text) for name, text in dict(errors).items()]
+        self.errors = pd.DataFrame(rows, columns=["bridge", "stage", "error"])
         is_fitted = [name in self.monitors or name in self.chains for name in names]
         self.table = pd.DataFrame({"is_fitted": is_fitted}, pd.Index(names, name="bridge", dtype=object))
         self.warnings = pd.DataFrame(list(warned), columns=["bridge", "kind", "message"])

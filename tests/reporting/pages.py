@@ -2,6 +2,8 @@
 
 import base64
 from html.parser import HTMLParser
+from io import StringIO
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,6 +11,7 @@ import pandas as pd
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import AffineModel
+from skthermo.reporting._html import POLICY, SCRIPT
 from skthermo.studies import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
@@ -67,7 +70,9 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if self.open and self.open[-1] not in ("style", "title"):
+        if self.open and self.open[-1] == "script":
+            assert data == SCRIPT, "a script that is not the page's own"
+        elif self.open and self.open[-1] not in ("style", "title"):
             self.text += data
             texts = {"td": self.cells, "th": self.heads, "p": self.paragraphs, "a": self.link_texts}.get(self.open[-1])
             if texts is not None:
@@ -78,6 +83,22 @@ class Page(HTMLParser):
 
     def values(self, attribute):
         return [attributes[attribute] for _, attributes in self.tags if attribute in attributes]
+
+    def links(self):
+        """Where links lead, those that save a table left out."""
+        return [link for link in self.values("href") if not link.startswith("data:text/csv;")]
+
+    def tables(self):
+        """Tables behind drawings by the names of their files."""
+        saved = [link for link in self.all("a") if "download" in link]
+        return {one["download"]: pd.read_csv(StringIO(unquote(one["href"].split(",", 1)[1]))) for one in saved}
+
+    def is_self_contained(self):
+        """Nothing is loaded, and no script runs but the page's own."""
+        (policy,) = [tag["content"] for tag in self.all("meta") if "http-equiv" in tag]
+        foreign = [tag for tag, _ in self.tags if tag in ("link", "iframe", "object", "form")]
+        handlers = [name for _, attributes in self.tags for name in attributes if name.startswith("on")]
+        return policy == POLICY and self.all("script") == [{}] and not foreign and not handlers
 
     def drawings(self):
         """Drawings as trees; an error if they are no XML."""

@@ -96,14 +96,14 @@ def test_worst_bridges_come_first(page):
 
 
 def test_every_bridge_has_a_page_that_links_back(page, file, fleet):
-    links = {unquote(link) for link in page.values("href") if not link.startswith("#")}
+    links = {unquote(link) for link in page.links() if not link.startswith("#")}
     assert {path.relative_to(file.parent).as_posix() for path in file.parent.glob("*/*")} == links
     assert len(links) == len(fleet.table)
     for link in links:
         one = Page((file.parent / link).read_text(encoding="utf-8"))
-        (back,) = [target for target in one.values("href") if not target.startswith("#")]
+        (back,) = [target for target in one.links() if not target.startswith("#")]
         assert ((file.parent / link).parent / unquote(back)).resolve() == file.resolve()
-        assert not [tag for tag, _ in one.tags if tag in ("script", "link", "iframe", "object", "form")]
+        assert one.is_self_contained()
 
 
 def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
@@ -118,13 +118,17 @@ def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
 
 
 def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
-    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "iframe", "object", "form")]
+    assert page.is_self_contained()
     assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "false-alarms", "warnings", "settings"]
     assert f"ValueError: {QUOTED}" in page.text
-    assert "OSError: checksum <wrong>" in page.text
+    for what in ("Its model could not be fitted to its records", "Its new records could not be evaluated"):
+        assert page.text.count(what) == 2  # as a state, and beside its message
     assert "expect 11 false alarms a year" in page.text
     assert all(line in page.text for line in fleet.discoveries(0.1).summary().splitlines())
     fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
+    broken = Page((file.parent / "all of #1_pages" / "broken_file.html").read_text(encoding="utf-8"))
+    assert "The file of its monitor cannot be read." in broken.paragraphs
+    assert "OSError: checksum <wrong>" in broken.text
     assert "with a mean error of" in fitted.text
     assert QUOTED in fitted.text
 
@@ -211,5 +215,5 @@ def test_a_line_shows_the_highest_of_each_week():
     index[63:] = np.nan
     drawn = line(index, 2.0)
     assert len(places(drawn, "dots above")) == 1
-    assert len(re.findall("[ML]", re.search('class="course" d="([^"]*)"', drawn)[1])) == 9
+    assert len(re.findall("[ML]", re.search('class="line" d="([^"]*)"', drawn)[1])) == 9
     assert line(np.full(20, np.nan), 2.0) == ""

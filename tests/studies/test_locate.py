@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from skthermo.datasets import make_truss_campaign, truss_structure
-from skthermo.fem import Beam, Spring, Structure, add_noise
+from skthermo.fem import Beam, ImportedStructure, Spring, Structure, add_noise
 from skthermo.studies import locate_damage
 from skthermo.surrogate import DataInformedFEM
 
@@ -103,6 +103,25 @@ def test_the_structure_must_be_the_models(fem, truss, later):
         located.likely_members(group="deck")
     with pytest.raises(ValueError, match="between 0 and 1"):
         located.likely_members(90)
+
+
+def test_members_that_another_program_assembled_are_located_alike(fem, truss, later):
+    """The truss as a structure, and as a matrix of the whole model for each member."""
+    year, parameters = make_truss_campaign(random_state=0), fem.model.parameter_names
+    members = {name: bar.nodes for name, bar in truss.members.items()}
+    alone = Structure(truss.nodes, truss.members, truss.supports, {name: [name] for name in members})
+    groups = {group: truss.groups[group] for group in parameters}
+    imported = ImportedStructure(alone.assemble(list(members)), truss.nodes, members, groups)
+    F = damaged_records(truss, later, "bottom", ["4", "9"], 0.3)
+    located = []
+    for structure in (truss, imported):
+        model = structure.assemble(parameters, groups=parameters)
+        chain = DataInformedFEM(model, random_state=0).fit(year.temperatures, year.frequencies)
+        located.append(locate_damage(chain, structure, later.temperatures, F, random_state=0))
+    ours, theirs = (one.table.sort_index() for one in located)
+    pd.testing.assert_frame_equal(theirs, ours, rtol=1e-6, atol=1e-8)
+    assert set(located[1].likely_members()) == {"4", "9"}
+    assert located[1].summary() == located[0].summary()
 
 
 # A symmetric bridge, calibrated

@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, Matrix, MatrixLike, real_array
+from skthermo._tables.arrays import Array, Label, Matrix, MatrixLike, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element, check_matrices
 
@@ -20,7 +20,7 @@ Key = tuple[str, ...]
 class TermAssembler:
     """Sums members' matrices, at the free ``dofs``, into one term for each combination of parameters and groups."""
 
-    def __init__(self, dofs: Sequence[Dof]):
+    def __init__(self, dofs: Sequence[Label]):
         self._index = {dof: i for i, dof in enumerate(dofs)}
         self._entries: dict[tuple[Key, frozenset[str]], list] = {}
         self._contents: dict[tuple[Key, frozenset[str]], list[tuple[Hashable, Key]]] = {}
@@ -146,13 +146,18 @@ class Structure:
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
         self._groups = {group: self._read_group(group, names) for group, names in (groups or {}).items()}
-        self.dofs = self._free_dofs(supports)
+        self.dofs: list[Label] = list(self._free_dofs(supports))
         self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
 
     @property
     def dimension(self) -> int:
         """2 or 3."""
         return len(next(iter(self._coordinates.values())))
+
+    @property
+    def n_dof(self) -> int:
+        """Number of free degrees of freedom."""
+        return len(self.dofs)
 
     @property
     def nodes(self) -> dict[Hashable, Array]:
@@ -269,13 +274,13 @@ class Structure:
         """
         if not getattr(model, "contents", ()):
             raise ValueError(
-                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, and "
-                "that is not divided yet"
+                f"{model!r:.200} does not know its members; expected a model that this structure has assembled, "
+                "by structure.assemble(...), and that is not divided yet"
             )
         terms = model.stiffness_terms
-        if terms[0].shape[0] != len(self.dofs):
+        if terms[0].shape[0] != self.n_dof:
             raise ValueError(
-                f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {len(self.dofs)}; expected a "
+                f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {self.n_dof}; expected a "
                 "model that this structure has assembled"
             )
         parts: dict[str, dict[int, MatrixLike]] = {}
@@ -310,11 +315,7 @@ class Structure:
             part = {part_of[member]: STIFFNESS} if member in part_of else {}
             assembler.add(member, {properties: matrices[properties]}, element.dofs(self.dimension), {}, part)
         summed = [matrix for _, matrix in assembler.terms()]
-        if abs(sum(summed) - term).max() > SAME * abs(term).max():
-            raise ValueError(
-                f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
-                "expected the structure that assembled the model"
-            )
+        check_same(sum(summed), term, contents)
         names = [name for name in dict.fromkeys(part_of.values()) if assembler.positions(name)]
         return {name: summed[assembler.positions(name)[0]] for name in names}
 
@@ -366,8 +367,8 @@ class Structure:
             raise ValueError(f"group {group!r} holds {list(unknown) or 'no member'}; expected names of members")
         return members
 
-    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> list[Dof]:
-        directions = TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
+    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
+        directions = self._directions
         used: set[Dof] = set()
         for name, element in self._members.items():
             for node, direction in element.dofs(self.dimension):
@@ -380,7 +381,14 @@ class Structure:
         for node in self._coordinates:
             if node not in connected:
                 raise ValueError(f"node {node!r} is disconnected: no member ends there")
-        fixed = set()
+        used -= self._fixed_dofs(supports)
+        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
+        if not free:
+            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
+        return free
+
+    def _fixed_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> set[Dof]:
+        directions, fixed = self._directions, set()
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
@@ -388,16 +396,25 @@ class Structure:
                 if direction not in directions:
                     raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
                 fixed.add((node, direction))
-        used -= fixed
-        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
-        if not free:
-            raise ValueError("the supports fix every node in every direction; expected a structure that can move")
-        return free
+        return fixed
+
+    @property
+    def _directions(self) -> tuple[str, ...]:
+        return TRANSLATIONS[:2] if self.dimension == 2 else (*TRANSLATIONS, *ROTATIONS)
 
     def __repr__(self) -> str:
         return (
-            f"Structure({len(self._coordinates)} nodes, {len(self._members)} members, "
-            f"{len(self.dofs)} degrees of freedom, groups {sorted(self._groups)})"
+            f"{type(self).__name__}({len(self._coordinates)} nodes, {len(self._members)} members, "
+            f"{self.n_dof} degrees of freedom, groups {sorted(self._groups)})"
+        )
+
+
+def check_same(summed: Matrix, term: Matrix, contents: Sequence[tuple[Hashable, Key]]) -> None:
+    """Raise an error if the matrices of a term's members do not add up to the term."""
+    if abs(summed - term).max() > SAME * abs(term).max():
+        raise ValueError(
+            f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
+            "expected the structure that assembled the model"
         )
 
 
@@ -412,10 +429,20 @@ def _read_directions(along: object, node: Hashable) -> list[str]:
 
 
 def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    coordinates = read_coordinates(nodes)
+    places: dict[tuple[float, ...], Hashable] = {}
+    for node, xyz in coordinates.items():
+        twin = places.setdefault(tuple(xyz.tolist()), node)
+        if twin != node:
+            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+    return coordinates
+
+
+def read_coordinates(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
+    """Coordinates of every node, two or three finite numbers each."""
     if not nodes:
         raise ValueError("nodes is empty; expected a mapping of node to coordinates")
     coordinates: dict[Hashable, Array] = {}
-    places: dict[tuple[float, ...], Hashable] = {}
     first = np.shape(next(iter(nodes.values())))
     for node, place in nodes.items():
         try:
@@ -427,9 +454,7 @@ def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Arr
                 f"node {node!r} has the coordinates {place!r}; expected two or three finite numbers, "
                 "as many as the first node has"
             )
-        twin = places.setdefault(tuple(xyz + 0.0), node)
-        if twin != node:
-            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
+        xyz = xyz + 0.0  # no negative zeros
         xyz.flags.writeable = False
         coordinates[node] = xyz
     return coordinates

@@ -8,6 +8,7 @@ from skthermo.fem.elements._element import (
     ByProperties,
     Dof,
     Element,
+    PhysicalElement,
     check_element,
     check_matrices,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "Dof",
     "Element",
     "Membrane",
+    "PhysicalElement",
     "PointMass",
     "Spring",
     "check_element",

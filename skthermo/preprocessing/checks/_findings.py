@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import MARKERS, Table, check_same_rows, column_names, columns_by_sensor, row_times
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo.exceptions import RecordsWarning
+from skthermo._tables.arrays import Array, median, robust_deviation, spread_evenly
+from skthermo._tables.frames import Table, columns_by_sensor, row_times
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import distances_from_neighbours
 from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
 from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
+from skthermo.preprocessing.checks._gross import CleanedRecords
+from skthermo.preprocessing.checks._kinds import Finding
+from skthermo.preprocessing.checks._reading import finding, period_of
+from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table
 from skthermo.preprocessing.checks._signs import (
     TimeShift,
     best_shift,
@@ -28,7 +31,6 @@ from skthermo.preprocessing.checks._signs import (
     with_past,
 )
 
-COLUMNS = ["what", "column", "n_rows", "from", "to", "detail"]
 LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
 MOST_FITTED = 20_000  # rows, evenly spread, that a trend is fitted to
 NOTHING = 0.02  # share of a mode's variance that counts as explained by chance
@@ -42,89 +44,15 @@ LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
 IMPLAUSIBLE = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
 PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
 
-WARNINGS = {
-    "stuck sensor": "values of a sensor only repeat: {}; expected NaN where it is stuck",
-    "stuck mode": "values of a mode only repeat: {}; expected NaN where it is stuck",
-    "weather": "the temperatures explain nothing of the frequencies: {}",
-    "time shift": "temperatures of other rows explain the frequencies better: {}",
-    "exchanged modes": "modes look exchanged in some rows: {}; expected the same mode in all of a column",
-    "outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}; expected "
-    "NaN where a value is wrong: HampelFilter puts it there",
-    "memory": "frequencies follow the weather of weeks, as soil and large concrete do: {}; append these means to the "
-    "inputs of the regression",
-    "step": "frequencies change at once by what the weather does not explain: {}; expected records of one structure, "
-    "in one state and by one way of identification",
-    "trend": "what the weather leaves of the frequencies has a trend: {}",
-}
 
-
-@dataclass(frozen=True, repr=False)
-class RecordFindings(SavesFrames):
-    """What `check_records` has found.
-
-    Parameters
-    ----------
-    table : DataFrame
-        A row for each finding: ``what`` was found in which ``column``, in how many rows (``n_rows``), ``from`` and
-        ``to`` which row by the labels of the records' index, and a sentence that says more (``detail``). Empty where
-        nothing was found.
-    n_rows : int
-        Number of records.
-    outliers : DataFrame of bool of shape (n_records, n_modes), optional
-        Which frequencies are outliers, on the records' index.
-    memory : MemoryFindings, optional
-        What `find_memory` has found; None where nothing was looked for.
-
-    Examples
-    --------
-    >>> from skthermo.datasets import make_truss_campaign
-    >>> from skthermo.preprocessing import check_records
-    >>> year = make_truss_campaign(random_state=0)
-    >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
-    >>> print(check_records(year.temperatures, year.frequencies))
-    1 finding in 365 records.
-    stuck sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
-    """
-
-    table: pd.DataFrame
-    n_rows: int
-    outliers: pd.DataFrame | None = None
-    memory: MemoryFindings | None = None
-
-    def summary(self) -> str:
-        """A line for each finding.
-
-        Returns
-        -------
-        str
-            Text of several lines; a single one where nothing was found.
-        """
-        if self.table.empty:
-            return f"No finding in {self.n_rows} records."
-        count = f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."
-        return "\n".join([count, *(f"{what}: {detail}" for what, detail in self.table[["what", "detail"]].to_numpy())])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def warnings(self) -> Iterator[RecordsWarning]:
-        """One warning for each kind of finding.
-
-        Yields
-        ------
-        RecordsWarning
-            Its ``kind`` is what was found.
-        """
-        for kind, rows in self.table.groupby("what", sort=False):
-            yield RecordsWarning(WARNINGS[kind].format("; ".join(rows["detail"])), kind)
-
-
-def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str = "Hz") -> RecordFindings:
+def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", model: Any = None) -> RecordFindings:
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
-    It looks for sensors and modes that are stuck, weather that explains nothing, temperatures of another time, modes
-    exchanged in some rows, outliers, memory, steps and trends. A finding is a reason to look at the records, no proof
-    of a fault.
+    It looks for gross errors first: what is no table of numbers, wrong times, numbers that stand for missing values,
+    other units, empty, constant or equal columns, tables that are exchanged or have different rows. Whatever it is
+    given as a table, it does not fail. Such values are then left out, and it looks for sensors and modes that are
+    stuck, weather that explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory,
+    steps and trends. A finding is a reason to look at the records, no proof of a fault.
 
     Parameters
     ----------
@@ -133,7 +61,10 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
     frequencies : array-like or DataFrame of shape (n_samples, n_modes)
         Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed.
     unit : str, default="Hz"
-        Unit of the second table, as the findings give it: "" for parameters, which are multipliers.
+        Unit of the second table, as the findings give it: "" for parameters, which are multipliers. Values in Hz have
+        to be positive.
+    model : FEModel, optional
+        The second table's modes are compared with its nominal frequencies, which shows other units and other modes.
 
     Returns
     -------
@@ -143,7 +74,7 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
     Raises
     ------
     ValueError
-        If the tables differ in length or index, or hold something that is no number; if the unit is no text.
+        If the unit is no text, or the model no FE model. Tables never raise an error.
 
     See Also
     --------
@@ -153,6 +84,14 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
 
     Notes
     -----
+    - *Gross errors* are found by column, from its values in order, before anything else. A number stands for a missing
+      value (*markers*) if it is beyond -90 to 100 degrees Celsius and 50 degrees away from the others, or one that
+      loggers write (such as -999 or 9999) and far from the others. An *isolated level* is up to three values that
+      repeat exactly, 30 degrees away from all others, or, of frequencies, beyond half and twice their median. Sensors
+      are compared with the median of the others for another unit (*fahrenheit*, *scaled temperatures*) and for
+      *opposite signs*. A mode is far from the model's at a ratio above 1.6; a *unit of frequencies* is named if the
+      typical ratio is within a fifth of that of the unit. Their ``severity`` is in the table: "meaningless" if results
+      of a fit would be.
     - *Stuck*: a run of at least five equal values. Where neighbouring records are equal by rounding, it has to be four
       times as long as all but three runs of the column are. Nearly all other periods of its length must vary by at
       least three steps of rounding, and its value must not be one at which the column rests again and again, as rain
@@ -187,17 +126,18 @@ def check_records(temperatures: ArrayLike, frequencies: ArrayLike, *, unit: str 
              what  n_rows
     0  time shift     305
     """
-    check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
     if not isinstance(unit, str):
         raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
-    records = _Records.of(temperatures, frequencies, f" {unit}" if unit else "")
-    findings = [*_stuck(records)]  # its rows then are NaN, and so on
+    tables = {"temperatures": temperatures, "frequencies": frequencies}
+    cleaned = CleanedRecords.of(tables, unit=unit, model=model)
+    if not cleaned.belong_together:
+        return RecordFindings(findings_table(cleaned.findings), cleaned.n_rows, cleaned.outliers())
+    records = _Records.of(cleaned, f" {unit}" if unit else "")
+    findings = [*cleaned.findings, *_stuck(records)]  # its rows then are NaN, and so on
     findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _implausible(records)
-    far = np.zeros_like(records.outliers)
-    far[records.order] = records.outliers
-    index = frequencies.index if isinstance(frequencies, pd.DataFrame) else None
-    outliers = pd.DataFrame(far, index, records.modes)
-    return RecordFindings(pd.DataFrame(findings, columns=COLUMNS), len(outliers), outliers, records.memory)
+    far = cleaned.outliers()
+    far.iloc[records.order] |= records.outliers
+    return RecordFindings(findings_table(findings), cleaned.n_rows, far, records.memory)
 
 
 @dataclass
@@ -206,7 +146,7 @@ class _Records:
 
     T: Array
     F: Array
-    sensors: dict[Hashable, list[int]]
+    sensors: list[Hashable]
     modes: list[Hashable]
     order: NDArray[np.intp]
     index: pd.Index
@@ -216,13 +156,19 @@ class _Records:
     memory: MemoryFindings | None = None
 
     @classmethod
-    def of(cls, temperatures: Table, frequencies: Table, unit: str) -> _Records:
-        order = np.argsort(row_times(temperatures), kind="stable")
-        index = temperatures.index if isinstance(temperatures, pd.DataFrame) else pd.RangeIndex(len(order))
-        T, F = (as_floats(table)[order] for table in (temperatures, frequencies))
-        T, F = (np.where(np.isin(table, MARKERS), np.nan, table) for table in (T, F))  # others tell of these
-        sensors, modes = columns_by_sensor(temperatures), column_names(frequencies, "f")
-        return cls(T, F, sensors, modes, order, index[order], unit, np.zeros(F.shape, dtype=bool))
+    def of(cls, cleaned: CleanedRecords, unit: str) -> _Records:
+        """Of every sensor what it shows at that time, and of rows with one time the first."""
+        T, F = cleaned.readings
+        sensors = columns_by_sensor(T)
+        rows, index = T.whole, pd.RangeIndex(len(T.values))
+        if cleaned.have_times:
+            rows = np.flatnonzero(~T.index.duplicated())
+            index = T.index[rows]
+        elif not isinstance(T.index, pd.DatetimeIndex):
+            index = T.index
+        now = T.values[np.ix_(rows, [places[0] for places in sensors.values()])]
+        outliers = np.zeros((len(rows), len(F.columns)), dtype=bool)
+        return cls(now, F.values[rows], list(sensors), F.columns, T.order[rows], index, unit, outliers)
 
     @property
     def n_usable(self) -> int:
@@ -241,28 +187,18 @@ class _Records:
         """Number of rows by which a structure may follow the weather late: a day, at least one."""
         return INERTIA if self.hours is None else max(int(24 / self.hours), 1)
 
-    def label(self, row: int) -> str:
-        """How a row is called in a sentence."""
-        label = self.index[row]
-        if not isinstance(label, pd.Timestamp):
-            return f"row {label}"
-        return f"{label:%Y-%m-%d}" if label == label.normalize() else f"{label:%Y-%m-%d %H:%M}"
+    def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> Finding:
+        """A finding in some rows."""
+        return finding(self.index, what, column, rows, detail)
 
     def period(self, rows: NDArray[np.intp]) -> str:
         """First and last of some rows."""
-        return f"{self.label(rows[0])} to {self.label(rows[-1])}" if len(rows) > 1 else self.label(rows[0])
-
-    def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> list[object]:
-        """A row of the table."""
-        return [what, column, len(rows), self.index[rows[0]], self.index[rows[-1]], detail]
+        return period_of(self.index, rows)
 
 
-def _stuck(records: _Records) -> Iterator[list[object]]:
-    first = [(name, columns[0]) for name, columns in records.sensors.items()]  # lags repeat what a sensor shows
-    modes = [(name, column) for column, name in enumerate(records.modes)]
-    for what, table, columns in (("stuck sensor", records.T, first), ("stuck mode", records.F, modes)):
-        for name, position in columns:
-            column = table[:, position]
+def _stuck(records: _Records) -> Iterator[Finding]:
+    for what, table, names in (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes)):
+        for name, column in zip(names, table.T, strict=True):
             for rows in stuck_runs(column):
                 if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
                     continue  # a lag of another column, which begins with copies of its first value
@@ -272,16 +208,14 @@ def _stuck(records: _Records) -> Iterator[list[object]]:
                 records.has_stuck_sensors |= table is records.T
 
 
-def _against_weather(records: _Records) -> Iterator[list[object]]:
-    first = [columns[0] for columns in records.sensors.values()]  # with lags, rows know the weather of others
-    now = records.T[:, first]
-    basis = WeatherBasis.of(now)
-    places = basis.coordinates(now)
+def _against_weather(records: _Records) -> Iterator[Finding]:
+    basis = WeatherBasis.of(records.T)
+    places = basis.coordinates(records.T)
     lines, past = basis.lines(places), with_past(places)
     folds = BlockedKFold().fold_of(_with_stamps(records))
     yield from _exchanged(records, lines, folds)
     yield from _outliers(records, lines, folds)
-    slow = list(_slow_means(records, now))
+    slow = list(_slow_means(records))
     changes, level = _changes(records, np.hstack([lines, past, *(inputs for _, inputs in slow)]))
     F = records.F - level  # a step or a trend would pass for a season of another time
     share = explained(lines, F, folds)
@@ -291,10 +225,7 @@ def _against_weather(records: _Records) -> Iterator[list[object]]:
         yield records.finding("time shift", "", *_shifted(records, shift))
         return
     if len(share) and (share < NOTHING).all():
-        detail = (
-            f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows; "
-            "expected temperatures that belong to the frequencies, row by row"
-        )
+        detail = f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
         yield records.finding("weather", "", usable, detail)
         return
     yield from (finding for finding, _ in slow)
@@ -305,12 +236,12 @@ def _with_stamps(records: _Records) -> Table:
     return pd.DataFrame(index=records.index) if isinstance(records.index, pd.DatetimeIndex) else records.T
 
 
-def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[object], Array]]:
+def _slow_means(records: _Records) -> Iterator[tuple[Finding, Array]]:
     """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
     if records.has_stuck_sensors:
         return
-    names = list(records.sensors)
-    found = find_memory(pd.DataFrame(now, records.index, names), pd.DataFrame(records.F, records.index, records.modes))
+    tables = ((records.T, records.sensors), (records.F, records.modes))
+    found = find_memory(*(pd.DataFrame(values, records.index, names) for values, names in tables))
     records.memory = found
     chosen = found.table[found.table["chosen"].astype(bool)]
     usable = np.flatnonzero(~np.isnan(records.F).all(axis=1))
@@ -318,7 +249,7 @@ def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[object], A
         duration = pd.Timedelta(constant)
         if duration >= WEEKS:
             times, length = records.index.as_unit("ns").asi8, duration.as_unit("ns").value
-            mean = trailing_means(times, now[:, [names.index(sensor)]], length)
+            mean = trailing_means(times, records.T[:, [records.sensors.index(sensor)]], length)
             before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
             detail = (
                 f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the out-of-fold error by "
@@ -328,7 +259,7 @@ def _slow_means(records: _Records, now: Array) -> Iterator[tuple[list[object], A
             yield records.finding("memory", sensor, usable, detail), inputs
 
 
-def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[object]]:
+def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
     for (first, second), rows in swapped_modes(lines, records.F, folds):
         names = f"{records.modes[first]!r} and {records.modes[second]!r}"
         n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
@@ -337,7 +268,7 @@ def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iter
         records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
 
 
-def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[list[object]]:
+def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
     F = records.F
     rest = F - np.where(np.isnan(lines).any(axis=1)[:, np.newaxis], median(F), out_of_fold(lines, F, folds))
     distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
@@ -349,7 +280,7 @@ def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Itera
     yield from _outliers_found(records, far & (deviation > 0))
 
 
-def _implausible(records: _Records) -> Iterator[list[object]]:
+def _implausible(records: _Records) -> Iterator[Finding]:
     """Values of twice or half the median of their mode, which need no weather to be doubtful."""
     middle, deviation = median(records.F), robust_deviation(records.F)
     with np.errstate(invalid="ignore"):
@@ -358,7 +289,7 @@ def _implausible(records: _Records) -> Iterator[list[object]]:
     yield from _outliers_found(records, far)
 
 
-def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[object]]:
+def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[Finding]:
     F = records.F
     for name, column, is_far in zip(records.modes, F.T, far.T, strict=True):
         rows = np.flatnonzero(is_far)
@@ -366,7 +297,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[list[
             n_known = int((~np.isnan(column)).sum())
             detail = (
                 f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g}{records.unit} in "
-                f"{records.label(rows[0])}"
+                f"{records.period(rows[:1])}"
             )
             yield records.finding("outliers", name, rows, detail)
     F[far] = np.nan
@@ -381,15 +312,15 @@ def _shifted(records: _Records, shift: TimeShift) -> tuple[NDArray[np.intp], str
         length = f" (about {hours:.3g} hours)" if hours < 48 else f" (about {hours / 24:.3g} days)"
     detail = (
         f"those of {abs(shift.rows)} rows {direction}{length} explain {shift.explained:.0%} of the variance out of "
-        f"fold, those of the same rows {shift.unshifted:.0%}; expected two tables of the same times"
+        f"fold, those of the same rows {shift.unshifted:.0%}"
     )
     return rows, detail
 
 
-def _changes(records: _Records, inputs: Array) -> tuple[list[list[object]], Array]:
+def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
     """Steps and trends that are found beside the weather, and what they add to each frequency."""
     level = np.zeros(records.F.shape)
-    found: list[list[object]] = []
+    found: list[Finding] = []
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)
@@ -403,7 +334,7 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[list[object]], Arra
         step = largest_step(inputs[rows], F[:, mode])
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
-            detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.label(rows[step.row])}"
+            detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"
             found.append(records.finding("step", name, known, f"{detail}, standard error {step.standard_error:.1g}"))
             continue
         change, error = row["change"], row["standard_error"]

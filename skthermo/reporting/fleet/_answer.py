@@ -9,7 +9,7 @@ import pandas as pd
 
 from skthermo._tables.text import counted
 from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
-from skthermo.reporting.fleet._bridge import FAILED, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
+from skthermo.reporting.fleet._bridge import FAILED, FAILURES, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
 from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, banner, first_section
 
 MOST_NAMED = 5  # largest number of bridges in a sentence
@@ -116,7 +116,22 @@ def warnings_of_all(warned: pd.DataFrame, errors: pd.DataFrame) -> Section:
         parts += [paragraphs(text), table("Warnings by kind.", ["Kind", "Bridges", "The first of them"], rows)]
     else:
         parts.append(paragraphs("There was no warning."))
-    if len(errors):
-        rows = [[str(row["bridge"]), str(row["error"])] for _, row in errors.iterrows()]
-        parts += [element("h3", "Errors"), table("What failed.", ["Bridge", "Error"], rows, is_cards=True)]
+    parts += errors_of(in_words(errors))
     return section("warnings", "Warnings and errors", *parts, link="Warnings")
+
+
+def in_words(errors: pd.DataFrame) -> pd.DataFrame:
+    """Errors of bridges, and what failed in an owner's words."""
+    return errors.assign(what=errors["stage"].map(FAILURES).fillna("Something failed"))
+
+
+def errors_of(errors: pd.DataFrame, unread: str = "") -> list[Html]:
+    """What failed, in an owner's words and in those of the program; nothing without errors."""
+    rows = [[str(row["bridge"]), row["what"], _message(row["error"])] for _, row in errors.iterrows()]
+    rows += [["monitor", "Its file cannot be read", _message(unread)]] if unread else []
+    columns = ["Bridge", "What failed", "Message for the engineer"]
+    return [element("h3", "Errors"), table("What failed.", columns, rows, is_cards=True)] if rows else []
+
+
+def _message(error: object) -> Html:
+    return element("code", error)

@@ -16,6 +16,17 @@ from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, Standing
 FAILED, UNWATCHED = "not fitted", "no monitor"
 UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
 NOT_SIGNIFICANT = "not significant after correction for many bridges; inspect"
+FAILURES = {
+    "records": "Its records could not be read",
+    "maker": "Its model could not be built",
+    "fit": "Its model could not be fitted to its records",
+    "monitor": "Its monitor could not be fitted",
+    "saving": "What was fitted could not be saved",
+    "process": "The program that fitted it was stopped",
+    "new records": "Its new records could not be read",
+    "update": "Its new records could not be evaluated",
+}
+"""What failed, in an owner's words, by the stage of the error."""
 MONTH = 31  # days of which the table says how many were evaluated
 
 SIGNIFICANT, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
@@ -35,7 +46,7 @@ class Bridge:
     since: pd.Timestamp = pd.NaT
     why: str = ""
     index: str = ""
-    course: Html = field(default_factory=Html)
+    line: Html = field(default_factory=Html)
     drift: str = ""
     days: str = ""
     n_warnings: int = 0
@@ -57,7 +68,7 @@ class Bridge:
         unexplained: Sequence[int] = (),
         n_warnings: int = 0,
     ) -> Bridge:
-        """A bridge as its monitor sees it; ``unexplained`` are the numbers of its events that have ended so."""
+        """A bridge as its monitor evaluates it; ``unexplained`` are the numbers of its events that have ended so."""
         opened = standing.opened("damage")
         threshold = float(standing.monitor.threshold_)
         highest = float(opened["peak"].max()) / threshold if len(opened) else np.nan
@@ -118,7 +129,7 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
     elif standing.state == ATTENTION:
         texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
     if standing.error and standing.state == ALARM:
-        texts.append(f"New records could not be used: {standing.error}.")
+        texts.append(f"{standing.error}.")
     if unexplained:
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
         texts.append(f"{number} would be significant, but ended before it was explained.")

@@ -18,7 +18,7 @@ from skthermo.fleet import Fleet
 from skthermo.reporting._html import Html, Section, bullets, element, joined, page, paragraphs, section, table
 from skthermo.reporting._model import learned, stiffnesses
 from skthermo.reporting._settings import parameters, settings
-from skthermo.reporting.fleet._answer import answer, warnings_of_all
+from skthermo.reporting.fleet._answer import answer, errors_of, in_words, warnings_of_all
 from skthermo.reporting.fleet._bridge import (
     BROKEN,
     FAILED,
@@ -101,19 +101,20 @@ class PageWriter:
     limit: float
 
     @cached_property
-    def errors(self) -> dict[Hashable, str]:
-        """Errors by bridge."""
-        return {name: "; ".join(rows["error"].astype(str)) for name, rows in self.fleet.errors.groupby("bridge")}
+    def errors(self) -> dict[Hashable, pd.DataFrame]:
+        """Errors by bridge: stage, error and what failed in an owner's words."""
+        return dict(iter(in_words(self.fleet.errors).groupby("bridge")))
 
     def write(self, name: Hashable) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
         warned = self.fleet.warnings
         messages = warned.loc[warned["bridge"] == name, "message"].unique().tolist()
         monitor, unread = _opened(self.fleet.monitors, name)
-        error = self.errors.get(name, "")
+        failed = self.errors.get(name, in_words(self.fleet.errors)[:0])
+        error = "; ".join(dict.fromkeys(failed["what"]))
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         texts = bullets(messages) or paragraphs("There was no warning.")
-        listed = section("warnings", "Warnings of its fit", texts, link="Warnings")
+        listed = section("warnings", "Warnings of its fit", texts, *errors_of(failed, unread), link="Warnings")
         if standing is not None:
             ended = self.found.unexplained
             bridge = Bridge.watched(
@@ -139,11 +140,13 @@ class PageWriter:
         """A bridge that nobody watches, and its chain, if it has one."""
         chain, without_chain = _opened(self.fleet.chains, name)
         if unread:
-            return Bridge(name, NOT_EVALUATED, SILENT, np.inf, why=unread, n_warnings=n_warnings), chain
+            why = "The file of its monitor cannot be read."
+            return Bridge(name, NOT_EVALUATED, SILENT, np.inf, why=why, n_warnings=n_warnings), chain
         if chain is None:
-            why = without_chain or error or "no reason is given"
-            return Bridge(name, FAILED, BROKEN, why=why, n_warnings=n_warnings), None
-        return Bridge(name, UNWATCHED, UNSEEN, why=error or "Its model was fitted only.", n_warnings=n_warnings), chain
+            why = "The file of its model cannot be read" if without_chain else error or "No reason is given"
+            return Bridge(name, FAILED, BROKEN, why=f"{why}.", n_warnings=n_warnings), None
+        why = f"{error or 'Its model was fitted only'}."
+        return Bridge(name, UNWATCHED, UNSEEN, why=why, n_warnings=n_warnings), chain
 
 
 def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, written: str) -> list[Section]:
@@ -186,20 +189,24 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
             element("a", bridge.name, href=links[bridge.name]),
             _state(bridge),
             moment(bridge.since, is_short=True),
-            element("span", bridge.course, element("span", bridge.index)) if bridge.index else "",
+            element("span", bridge.line, element("span", bridge.index)) if bridge.index else "",
             bridge.drift,
             bridge.days,
             f"{bridge.n_warnings:,}" if bridge.n_warnings else "",
         ]
         for bridge in bridges
     ]
-    text = (
-        "The number behind the small line is the newest damage index over its threshold: an event opens when it is "
-        "above 1 for most of several records. The line shows the highest index of each week of the last year, and the "
-        "dashed line the threshold."
-    )
+    words = [
+        "Since: when the present state began. A healthy bridge is healthy since its last event ended, or since the "
+        "first day of its monitor.",
+        "Damage index over threshold: the newest damage index divided by its threshold. An event opens when this is "
+        "above 1 for most of several records. Of an open event, the highest value so far stands beside it. The line "
+        "shows the highest index of each week in the last year, and the dashed line the threshold.",
+        "Slow change: the largest change of the stiffness of a group since the baseline, if it is beyond the error of "
+        "the estimate.",
+    ]
     caption = "All bridges, the worst first: alarms, lost stiffness, bridges of which nothing is known, healthy ones."
-    return section("bridges", "All bridges", paragraphs(text), table(caption, COLUMNS, rows, is_cards=True))
+    return section("bridges", "All bridges", bullets(words), table(caption, COLUMNS, rows, is_cards=True))
 
 
 def _state(bridge: Bridge) -> Html:

@@ -9,6 +9,7 @@ from skthermo.plotting import MonitorDisplay
 from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
+from skthermo.reporting._readable import Values
 from skthermo.reporting.service._standing import MONTH, NOT_EVALUATED, YEAR, Standing
 
 LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
@@ -23,7 +24,8 @@ def draw_month(standing: Standing) -> Html:
         f"Damage index of {counted(len(evaluated), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
         f"evaluated. {_highest(evaluated['index'])}"
     )
-    return _drawn(standing, alt, "The last month, by record", start=start, by="record", parts=["index"])
+    values = Values("damage index of the last month", evaluated[["index", "threshold"]].rename_axis("date"))
+    return _drawn(standing, alt, "The last month, by record", values=values, start=start, by="record", parts=["index"])
 
 
 def draw_days(standing: Standing) -> list[Html]:
@@ -41,7 +43,8 @@ def draw_days(standing: Standing) -> list[Html]:
             f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "
             f"{n_without:,} without an evaluated record. {_highest(days['index_max'])}"
         )
-        drawn.append(_drawn(standing, alt, title, start=start, parts=["index"]))
+        values = Values(f"damage index {title.split(',')[0]}", _daily(days, standing.monitor.threshold_))
+        drawn.append(_drawn(standing, alt, title, values=values, start=start, parts=["index"]))
     return drawn
 
 
@@ -70,10 +73,22 @@ def draw_drift(standing: Standing) -> Html | None:
     if not columns or not days[columns].notna().any(axis=None):
         return None
     names = ", ".join(str(name).removeprefix("drift ") for name in columns)
-    return _drawn(standing, f"Change of stiffness over time of the groups {names}.", parts=["drift"], height=3.0)
+    alt = f"Change of stiffness over time of the groups {names}."
+    changes = 100 * days[columns].astype(float)
+    changes = changes.set_axis([f"change of {str(name).removeprefix('drift ')} (%)" for name in columns], axis=1)
+    values = Values("change of stiffness", changes.rename_axis("date"))
+    return _drawn(standing, alt, parts=["drift"], height=3.0, values=values)
 
 
-def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4, **options: object) -> Html:
+def _daily(days: pd.DataFrame, threshold: float) -> pd.DataFrame:
+    """Damage index of each day, for those who read it."""
+    columns = {"highest of the day": days["index_max"], "median": days["index_median"], "threshold": threshold}
+    return pd.DataFrame(columns).rename_axis("date")
+
+
+def _drawn(
+    standing: Standing, alt: str, title: str = "", *, values: Values, height: float = 3.4, **options: object
+) -> Html:
     """A display of the monitor, with its legend below."""
 
     def make() -> MonitorDisplay:
@@ -81,7 +96,7 @@ def _drawn(standing: Standing, alt: str, title: str = "", *, height: float = 3.4
         fold_legend(display.figure_, "outside lower center", n_columns=2)
         return display
 
-    return draw(make, alt, title, height=height)
+    return draw(make, alt, title, height=height, values=values)
 
 
 def _highest(index: pd.Series) -> str:

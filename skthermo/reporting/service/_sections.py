@@ -194,7 +194,11 @@ def events(standing: Standing) -> Section:
     older = f"The table lists the newest {MOST_LISTED}; {rest:,} older ones are in the monitor." if rest > 0 else ""
     columns = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
     rows = [_cells(standing, number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
-    caption = "Events, the newest first, with the modes that drive each, the worst first, and its number of records."
+    caption = (
+        "Events, the newest first. Highest index: the highest damage index of the event, beside a threshold of now "
+        f"{significant(standing.monitor.threshold_, 3)}. Modes: those that changed most, the first the most. Records: "
+        "how many were in alarm."
+    )
     return section("events", "Events", paragraphs(text, older), table(caption, columns, rows, is_cards=True))
 
 
@@ -349,10 +353,10 @@ def sensors(standing: Standing) -> Section:
     parts = [bullets(sensor_sentences(standing))]
     if standing.monitor.sensors:
         meaning = (
-            "Each thermometer is compared with what the others, and references, tell of it, and each response with the "
-            "others and the weather. The monitor goes on without a thermometer that fails. A change that could be "
-            "damage is never put down to a sensor: a response that moves alone by more than damage explains is set "
-            "aside, and the structure is not called healthy until somebody has looked at it."
+            "Each thermometer is compared with what the other thermometers and the references predict, and each "
+            "response with the others and the weather. The monitor goes on without a thermometer that fails. A change "
+            "that could be damage is never attributed to a sensor: a response that changes alone, by more than damage "
+            "explains, is set aside, and the structure is not called healthy until somebody has looked at it."
         )
         parts.append(paragraphs(meaning))
     if len(known):
@@ -427,7 +431,7 @@ def false_alarms(standing: Standing) -> Section:
     damage = standing.events[standing.events["kind"] == "damage"]
     sentences = [
         f"The monitor is set so that a structure that stays healthy gives {asked} a year on average: an alarm without "
-        "damage. Fewer would be bought with damage that is found later, or not at all.",
+        "damage. With fewer false alarms, damage is detected later or not at all.",
         f"Expected are {significant(expected, 2)} a year; in a single year there may be {estimate.lowest:,} to "
         f"{estimate.highest:,} by chance.",
     ]
@@ -450,7 +454,7 @@ def false_alarms(standing: Standing) -> Section:
         ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
     ]
     rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
-    return section("promise", "False alarms", paragraphs(*sentences), rule)
+    return section("false_alarms", "False alarms", paragraphs(*sentences), rule)
 
 
 def _settings(monitor: Monitor) -> Section:

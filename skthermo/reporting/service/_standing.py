@@ -30,7 +30,7 @@ class Doubt(NamedTuple):
 class Standing:
     """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss.
 
-    ``error`` says why the newest records could not be handed to the monitor, if they could not.
+    ``error`` says in words that the newest records could not be evaluated, if they could not.
     """
 
     monitor: Monitor
@@ -120,7 +120,7 @@ class Standing:
             )
             if self.is_silent:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
-            return f"{text} New records could not be used: {self.error}." if self.error else text
+            return f"{text} {self.error}." if self.error else text
         if self.state == ATTENTION:
             return (
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "

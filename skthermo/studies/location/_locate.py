@@ -57,7 +57,7 @@ def locate_damage(
     fem : DataInformedFEM
         Fitted to healthy records; its model was assembled from the structure. It may have been calibrated since.
     structure : Structure
-        Nodes and members of the model.
+        Nodes and members of the model; an `ImportedStructure` for members that another program has assembled.
     T : array-like or DataFrame of shape (n_samples, n_sensors)
         Temperatures of the records to explain, in degrees Celsius.
     F : array-like or DataFrame of shape (n_samples, n_modes)
@@ -122,7 +122,7 @@ def locate_damage(
     """
     check_chain(fem)
     if not isinstance(structure, Structure):
-        raise ValueError(f"structure is {structure!r:.200}; expected the Structure that the model was assembled from")
+        raise ValueError(f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model")
     contents = read_groups(fem.model, groups)
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
