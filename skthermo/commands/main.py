@@ -1,33 +1,48 @@
-"""Commands of nightly jobs: a monitor in service.
+"""Commands of nightly jobs: monitors without a line of Python.
 
-    python -m skthermo update bridge.skops new.csv --report status.html
-    python -m skthermo status bridge.skops
-    python -m skthermo acknowledge bridge.skops 3 --harmless --note "a special transport"
+    skthermo check T.csv F.csv                     look at records
+    skthermo init T.csv F.csv --into bridge        write settings that fit them
+    skthermo fit bridge/monitor.toml               fit a monitor to the baseline
+    skthermo update bridge/monitor.toml            evaluate what is new in the folder bridge/new
+    skthermo update bridge/monitor.toml NEW.csv    evaluate the records of a file
+    skthermo status bridge/monitor.toml            say how things stand
+    skthermo report bridge/monitor.toml            write the owner's page
+    skthermo acknowledge bridge/monitor.toml 3 --harmless --note "a special transport"
+    skthermo rebaseline bridge/monitor.toml --since 2027-05-01
 
-Exit codes of update and status: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an error, and
-the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its report cannot be
-written. acknowledge: 0 done, 3 an error.
+The file of a monitor alone, .skops or .joblib, stands where settings do. Several settings in one call are a fleet.
+
+Exit codes of update, status and report: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an
+error, and the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its page
+cannot be written. Of several bridges: 1 if one is in alarm, else 3 if one failed, else 2 if one is not evaluated.
+check: 0 no finding, 1 findings. All others: 0 done, 3 an error.
 """
 
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pandas as pd
 
-from skthermo._estimators.warnings import told_around
-from skthermo._io import alone_with
-from skthermo.commands._record_files import ISO, read_file
-from skthermo.monitoring import Monitor, load_monitor
+import skthermo
+from skthermo.commands import _bridge
+from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt
+from skthermo.commands._outputs import as_json, write_metrics
 
-HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
+WORST = (ALARM, FAILED, NOT_EVALUATED, HEALTHY)
+EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
+
+logger = logging.getLogger("skthermo.commands")
 
 
 class Parser(argparse.ArgumentParser):
@@ -39,135 +54,279 @@ class Parser(argparse.ArgumentParser):
         self.exit(FAILED, f"error: {message}\n")
 
 
+class Spoken(logging.Formatter):
+    """Messages as lines such as "warning: text"."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The level in small letters, and the text."""
+        return f"{record.levelname.lower()}: {record.getMessage()}"
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit code."""
     options = _parser().parse_args(arguments)
-    with warnings.catch_warnings():
-        warnings.simplefilter("default", UserWarning)  # once for each line of code, whatever the environment says
-        warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
-        try:
-            return options.command(options)
-        except Exception as error:  # Python's own exit code of an error would be that of an alarm
-            _complain(error)
-            return FAILED
+    facts: dict[str, Any] = {"skthermo": skthermo.__version__, "command": options.name, "exit_code": FAILED}
+    facts |= {"time": pd.Timestamp.now("UTC"), "bridges": [], "fleet": None, "findings": None, "settings": None}
+    facts |= {"warnings": [], "errors": []}
+    try:
+        with _logged(options, facts["warnings"]):
+            try:
+                facts["exit_code"] = options.command(options, facts)
+            except Exception as error:  # Python's own exit code of an error would be that of an alarm
+                _complain(error)
+                facts["errors"].append(str(error))
+            logger.info("%s ends with exit code %s", options.name, facts["exit_code"])
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        facts["errors"].append(str(error))
+    if options.json:
+        print(as_json(facts))
+    return facts["exit_code"]
+
+
+@contextmanager
+def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
+    """Warnings and errors go to stderr, and to a file that the options name; warnings are kept for the JSON, too."""
+    root, handlers = logging.getLogger("skthermo"), [logging.StreamHandler()]
+    level = root.level
+    handlers[0].setFormatter(Spoken())
+    handlers[0].setLevel(logging.INFO if options.verbose else logging.WARNING)
+    if options.log is not None:
+        file = logging.FileHandler(options.log, encoding="utf-8")
+        file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+        handlers.append(file)
+
+    def keep(message: Warning | str, *_: Any) -> None:
+        texts.append(str(message))
+        logger.warning("%s", message)
+
+    for handler in handlers:
+        root.addHandler(handler)
+    root.setLevel(logging.INFO)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("default", UserWarning)  # once for each line of code, whatever the environment says
+            warnings.showwarning = keep
+            yield
+    finally:
+        root.setLevel(level)
+        for handler in handlers:
+            root.removeHandler(handler)
+            handler.close()
+
+
+def _complain(error: Exception) -> None:
+    if not isinstance(error, EXPLAINED):
+        traceback.print_exception(error)
+    logger.error("%s", error)
 
 
 def _parser() -> Parser:
-    parser = Parser("python -m skthermo", description=__doc__)
+    parser = Parser("skthermo", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command, text in ((_update, "take in new records"), (_status, "say how things stand"), (_acknowledge, "")):
-        name = command.__name__[1:]
-        one = commands.add_parser(name, help=text or "say what an event was", formatter_class=parser.formatter_class)
-        one.set_defaults(command=command)
-        one.add_argument("monitor", type=Path, help="the monitor's file, .skops or .joblib")
-        if command is not _acknowledge:
-            one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, written anew")
+
+    def add(name: str, text: str, command: Callable[..., int]) -> argparse.ArgumentParser:
+        one = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        one.set_defaults(command=command, name=name, metrics=None, now=None, report=None, title=None)
+        one.add_argument("--json", action="store_true", help="print JSON in place of text")
+        one.add_argument("--log", type=Path, metavar="FILE", help="append warnings, errors and what was done")
+        one.add_argument("--verbose", action="store_true", help="say more on stderr")
+        return one
+
+    for name, text, command in (
+        ("check", "look at files of records, and say what was found", _check),
+        ("init", "look at files of records, and write settings that fit them", _init),
+    ):
+        one = add(name, text, command)
+        one.add_argument("files", nargs="+", type=Path, help="T.csv F.csv, or one file with all columns")
+        one.add_argument("--temperatures", nargs="+", metavar="COLUMN", help="by default as files or names tell")
+        one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
+        one.add_argument("--reference", nargs="+", default=[], metavar="COLUMN", help="temperatures from elsewhere")
+        one.add_argument("--zone", help='time zone of the logger\'s clock, such as "Europe/Brussels"')
+        one.add_argument("--until", metavar="TIME", help="last moment of the baseline (default: all records)")
+        if name == "init":
+            one.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
+            one.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
+    works: tuple[tuple[str, str, Any], ...] = (
+        ("fit", "fit monitors to their baselines", _bridge.fit),
+        ("update", "take in new records", _bridge.update),
+        ("status", "say how things stand", _bridge.status),
+        ("report", "write the page for the owner", _bridge.report),
+        ("acknowledge", "say what an event was", _bridge.acknowledge),
+        ("rebaseline", "begin a new baseline after a repair", _bridge.rebaseline),
+    )
+    for name, text, work in works:
+        one = add(name, text, partial(_on_bridges, work))
+        many = {} if name in ("acknowledge", "rebaseline") else {"nargs": "+"}
+        what = "settings (.toml), or the file of a monitor (.skops, .joblib)"
+        one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
+        one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
+        one.add_argument("--now", metavar="TIME", help="as of this time (default: that of the clock)")
+        if name in ("update", "status", "report"):
+            one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, or of the fleet")
             one.add_argument("--title", help="heading of the page")
-        if command is not _status:
+            one.add_argument("--fdr", type=float, default=0.1, help="false discovery rate of a fleet (default: 0.1)")
+        if name not in ("status", "report"):
             one.add_argument(
                 "--wait", type=float, default=60.0, metavar="SECONDS", help="for another command at work (default: 60)"
             )
-        if command is _update:
-            _add_records(one)
-        if command is _acknowledge:
-            one.add_argument("event", type=int, help="its number")
-            kinds = one.add_mutually_exclusive_group(required=True)
-            kinds.add_argument("--harmless", action="store_true", help="its records may train the monitor anew")
-            kinds.add_argument("--damage", action="store_true", help="its records may not")
-            one.add_argument("--note", default="", help="what was found")
+    _add_details(commands.choices)
     return parser
 
 
-def _add_records(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("records", type=Path, help="new records, CSV or parquet; the first column holds the stamps")
-    parser.add_argument("--separator", default=",", help="between values of a CSV file (default: a comma)")
-    parser.add_argument("--decimal", default=".", help="decimal sign of a CSV file (default: a point)")
-    parser.add_argument(
-        "--stamps", default=ISO, metavar="FORMAT", help='such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)'
-    )
-    parser.add_argument("--confirm", action="store_true", help="take in records that are stamped far ahead")
+def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
+    """Options of single commands."""
+    parsers["fit"].add_argument("--replace", action="store_true", help="fit anew; the old monitor is kept beside")
+    update = parsers["update"]
+    update.add_argument("--separator", help="between values of a CSV file (default: as the settings say, or a comma)")
+    update.add_argument("--decimal", help="decimal sign of a CSV file (default: as the settings say, or a point)")
+    update.add_argument("--stamps", metavar="FORMAT", help='such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)')
+    update.add_argument("--confirm", action="store_true", help="take in records that are stamped far ahead")
+    parsers["acknowledge"].add_argument("event", type=int, help="its number")
+    kinds = parsers["acknowledge"].add_mutually_exclusive_group(required=True)
+    kinds.add_argument("--harmless", action="store_true", help="its records may train the monitor anew")
+    kinds.add_argument("--damage", action="store_true", help="its records may not")
+    parsers["acknowledge"].add_argument("--note", default="", help="what was found")
+    parsers["rebaseline"].add_argument("--since", required=True, metavar="TIME", help="when the work was complete")
+    parsers["rebaseline"].add_argument("--until", metavar="TIME", help="last moment that may train")
 
 
-def _update(options: argparse.Namespace) -> int:
-    """Evaluate new records, and save the monitor."""
-    with alone_with(options.monitor, options.wait):
-        monitor = load_monitor(options.monitor)
-        form = {name: getattr(options, name) for name in ("separator", "decimal", "stamps")}
-        records = read_file(options.records, **form, zone=monitor.last_.tz)
-        records.index.name = monitor.baseline_.index.name
-        before = monitor.counts_
-        with told_around({"records not evaluated"}):  # said below, with all reasons
-            evaluated = monitor.update(records, confirm=options.confirm) if len(records) else None
-        if evaluated is not None:
-            monitor.save(options.monitor)
-    taken_in = _taken_in(before, monitor.counts_, evaluated)
-    print("\n".join([_read(options.records, records), *taken_in, monitor.summary()]))
-    return _reported(monitor, options, _code(monitor, evaluated))
-
-
-def _status(options: argparse.Namespace) -> int:
-    """Say how things stand; the file is whole at any time, and needs no lock to be read."""
-    monitor = load_monitor(options.monitor)
-    print(monitor.summary())
-    return _reported(monitor, options, CODES[monitor.state()])
-
-
-def _acknowledge(options: argparse.Namespace) -> int:
-    """Say what an event was, and save the monitor."""
-    with alone_with(options.monitor, options.wait):
-        monitor = load_monitor(options.monitor)
-        monitor.acknowledge(options.event, harmless=options.harmless, note=options.note)
-        monitor.save(options.monitor)
-    print(f"event {options.event} is acknowledged as {'harmless' if options.harmless else 'damage'}")
-    print(monitor.summary())
-    return 0
-
-
-def _reported(monitor: Monitor, options: argparse.Namespace, code: int) -> int:
-    """Write the report that was asked for; the exit code."""
-    if options.report is None:
-        return code
-    from skthermo.reporting import owner_report  # a job without a report needs no drawings
-
-    try:
-        owner_report(monitor, options.report, title=options.title)
-    except Exception as error:  # it does not hide an alarm
-        _complain(error, f"{options.report} was not written: ")
-        return code if code == ALARM else FAILED
+def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Do the work of a command on each bridge; the exit code of all."""
+    given = options.files if isinstance(options.files, list) else [options.files]
+    files = [file for file in given if file.suffix in MONITORS]
+    records = [file for file in given if file.suffix not in MONITORS]
+    if not files or (records and (work is not _bridge.update or len(files) > 1)):
+        raise ValueError(
+            f"files are {', '.join(map(str, given))}; expected settings (.toml) or monitors (.skops, .joblib)"
+            f"{', one alone if records are named' if work is _bridge.update else ' only'}"
+        )
+    if work is _bridge.update and not records and any(file.suffix != ".toml" for file in files):
+        raise ValueError(f"no new records are named for {files[0]}; expected their file, such as new.csv")
+    if records:
+        work = partial(work, files=records)
+    bridges = [Bridge(file, _for_one(options, len(files))) for file in files]
+    done, errors = [], {}
+    for bridge in bridges:
+        one, error = attempt(work, bridge)
+        done.append(one)
+        _say(one, options, len(bridges), error)
+        if one.errors:
+            errors[one.name] = error or ValueError("; ".join(one.errors))
+    facts["bridges"] = [one.facts() for one in done]
+    code = next(code for code in WORST if any(one.code == code for one in done))
+    if len(bridges) > 1 and options.name in ("update", "status", "report"):
+        code = _as_fleet(bridges, done, errors, options, facts, code)
+    metrics: dict[Path, list[dict[str, Any]]] = {}
+    for bridge, one in zip(bridges, facts["bridges"], strict=True):
+        for file in {options.metrics, bridge.metrics_file} - {None}:
+            metrics.setdefault(file, []).append(one)
+    for file, of_bridges in metrics.items():
+        try:
+            write_metrics(file, of_bridges, pd.Timestamp.now("UTC"))
+        except OSError as error:
+            code = _failed(error, f"{file} was not written: ", facts, code)
     return code
 
 
-def _complain(error: Exception, what: str = "") -> None:
-    if not isinstance(error, ValueError | OSError | ImportError):  # these explain themselves
+def _for_one(options: argparse.Namespace, number: int) -> argparse.Namespace:
+    """Options of one bridge: the page that is named is that of the fleet, where there are several."""
+    alone = {} if number == 1 else {"report": None, "title": None}
+    return argparse.Namespace(**vars(options) | alone)
+
+
+def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:
+    """Print what a command says of a bridge, and its errors."""
+    where = f"{done.name}: " if number > 1 else ""
+    if not options.json and done.lines:
+        print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
+    for text in done.errors:
+        logger.error("%s%s", where, text)
+    if error is not None and not isinstance(error, EXPLAINED):
         traceback.print_exception(error)
-    print(f"error: {what}{error}", file=sys.stderr)
+    logger.info("%s %s: state %s, exit code %s", options.name, done.name, done.state, done.code)
 
 
-def _code(monitor: Monitor, evaluated: pd.DataFrame | None) -> int:
-    """Exit code of an update: an alarm that has ended again counts, and without a new evaluation nothing is healthy."""
-    states = set() if evaluated is None else set(evaluated["state"])
-    if "alarm" in states or monitor.state() == "alarm":
-        return ALARM
-    is_evaluated = evaluated is not None and (~evaluated["revised"] & (evaluated["state"] == "healthy")).any()
-    return CODES[monitor.state()] if is_evaluated else NOT_EVALUATED
+def _as_fleet(
+    bridges: Sequence[Bridge],
+    done: Sequence[Done],
+    errors: dict[str, Exception],
+    options: argparse.Namespace,
+    facts: dict[str, Any],
+    code: int,
+) -> int:
+    """Say which alarms are significant among those of several bridges, and write their page; the exit code."""
+    from skthermo.fleet import Fleet  # a job of one bridge needs none
+
+    loaded = {one.name: bridge for bridge, one in zip(bridges, done, strict=True) if one.state is not None}
+    if len(loaded) + sum(one.state is None for one in done) < len(done):
+        raise ValueError(
+            f"bridges are called {[one.name for one in done]}; expected another name for each, as in [files]"
+        )
+    try:
+        fleet = Fleet.of_monitors(ReadWhenAsked(loaded), errors)
+        facts["fleet"] = {"summary": fleet.summary(), "page": None, "discoveries": []}
+        if len(fleet.monitors):
+            found = fleet.discoveries(options.fdr)
+            facts["fleet"]["summary"] += f"\n{found.summary()}"
+            facts["fleet"]["discoveries"] = found.table.to_dict("records")
+        if not options.json:
+            print(facts["fleet"]["summary"])
+        if options.report is not None:
+            from skthermo.reporting import owner_report
+
+            page = owner_report(fleet, options.report, title=options.title, fdr=options.fdr, now=options.now)
+            facts["fleet"]["page"] = str(page)
+    except Exception as error:  # it does not hide an alarm
+        return _failed(error, "the fleet was not reported: ", facts, code)
+    return code
 
 
-def _read(file: Path, records: pd.DataFrame) -> str:
-    period = f", {records.index.min()} to {records.index.max()}" if len(records) else ""
-    return f"read from {file}: {len(records)}{period}"
+class ReadWhenAsked(Mapping[str, Any]):
+    """Monitors by name, each read from its file when it is asked for."""
+
+    def __init__(self, bridges: Mapping[str, Bridge]):
+        self._bridges = bridges
+
+    def __getitem__(self, name: str) -> Any:
+        return self._bridges[name].load()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._bridges)
+
+    def __len__(self) -> int:
+        return len(self._bridges)
 
 
-def _taken_in(before: dict[str, int], after: dict[str, int], evaluated: pd.DataFrame | None) -> list[str]:
-    """What became of the records."""
-    names = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
-    others = ", ".join(f"{after[name] - before[name]} {text}" for name, text in names.items())
-    if evaluated is None:
-        return [f"new: 0; {others}"]
-    new, revised = evaluated[~evaluated["revised"]], evaluated["revised"].sum()
-    states = ", ".join(f"{(new['state'] == state).sum()} {state}" for state in CODES)
-    lines = [f"new: {len(new)} ({states}); {others}"]
-    lines += [f"evaluated anew, as records came late: {revised}"] if revised else []
-    lines += [f"set aside, stamped too far ahead: {after['n_ahead']}"] if after["n_ahead"] else []
-    reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts()
-    return lines + [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
+def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> int:
+    """Say that something beside the monitors failed; the exit code, which stays that of an alarm."""
+    if not isinstance(error, EXPLAINED):
+        traceback.print_exception(error)
+    logger.error("%s%s", what, error)
+    facts["errors"].append(f"{what}{error}")
+    return code if code == ALARM else FAILED
+
+
+def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Look at files of records, and say what was found."""
+    from skthermo.commands._proposal import Proposal  # for jobs that look at files
+
+    found = Proposal.of(options)
+    facts["findings"] = found.findings.table.to_dict("records")
+    if not options.json:
+        print("\n".join([*found.account(), found.findings.summary()]))
+    return HEALTHY if found.findings.table.empty else ALARM
+
+
+def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Look at files of records, and write settings that fit them."""
+    from skthermo.commands._proposal import Proposal
+
+    found = Proposal.of(options)
+    file = found.write(options.into, options.bridge)
+    facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
+    if not options.json:
+        print("\n".join([*found.account(), found.findings.summary(), f"written: {file}"]))
+        print(f"read it, then: skthermo fit {file}")
+    return HEALTHY

@@ -170,7 +170,7 @@ class BridgeFit:
         """What is known if the records or the estimator cannot be had: what was fitted before, not evaluated any
         more."""
         if self.known is not None and self.known.is_fitted:
-            return Result(_not_evaluated(self.known, failure, warnings))
+            return Result(not_evaluated(self.known, failure, warnings))
         return Result(BridgeOutcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
 
 
@@ -210,10 +210,10 @@ class BridgeUpdate:
     def lost(self, failure: Failure, warnings: tuple[Warned, ...] = ()) -> Result:
         """The bridge as it was, with one row that says why no new record is evaluated."""
         failure = replace(failure, stage="new records" if failure.stage == "new records" else "update")
-        return Result(_not_evaluated(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
+        return Result(not_evaluated(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
 
 
-def _not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warned, ...]) -> BridgeOutcome:
+def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warned, ...] = ()) -> BridgeOutcome:
     """The bridge as it was; it is not healthy, because nothing is known of it."""
     standing = dict(outcome.standing)
     if outcome.is_watched:

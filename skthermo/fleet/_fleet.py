@@ -17,7 +17,16 @@ from skthermo._io import with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning
-from skthermo.fleet._bridge import NOT_WATCHED, BridgeOutcome, BridgeUpdate, known_of, pickled, unpickled
+from skthermo.fleet._bridge import (
+    NOT_WATCHED,
+    BridgeOutcome,
+    BridgeUpdate,
+    Failure,
+    known_of,
+    not_evaluated,
+    pickled,
+    unpickled,
+)
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
 from skthermo.fleet._storage import Storage
 from skthermo.fleet._workers import run_tasks
@@ -153,6 +162,46 @@ class Fleet:
         fleet = cls.__new__(cls)
         fleet._storage = storage
         return fleet
+
+    @classmethod
+    def of_monitors(
+        cls, monitors: Mapping[Hashable, Monitor], errors: Mapping[Hashable, Exception] | None = None
+    ) -> Fleet:
+        """A fleet, in memory, of monitors that were fitted one by one.
+
+        Parameters
+        ----------
+        monitors : mapping of name to Monitor
+            Fitted monitors, copies of which are kept; a mapping may read each when it is asked for.
+        errors : mapping of name to exception, optional
+            Bridges whose newest records, or whose monitor, could not be used, and why.
+
+        Returns
+        -------
+        Fleet
+            Its ``chains`` are None.
+
+        Raises
+        ------
+        ValueError
+            If there is no bridge.
+        NotFittedError
+            If a monitor is not fitted.
+        """
+        storage = Storage()
+        failures = {name: Failure.of("update", error) for name, error in (errors or {}).items()}
+        for name in monitors:
+            monitor = monitors[name]
+            fitted = pickled((None, monitor))
+            facts = {"n_records": len(monitor.baseline_)}
+            outcome = BridgeOutcome(name, is_fitted=True, facts=facts, **known_of(monitor), n_bytes=len(fitted))
+            failure = failures.pop(name, None)
+            storage.put(outcome if failure is None else not_evaluated(outcome, failure), fitted)
+        for name, failure in failures.items():
+            storage.put(BridgeOutcome(name, failures=(failure,)), None)
+        if not storage.outcomes:
+            raise ValueError("there are no monitors; expected at least one")
+        return cls._of(storage)
 
     def __len__(self) -> int:
         return len(self._outcomes)

@@ -46,7 +46,7 @@ def saved(records, tmp_path_factory):
 
 @pytest.fixture
 def bridge(saved, tmp_path, records):
-    """Runs commands on copies of these files, and gives exit code, output and errors."""
+    """Runs commands on copies of these files as of their newest record; gives exit code, output and errors."""
 
     def run(command, *options, state="healthy", new=None, **csv):
         file = tmp_path / f"{state}.joblib"
@@ -57,8 +57,11 @@ def bridge(saved, tmp_path, records):
             new.to_csv(tmp_path / "new.csv", **csv) if isinstance(new, pd.DataFrame) else None
             (tmp_path / "new.csv").write_text(new) if isinstance(new, str) else None
             options = (tmp_path / "new.csv", *options)
+        newest = [load_monitor(file).last_]
+        newest += list(new.index[new.index < newest[0] + pd.Timedelta("100D")]) if isinstance(new, pd.DataFrame) else []
+        now = () if "--now" in options else ("--now", max(newest))
         with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-            code = main([command, str(file), *map(str, options)])
+            code = main([command, str(file), *map(str, (*options, *now))])
         return SimpleNamespace(code=code, out=out.getvalue(), err=err.getvalue(), file=file)
 
     return run
@@ -127,7 +130,7 @@ def test_without_a_new_evaluation_nothing_is_healthy(bridge, records, new):
     }[new]
     done = bridge("update", new=rows)
     assert done.code == NOT_EVALUATED
-    assert "state: healthy" in done.out
+    assert "state: not evaluated" in done.out
     assert {"known": "2 repeated", "none": "new.csv: 0\n", "too late": "2 too late"}[new] in done.out
 
 
@@ -197,7 +200,8 @@ def test_other_forms_of_files(bridge, records, tmp_path):
 
 
 def test_a_file_that_may_be_cut_off_is_told(bridge, records, tmp_path):
-    done = bridge("update", new=records[FIRST + 10 : FIRST + 12].to_csv(index_label="time").rstrip())
+    text = records[FIRST + 10 : FIRST + 12].to_csv(index_label="time").rstrip()
+    done = bridge("update", "--now", records.index[FIRST + 11], new=text)
     assert done.code == HEALTHY
     assert done.err.startswith("warning: ")
     assert "does not end with a line break: its last value may be cut off" in done.err
@@ -263,7 +267,8 @@ def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeyp
     monkeypatch.setattr(skthermo.reporting, "owner_report", lambda *given, **named: shown.append((given, named)))
     done = bridge("update", "--report", tmp_path / "a.html", "--title", "Truss", new=records[FIRST + 10 : FIRST + 12])
     ((monitor, file), named), *others = shown
-    assert (done.code, file, named, others) == (HEALTHY, tmp_path / "a.html", {"title": "Truss"}, [])
+    assert (done.code, file, others) == (HEALTHY, tmp_path / "a.html", [])
+    assert named == {"title": "Truss", "now": str(records.index[FIRST + 11])}
     assert_same_course(monitor, load_monitor(done.file))
 
 
@@ -278,12 +283,18 @@ def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch
     assert "a mistake of ours" in done.err
 
 
-@pytest.mark.parametrize("arguments", [[], ["updates"], ["update", "bridge.joblib"], ["acknowledge", "b.skops", "1"]])
+@pytest.mark.parametrize("arguments", [[], ["updates"], ["acknowledge", "b.skops", "1"]])
 def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_evaluated(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == FAILED
-    assert capsys.readouterr().err.startswith("usage: python -m skthermo")
+    assert capsys.readouterr().err.startswith("usage: skthermo")
+
+
+@pytest.mark.parametrize("files", [["bridge.joblib"], ["new.csv"], ["a.toml", "b.toml", "new.csv"]])
+def test_files_that_do_not_belong_together_are_an_error(files, capsys):
+    assert main(["update", *files]) == FAILED
+    assert "expected" in capsys.readouterr().err
 
 
 def test_two_at_once(bridge, records, tmp_path):

@@ -344,3 +344,24 @@ def test_records_that_are_no_tables_are_reported():
     makers, records = asked(n=(None, lambda: (1, 2)))
     fleet = fit_fleet(makers, records)
     assert "shapes () and (); expected tables" in fleet.table.loc["n", "error"]
+
+
+def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
+    single = {name: fleet.monitors[name] for name in "abc"}
+    new = {
+        name: pd.concat(year(seed, 60, "2026-01-01", 0.1 * (name == "b")), axis=1) for seed, name in enumerate("abc")
+    }
+    for name, monitor in single.items():
+        monitor.update(new[name])
+    fitted = fit_fleet(*(dict(list(one.items())[:3]) for one in asked()), monitor=watch)
+    fitted.update(new)
+    made = Fleet.of_monitors(single)
+    columns = ["is_fitted", "state", "last", "n_evaluated", "alarm_rate", "n_events", "n_open"]
+    pd.testing.assert_frame_equal(made.table[columns], fitted.table[columns])
+    pd.testing.assert_frame_equal(made.events, fitted.events)
+    assert made.discoveries().bridges == fitted.discoveries().bridges == ["b"]
+    broken = Fleet.of_monitors(single, {"a": ValueError("no sensor"), "b": OSError("no file"), "d": OSError("lost")})
+    assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "alarm", "c": "healthy", "d": ""}
+    assert set(broken.errors["bridge"]) == {"a", "b", "d"}
+    with pytest.raises(ValueError, match="monitors"):
+        Fleet.of_monitors({})

@@ -1,0 +1,290 @@
+"""Settings that fit some records: what was found in their files, and what was chosen, as a file with comments."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import skthermo
+from skthermo._io import write_when_complete
+from skthermo._tables.text import duration_text
+from skthermo.commands._looking import Look, is_in_kelvin, look_at
+from skthermo.commands._new_records import in_celsius, joined
+from skthermo.commands._record_files import PARQUET, CsvFormat
+from skthermo.commands._settings import CLASSES, SECTIONS, Records, class_named, read_settings, settings_of
+from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
+
+BASELINE = "baseline"  # folder to which the files of the baseline are copied
+TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"
+LIKE_TEMPERATURE = re.compile(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", re.IGNORECASE)
+LIKE_FREQUENCY = re.compile(r"f_?\d*$|freq|mode|hz", re.IGNORECASE)
+DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day are evaluated together
+WIDTH = 110  # of comments
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What was found in files of records, and the settings that are proposed for them."""
+
+    looks: Sequence[Look]
+    form: CsvFormat
+    records: Records
+    baseline: pd.DataFrame
+    n_waiting: int
+    units: Mapping[str, str]
+    findings: RecordFindings
+    memory: MemoryFindings
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Proposal:
+        """Look at files, and at their records up to the end of the baseline."""
+        looks = [look_at(file, options.zone) for file in options.files]
+        form = _form_of_all(looks)
+        again = [
+            name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])
+        ]
+        if again and len({frozenset(look.records) for look in looks}) > 1:
+            raise ValueError(f"several files have the columns {again}; expected each in one, beside the stamps")
+        columns = list(dict.fromkeys(name for look in looks for name in look.records))
+        roles = _roles(looks, columns, options)
+        used = [name for names in roles.values() for name in names]
+        units = {name: unit for look in looks for name, unit in look.units.items()}
+        together, waiting = joined([look.records for look in looks], columns)
+        if not len(together):
+            spans = "; ".join(
+                f"{look.file}: {look.records.index.min()} to {look.records.index.max()}" for look in looks
+            )
+            raise ValueError(f"the files have no stamp in common ({spans}); expected records of the same times")
+        together = together.sort_index()
+        convert = {
+            name: unit
+            for name in (*roles["temperatures"], *roles["reference"])
+            if (unit := _foreign(together, name, units))
+        }
+        together = in_celsius(together, convert)
+        until = options.until
+        baseline = together[used] if until is None else together.loc[:until, used]
+        if not len(baseline):
+            raise ValueError(f"no record is from before {until}; the first is of {together.index[0]}")
+        ignored = [name for look in looks for name in look.ignored] + [name for name in columns if name not in used]
+        records = Records(
+            [f"{BASELINE}/{look.file.name}" for look in looks], **roles, ignore=ignored, convert=convert, until=until
+        )
+        T, F = baseline[roles["temperatures"]], baseline[roles["responses"]]
+        units = {name: units.get(name, HZ if LIKE_FREQUENCY.match(name) else "") for name in roles["responses"]}
+        unit = next(iter(units.values())) if len(set(units.values())) == 1 else ""
+        return cls(
+            looks, form, records, baseline, len(waiting), units, check_records(T, F, unit=unit), find_memory(T, F)
+        )
+
+    @property
+    def step(self) -> pd.Timedelta:
+        """Usual time between records."""
+        steps = np.diff(self.baseline.index.as_unit("ns").asi8)
+        return pd.Timedelta(int(np.median(steps)) if len(steps) else 0, "ns")
+
+    def account(self) -> Iterator[str]:
+        """What was found in the files."""
+        for look in self.looks:
+            form, index = look.form, look.records.index
+            is_csv = look.file.suffix.lower() not in PARQUET
+            shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
+            zone = f" in {index.tz}" if index.tz else ", without a time zone"
+            yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"
+            yield from (f"not used: {name!r}, as {why}" for name, why in look.ignored.items())
+            yield from (f"see: {note}" for note in look.notes)
+        if self.n_waiting:
+            yield f"stamps that are not in all files, and are left out: {self.n_waiting}"
+        missing = self.baseline.isna().to_numpy().mean()
+        yield (
+            f"baseline: {len(self.baseline)} records, usually every {duration_text(self.step)}, {missing:.1%} of the "
+            "values missing"
+        )
+        yield f"temperatures: {', '.join(self.records.temperatures)}; responses: {', '.join(self.records.responses)}"
+        yield self.memory.summary()
+
+    def write(self, folder: Path, name: str | None) -> Path:
+        """Write the settings into a folder, with copies of the files and a folder for new ones."""
+        file = folder / "monitor.toml"
+        if file.exists():
+            raise FileExistsError(
+                f"there is a file {str(file)!r} already; expected another folder, or none of that name"
+            )
+        (folder / BASELINE).mkdir(parents=True, exist_ok=True)
+        (folder / self.records.folder).mkdir(exist_ok=True)
+        for look in self.looks:
+            copy = folder / BASELINE / look.file.name
+            if copy.resolve() != look.file.resolve():
+                shutil.copyfile(look.file, copy)
+        write_when_complete(file, self.text(name))
+        read_settings(file)  # what is written can be read
+        return file
+
+    def text(self, name: str | None = None) -> str:
+        """The settings as TOML, with what each means."""
+        found = [*self.account(), *self.findings.summary().splitlines()]
+        per_unit: Any = next(iter(self.units.values())) if len(set(self.units.values())) == 1 else dict(self.units)
+        is_dense = self.step <= DENSE
+        means = self.memory.features
+        calls: list[tuple[str, str | None, dict[str, Any], str]] = [
+            ("files", None, {"name": name} if name else {}, "What is written."),
+            ("records", None, asdict(self.records), "Which records there are."),
+            ("csv", None, asdict(self.form), "How CSV files are written."),
+        ]
+        if means is not None:
+            chosen = {"time_constants": list(means.time_constants), "sensors": list(means.sensors)}
+            calls.append(
+                ("features", "ExponentialMeans", chosen, "Means of earlier temperatures that explain responses.")
+            )
+        calls += [
+            ("features", "HingeFeatures", {}, "Frequencies are piecewise-linear in temperature."),
+            (
+                "regression",
+                "sklearn.linear_model.Ridge",
+                {},
+                "Predicts the responses from the temperatures: any regressor of scikit-learn, with its own settings.",
+            ),
+            ("compensator", None, {}, "Takes out what the weather explains."),
+            (
+                "detector",
+                "WindowedAlarm" if is_dense else "MahalanobisDetector",
+                {"window": "1D"} if is_dense else {},
+                "Evaluates the records of a day together." if is_dense else "Evaluates each record for itself.",
+            ),
+            (
+                "monitor",
+                None,
+                {"false_alarms_per_year": 1.0, "units": per_unit, "random_state": 0},
+                "The detector in service.",
+            ),
+        ]
+        parts = [
+            _comment(
+                f"Settings of a monitor, written by skthermo {skthermo.__version__}. Lines with # say what else can be "
+                "set."
+            )
+        ]
+        parts += [_comment("Found in the records:"), *(_comment(f"- {one}") for one in found)]
+        parts += [_section(*call) for call in calls]
+        parts += [_fem(), _page()]
+        return "\n".join(parts) + "\n"
+
+
+def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
+    """The form that all CSV files have in common."""
+    looks = [look for look in looks if look.file.suffix.lower() not in PARQUET] or looks[:1]
+    missing = sorted({marker for look in looks for marker in look.form.missing})
+    forms = [replace(look.form, missing=missing) for look in looks]
+    other = next((n for n, form in enumerate(forms) if form != forms[0]), None)
+    if other is not None:
+        differing = [name for name, value in asdict(forms[0]).items() if value != getattr(forms[other], name)]
+        got = ", ".join(f"{name} {getattr(forms[0], name)!r} and {getattr(forms[other], name)!r}" for name in differing)
+        raise ValueError(f"{looks[0].file} and {looks[other].file} have different forms: {got}; expected the same")
+    return forms[0]
+
+
+def _roles(looks: Sequence[Look], columns: list[str], options: argparse.Namespace) -> dict[str, list[str]]:
+    """Columns by what they are: as said, else as the first and the other of two files, or by unit and name."""
+    given = {"temperatures": options.temperatures, "reference": options.reference, "responses": options.responses}
+    unknown = [name for names in given.values() for name in names or () if name not in columns]
+    if unknown:
+        raise ValueError(f"there are no columns {unknown}; expected some of {columns}")
+    named = {name for names in given.values() for name in names or ()}
+    rest = [name for name in columns if name not in named]
+    units = {name: unit for look in looks for name, unit in look.units.items()}
+    is_pair = len({frozenset(look.records) for look in looks}) == 2
+    for role, unit, like in (
+        ("temperatures", TEMPERATURES, LIKE_TEMPERATURE),
+        ("responses", {HZ}, LIKE_FREQUENCY),
+    ):
+        if given[role] is None and is_pair:
+            first = set(looks[0].records)
+            given[role] = [name for name in rest if (name in first) == (role == "temperatures")]
+        elif given[role] is None:
+            given[role] = [n for n in rest if units.get(n) in unit or (n not in units and like.match(str(n)))]
+        if not given[role]:
+            raise ValueError(f"no column is known to be one of the {role}; expected --{role} and some of {columns}")
+    return {role: list(names) for role, names in given.items()}
+
+
+def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:
+    """The unit of a temperature that is not in degrees Celsius."""
+    unit = units.get(name, "")
+    if unit in ("K", "°F"):
+        return unit
+    return "K" if unit == "" and is_in_kelvin(records[name]) else ""
+
+
+def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:
+    """A section: what is chosen as settings, all others as comments with their defaults."""
+    if kind is None:
+        maker, without = SECTIONS[name][0](), SECTIONS[name][1]
+    else:
+        maker, without = class_named(kind, CLASSES[name]), ()
+    header = f"[[{name}]]" if name == "features" else f"[{name}]"
+    lines = ["", _comment(text), header, *([f"class = {toml(kind)}"] if kind else [])]
+    is_own = maker.__module__.startswith("skthermo")
+    for key, setting in settings_of(maker, without).items() if is_own else ():
+        value = chosen.get(key, setting.default)
+        is_chosen = setting.is_required or (
+            key in chosen and value is not None and value not in ([], (), {}, setting.default)
+        )
+        is_chosen |= key in chosen and name == "monitor"
+        lines.append(_comment(setting.text, "## "))
+        shown = "..." if value is None else toml(value)
+        lines.append(f"{key} = {shown}" if is_chosen else f"# {key} = {shown}")
+    return "\n".join(lines)
+
+
+def _fem() -> str:
+    lines = [
+        "",
+        _comment(
+            "An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives "
+            "one, or a folder of matrices that another program exported. Other settings are those of DataInformedFEM."
+        ),
+        "# [fem]",
+        '# model = "model.py:make_model"',
+    ]
+    return "\n".join(lines)
+
+
+def _page() -> str:
+    lines = [
+        "",
+        _comment("The page for the owner."),
+        "# [page]",
+        '# title = "Bridge over the river"',
+        "# drift_limit = 0.1",
+    ]
+    return "\n".join(lines)
+
+
+def _comment(text: str, sign: str = "# ") -> str:
+    lines = textwrap.wrap(text, WIDTH, initial_indent=sign, subsequent_indent=sign, break_long_words=False)
+    return "\n".join(lines)
+
+
+def toml(value: Any) -> str:
+    """A value as TOML has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return (
+            "{" + ", ".join(f"{json.dumps(key, ensure_ascii=False)} = {toml(one)}" for key, one in value.items()) + "}"
+        )
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    if isinstance(value, int | float):
+        return repr(value)
+    return json.dumps(str(value), ensure_ascii=False)

@@ -1,0 +1,418 @@
+"""Settings of a monitor in a TOML file: what they are called, what they mean, and what they make.
+
+Names, defaults and descriptions of settings are those of the classes that they are for, from their signatures and
+docstrings: a section of the file is a call.
+"""
+
+from __future__ import annotations
+
+import datetime
+import inspect
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from types import UnionType
+from typing import Any, NamedTuple, Union, get_args, get_origin, get_type_hints
+from zoneinfo import ZoneInfo
+
+import pandas as pd
+from sklearn.pipeline import make_pipeline
+
+from skthermo.commands._record_files import CsvFormat
+from skthermo.detection import TemperatureCompensator
+from skthermo.monitoring import Monitor
+
+NONE = "none"  # in a file, where a parameter may be None and is not by default
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the bridge is called, and which files are written, beside the settings if no folder is named.
+
+    Parameters
+    ----------
+    name : str, optional
+        Name of the bridge in pages, JSON and metrics; by default that of the folder.
+    monitor : str, default="monitor.joblib"
+        File of the fitted monitor, .joblib or .skops.
+    page : str, default="status.html"
+        Page for the owner; "" for none.
+    transitions : str, default="transitions.jsonl"
+        File to which each change of state is appended, a line of JSON for each; "" for none.
+    metrics : str, optional
+        File in Prometheus' text format, for a textfile collector; by default none.
+    max_age : str, optional
+        Age of the newest record beyond which nothing is healthy, such as "2D"; by default two days and the usual time
+        between records.
+    """
+
+    name: str | None = None
+    monitor: str = "monitor.joblib"
+    page: str = "status.html"
+    transitions: str = "transitions.jsonl"
+    metrics: str | None = None
+    max_age: str | None = None
+
+
+@dataclass(frozen=True)
+class Records:
+    """Which files hold records, and which of their columns are what.
+
+    Parameters
+    ----------
+    baseline : list of str
+        Files of the baseline. Those with other columns are joined by their stamps.
+    temperatures : list of str
+        Columns with temperatures, in degrees Celsius.
+    responses : list of str
+        Columns with natural frequencies, or other responses of the structure.
+    reference : list of str, optional
+        Columns with temperatures from elsewhere, such as a weather station. They check the thermometers and fill their
+        gaps, and are no inputs of the detector.
+    ignore : list of str, optional
+        Columns that are not used.
+    convert : mapping of str to str, optional
+        Columns in another unit than degrees Celsius, and that unit: "K" or "°F".
+    until : str, optional
+        Last moment of the baseline; later records of these files are new ones. By default all of them are the
+        baseline.
+    folder : str, default="new"
+        Folder of new records: `update` without names of files takes what is new there.
+    """
+
+    baseline: Sequence[str]
+    temperatures: Sequence[str]
+    responses: Sequence[str]
+    reference: Sequence[str] = ()
+    ignore: Sequence[str] = ()
+    convert: Mapping[str, str] = field(default_factory=dict)
+    until: str | None = None
+    folder: str = "new"
+
+    @property
+    def columns(self) -> list[str]:
+        """All columns that are used."""
+        return [*self.temperatures, *self.reference, *self.responses]
+
+
+class Setting(NamedTuple):
+    """A parameter by which something is called: its default, and what it is."""
+
+    default: Any
+    text: str
+
+    @property
+    def is_required(self) -> bool:
+        """Whether it has no default."""
+        return self.default is inspect.Parameter.empty
+
+
+def page_maker() -> Callable[..., Any]:
+    """What writes pages; drawings are not needed by other commands."""
+    from skthermo.reporting import owner_report
+
+    return owner_report
+
+
+def chain_maker() -> Callable[..., Any]:
+    """The chain of an FE model, which few monitors need."""
+    from skthermo.surrogate import DataInformedFEM
+
+    return DataInformedFEM
+
+
+SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
+    "files": (lambda: Files, ()),
+    "records": (lambda: Records, ()),
+    "csv": (lambda: CsvFormat, ()),
+    "compensator": (lambda: TemperatureCompensator, ("estimator", "targets")),
+    "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
+    "fem": (chain_maker, ("inverse", "mapper", "imputer")),
+    "page": (page_maker, ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now")),
+}
+"""What each section calls, and which parameters come from elsewhere."""
+
+CLASSES: dict[str, tuple[str, ...]] = {
+    "features": ("skthermo.preprocessing", "sklearn"),
+    "regression": ("sklearn",),
+    "detector": ("skthermo.detection", "sklearn"),
+}
+"""Sections that name the class they call, and the packages of these; ``features`` are several, one after the other."""
+
+
+def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
+    """Parameters of a class or function by name, with their descriptions."""
+    doc = inspect.getdoc(maker) or ""
+    types = dict(_types(doc))
+    texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
+    kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    return {
+        name: Setting(_default(one.default), texts.get(name, ""))
+        for name, one in inspect.signature(maker).parameters.items()
+        if name not in without and one.kind not in kinds
+    }
+
+
+def _default(value: Any) -> Any:
+    """The default of a parameter; those of dataclasses may be made by a factory, and are empty."""
+    return {} if "factory" in repr(value) else value
+
+
+def _descriptions(doc: str) -> Iterator[tuple[str, str]]:
+    """Names and first paragraphs of the parameters that a numpydoc docstring describes."""
+    part = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", doc, re.DOTALL | re.MULTILINE)
+    for match in re.finditer(r"^(\w[\w, ]*?) ?: [^\n]*\n((?:[ \t]+[^\n]*\n?)*)", part[1] if part else "", re.MULTILINE):
+        text = re.sub(r"`+~?([^`]*)`+", r"\1", " ".join(match[2].split()))
+        yield from ((name.strip(), text) for name in match[1].split(","))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of one monitor, checked.
+
+    ``parts`` are unfitted estimators by section, ``options`` the values of the other sections.
+    """
+
+    file: Path
+    files: Files
+    records: Records
+    csv: CsvFormat
+    parts: Mapping[str, Any]
+    options: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def name(self) -> str:
+        """Name of the bridge."""
+        return self.files.name or self.file.resolve().parent.name
+
+    def path(self, name: str) -> Path:
+        """A file that the settings name: beside them, if it has no folder of its own."""
+        return self.file.parent / name
+
+    def monitor(self, fem: Any = None) -> Monitor:
+        """The monitor that the settings describe, unfitted."""
+        steps = [*self.parts["features"], self.parts["regression"]]
+        regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
+        targets, reference = list(self.records.responses), list(self.records.reference) or None
+        compensator = TemperatureCompensator(regression, targets=targets, **self.options["compensator"])
+        detector = make_pipeline(compensator, self.parts["detector"])
+        return Monitor(detector, reference=reference, fem=fem, **self.options["monitor"])
+
+    def fem(self, T: pd.DataFrame, F: pd.DataFrame) -> Any:
+        """The chain of the FE model that the settings name, fitted; None without one."""
+        options = dict(self.options["fem"])
+        if not options:
+            return None
+        return chain_maker()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+
+
+def _model(path: Path, settings: Path) -> Any:
+    """An FE model: what a function of a Python file gives, or matrices that other programs exported."""
+    file, _, function = str(path).rpartition(".py:")
+    if not file:
+        from skthermo.fem import load_affine
+
+        return load_affine(path)
+    names: dict[str, Any] = {"__name__": Path(file).stem}
+    code = Path(f"{file}.py")
+    exec(compile(code.read_text(encoding="utf-8"), str(code), "exec"), names)
+    if not callable(names.get(function)):
+        raise ValueError(
+            f"{settings}: [fem] model: {code} has no function {function!r}; expected one that gives a model"
+        )
+    return names[function]()
+
+
+def read_settings(file: Path) -> Settings:
+    """Read and check a file of settings; errors name the line."""
+    return _Reader.of(file).settings()
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Content of a file, and where each of its settings stands."""
+
+    file: Path
+    content: Mapping[str, Any]
+    lines: Mapping[tuple[str, int, str], int]
+
+    @classmethod
+    def of(cls, file: Path) -> _Reader:
+        try:
+            text = file.read_text(encoding="utf-8")
+            return cls(file, tomllib.loads(text), dict(_places(text)))
+        except FileNotFoundError as error:
+            raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings that init writes") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
+
+    def settings(self) -> Settings:
+        """All that the file says."""
+        known = [*SECTIONS, *CLASSES]
+        for name, given in self.content.items():
+            is_list, wants_list = isinstance(given, list), name == "features"
+            if name not in known:
+                raise self.error(name, 0, "", f"there is no section [{name}]{_nearest(name, known)}")
+            if is_list != wants_list or not all(isinstance(one, dict) for one in (given if is_list else [given])):
+                expected = f"[[{name}]], once for each step" if wants_list else f"[{name}], once"
+                raise self.error(name, 0, "", f"{name!r} is no section; expected {expected}")
+        files, records, form = (self._called(name) for name in ("files", "records", "csv"))
+        parts = {
+            name: self._made(name, 0, self.content[name]) for name in ("regression", "detector") if self._has(name)
+        }
+        steps = enumerate(self.content.get("features", ()))
+        parts["features"] = [self._made("features", n, given) for n, given in steps]
+        options = {name: self._values(name) for name in ("compensator", "monitor", "fem", "page")}
+        found = Settings(self.file, files, records, form, parts, options)
+        self._check(found)
+        return found
+
+    def error(self, section: str, number: int, key: str, text: str) -> ValueError:
+        """An error that names the line."""
+        line = self.lines.get((section, number, key)) or self.lines.get((section, number, ""))
+        return ValueError(f"{self.file}{f', line {line}' if line else ''}: {text}")
+
+    def _has(self, name: str) -> bool:
+        if name not in self.content:
+            raise self.error(name, 0, "", f"there is no section [{name}]; expected one, with class = a name")
+        return True
+
+    def _called(self, name: str) -> Any:
+        """What a section calls with its values."""
+        values = self._values(name)
+        maker = SECTIONS[name][0]()
+        for key, value in values.items():
+            if not fits(value, get_type_hints(maker)[key]):
+                text = dict(_types(inspect.getdoc(maker) or ""))[key]
+                raise self.error(name, 0, key, f"[{name}] {key} is {value!r:.100}; expected {text}")
+        return maker(**values)
+
+    def _values(self, name: str) -> dict[str, Any]:
+        """Values of a section that are parameters of what it calls."""
+        if name in ("fem", "page") and name not in self.content:
+            return {}
+        maker, without = SECTIONS[name]
+        return self._known(name, 0, self.content.get(name, {}), settings_of(maker(), without))
+
+    def _known(self, name: str, number: int, given: Mapping[str, Any], known: Mapping[str, Setting]) -> dict[str, Any]:
+        for key in given:
+            if key not in known:
+                raise self.error(name, number, key, f"[{name}] has no setting {key!r}{_nearest(key, known)}")
+        lacking = [key for key, one in known.items() if one.is_required and key not in given]
+        if lacking:
+            raise self.error(name, number, "", f"[{name}] lacks {', '.join(lacking)}")
+        return {key: _plain(value, known[key]) for key, value in given.items()}
+
+    def _made(self, name: str, number: int, given: Mapping[str, Any]) -> Any:
+        """An estimator of the class that a section names."""
+        values = dict(given)
+        try:
+            maker = class_named(values.pop("class", None), CLASSES[name])
+        except ValueError as error:
+            raise self.error(name, number, "class", f"[{name}] class {error}") from error
+        estimator = maker(**self._known(name, number, values, settings_of(maker)))
+        self._validate(name, number, estimator)
+        return estimator
+
+    def _validate(self, name: str, number: int, estimator: Any) -> None:
+        """The checks of parameters that every estimator has."""
+        try:
+            estimator._validate_params()
+        except ValueError as error:
+            key = re.search(r"'(\w+)' parameter", str(error))
+            raise self.error(name, number, key[1] if key else "", f"[{name}] {error}") from error
+
+    def _check(self, found: Settings) -> None:
+        """What concerns several settings, or a value's meaning."""
+        columns = found.records.columns
+        again = sorted({name for name in columns if columns.count(name) > 1})
+        if again:
+            raise self.error("records", 0, "", f"[records] names {again} twice; expected each column once")
+        for key in ("temperatures", "responses"):
+            if not getattr(found.records, key):
+                raise self.error("records", 0, key, f"[records] {key} is empty; expected names of columns")
+        for column, unit in found.records.convert.items():
+            if unit not in ("K", "°F") or column not in columns:
+                text = f"[records] convert has {column!r}: {unit!r}; expected a column that is used, in 'K' or '°F'"
+                raise self.error("records", 0, "convert", text)
+        try:
+            ZoneInfo(found.csv.time_zone or "UTC")
+        except (KeyError, ValueError, OSError) as error:
+            text = f"[csv] time_zone is {found.csv.time_zone!r}; expected a name such as 'Europe/Brussels' or 'UTC'"
+            raise self.error("csv", 0, "time_zone", text) from error
+        monitor = found.monitor()
+        self._validate("monitor", 0, monitor)
+        self._validate("compensator", 0, monitor.detector[0])
+
+
+def class_named(name: Any, packages: Sequence[str]) -> type:
+    """A class of skthermo by its name, or one of scikit-learn by its module and name."""
+    own = [
+        one
+        for package in packages
+        if package.startswith("skthermo")
+        for one in import_module(package).__all__
+        if hasattr(getattr(import_module(package), one), "get_params")
+    ]
+    module, _, last = str(name).rpartition(".")
+    if name in own:
+        return next(getattr(import_module(one), name) for one in packages if hasattr(import_module(one), name))
+    if module.split(".")[0] == "sklearn" and "sklearn" in packages:
+        try:
+            found = getattr(import_module(module), last)
+        except (ImportError, AttributeError):
+            found = None
+        if isinstance(found, type) and hasattr(found, "get_params"):
+            return found
+    expected = [*own, "one of scikit-learn, such as 'sklearn.linear_model.Ridge'"]
+    raise ValueError(f"is {name!r}{_nearest(str(name), own, expected)}")
+
+
+def fits(value: Any, hint: Any) -> bool:
+    """Whether a value is of a type."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return any(fits(value, one) for one in inner)
+    if origin is not None and issubclass(origin, Mapping):
+        return isinstance(value, Mapping) and all(fits(one, inner[1]) for one in value.values())
+    if origin is not None:
+        return isinstance(value, list) and all(fits(one, inner[0]) for one in value)
+    if hint is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
+
+
+def _types(doc: str) -> Iterator[tuple[str, str]]:
+    """Names of parameters and their types as the docstring has them."""
+    for match in re.finditer(r"^(\w+) : ([^\n]*?)(?:, optional|, default=[^\n]*)?$", doc, re.MULTILINE):
+        yield match[1], match[2]
+
+
+def _plain(value: Any, setting: Setting) -> Any:
+    """A value as Python's API has it: times as text, and None by a word."""
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    return None if value == NONE and setting.default is not None else value
+
+
+def _nearest(name: str, known: Sequence[str] | Mapping[str, Any], expected: Sequence[str] | None = None) -> str:
+    """What may have been meant, and else all that there is."""
+    near = get_close_matches(name, list(known), 1, 0.6)
+    return f"; did you mean {near[0]!r}?" if near else f"; expected one of {', '.join(expected or known)}"
+
+
+def _places(text: str) -> Iterator[tuple[tuple[str, int, str], int]]:
+    """Lines of sections and their settings, by the name of the section, its number among those and the setting."""
+    counts: dict[str, int] = {}
+    section = ""
+    for line, content in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[\[?\s*([\w-]+)", content):
+            section = header[1]
+            counts[section] = counts.get(section, -1) + 1
+            yield (section, counts[section], ""), line
+        elif key := re.match(r"""\s*["']?([\w-]+)["']?\s*(\.\s*[^=]+)?=""", content):
+            yield (section, counts.get(section, 0), key[1]), line

@@ -1,0 +1,289 @@
+"""A bridge by commands alone: from two CSV files to a page, night by night."""
+
+import json
+import shutil
+from importlib.resources import files
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import skthermo.reporting
+from skthermo.monitoring import load_monitor
+from tests.commands.folders import edit, made_bridge, run, write_day, write_pair
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, truss_records
+
+HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
+SCHEMA = json.loads((files("skthermo.commands") / "output.schema.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def records():
+    records = truss_records()
+    return records.set_axis(records.index.as_unit("ns").rename(None))
+
+
+@pytest.fixture(scope="module")
+def fitted(records, tmp_path_factory):
+    return made_bridge(tmp_path_factory.mktemp("fitted"), records=records)
+
+
+@pytest.fixture
+def bridge(fitted, tmp_path, monkeypatch):
+    """A copy of the fitted bridge, whose page is a text; commands are started elsewhere."""
+    folder = shutil.copytree(fitted, tmp_path / "bridge")
+    monkeypatch.chdir(tmp_path)
+
+    def page(monitor, path, **options):
+        path.write_text(monitor.summary())
+        return path
+
+    monkeypatch.setattr(skthermo.reporting, "owner_report", page)
+    return folder
+
+
+def settings(bridge):
+    return bridge / "monitor.toml"
+
+
+def valid(said):
+    """JSON of a command that its schema allows."""
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator(SCHEMA).validate(said)
+    return said
+
+
+def test_records_of_a_folder_are_taken_in_night_by_night_as_in_one_pass(bridge, records):
+    whole = load_monitor(bridge / "monitor.joblib")
+    whole.update(records[FIRST : DAMAGED + 10])
+    transitions = []
+    for start, stop in pairwise((FIRST, FIRST + 1, DAMAGED - 2, DAMAGED + 3, DAMAGED + 10)):
+        now = write_day(records, bridge, start, stop)
+        done = run("update", settings(bridge), "--now", now, "--json")
+        (one,) = valid(done.json)["bridges"]
+        assert one["records"]["new"] == stop - start
+        assert done.code == one["exit_code"] == done.json["exit_code"]
+        assert (bridge / "status.html").read_text() == load_monitor(bridge / "monitor.joblib").summary()
+        transitions += one["transitions"]
+    assert done.code == ALARM
+    assert_same_course(load_monitor(bridge / "monitor.joblib"), whole)
+    lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
+    assert lines == transitions
+    assert [one["id"] for one in lines] == list(range(1, len(lines) + 1))
+    assert lines[0]["what"] == "opened"
+    again = run("update", settings(bridge), "--now", now, "--json")
+    assert valid(again.json)["bridges"][0]["records"]["new"] == 0
+    assert again.json["bridges"][0]["records"]["repeated"] == 0
+    assert (again.code, again.json["bridges"][0]["transitions"]) == (ALARM, [])
+
+
+def test_a_log_that_grows_is_read_where_it_grows(bridge, records):
+    log = bridge / "new" / "log.csv"
+    for stop in (3, 4, 9):
+        text = records[FIRST : FIRST + stop].to_csv(index_label="time")
+        log.write_text(text + "2027-02-01,1.")  # a line that the logger has not finished
+        done = run("update", settings(bridge), "--now", str(records.index[FIRST + stop - 1]))
+        assert done.code == HEALTHY
+    monitor = load_monitor(bridge / "monitor.joblib")
+    pd.testing.assert_frame_equal(monitor.records_, records[FIRST : FIRST + 9], check_freq=False)
+    assert monitor.counts_["n_repeated"] == 0
+
+
+def test_a_last_line_without_an_end_is_taken_when_it_stays_as_it_is(bridge, records):
+    file = bridge / "new" / "a.csv"
+    file.write_text(records[FIRST : FIRST + 3].to_csv(index_label="time").rstrip())
+    numbers = []
+    for _ in range(3):
+        run("update", settings(bridge), "--now", str(records.index[FIRST + 2]))
+        numbers.append(len(load_monitor(bridge / "monitor.joblib").records_))
+    assert numbers == [2, 3, 3]
+
+
+def test_temperatures_wait_for_frequencies_of_the_same_time(bridge, records):
+    T, f = (records.filter(regex=f"^{letter}") for letter in "Tf")
+    for (first, last), (begin, end) in (((0, 5), (0, 3)), ((5, 8), (3, 8))):
+        T[FIRST + first : FIRST + last].to_csv(bridge / "new" / f"T{first}.csv", index_label="time")
+        f[FIRST + begin : FIRST + end].to_csv(bridge / "new" / f"f{begin}.csv", index_label="time")
+        done = run("update", settings(bridge), "--now", str(records.index[FIRST + end - 1]))
+        assert done.code == HEALTHY
+        assert len(load_monitor(bridge / "monitor.joblib").records_) == end
+    assert "they wait" not in done.out
+    pd.testing.assert_frame_equal(
+        load_monitor(bridge / "monitor.joblib").records_, records[FIRST : FIRST + 8], check_freq=False
+    )
+
+
+def test_a_wrong_file_keeps_no_other_out_and_is_named_until_it_is_mended(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 3)
+    broken = records[FIRST + 3 : FIRST + 5].rename(columns={"T1": "T9"})
+    broken.to_csv(bridge / "new" / "wrong.csv", index_label="time")
+    for _ in range(2):
+        done = run("update", settings(bridge), "--now", now, "--json")
+        assert done.code == FAILED
+        (error,) = valid(done.json)["bridges"][0]["errors"]
+        assert "wrong.csv" in error
+        assert "T9" in error
+        assert len(load_monitor(bridge / "monitor.joblib").records_) == 3
+    write_day(records, bridge, FIRST + 3, FIRST + 5, "wrong.csv")
+    assert run("update", settings(bridge), "--now", str(records.index[FIRST + 4])).code == HEALTHY
+    assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
+
+
+def test_other_values_of_a_known_record_are_refused_alone(bridge, records):
+    write_day(records, bridge, FIRST, FIRST + 3)
+    run("update", settings(bridge), "--now", str(records.index[FIRST + 2]))
+    write_day(records + 0.5, bridge, FIRST + 2, FIRST + 4, "changed.csv")
+    now = write_day(records, bridge, FIRST + 3, FIRST + 5)
+    done = run("update", settings(bridge), "--now", now)
+    assert done.code == FAILED
+    assert "changed.csv" in done.err
+    assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
+
+
+def test_later_records_of_the_baselines_files_are_new_ones(records, tmp_path):
+    files = write_pair(records[: FIRST + 10], tmp_path)
+    toml = tmp_path / "b" / "monitor.toml"
+    run("init", *files, "--into", toml.parent, "--until", str(records.index[FIRST - 1]))
+    edit(toml, '# page = "status.html"', 'page = ""')
+    assert run("fit", toml).code == 0
+    assert len(load_monitor(toml.parent / "monitor.joblib").baseline_) == FIRST
+    assert run("update", toml, "--now", str(records.index[FIRST + 9])).code == HEALTHY
+    assert len(load_monitor(toml.parent / "monitor.joblib").records_) == 10
+
+
+def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, records):
+    now = write_day(records, bridge, FIRST, DAMAGED + 10)
+    run("update", settings(bridge), "--now", now)
+    seen = load_monitor(bridge / "monitor.joblib")
+    before = (bridge / "monitor.joblib").read_bytes()
+    refused = run("fit", settings(bridge))
+    assert (refused.code, (bridge / "monitor.joblib").read_bytes()) == (FAILED, before)
+    assert run("fit", settings(bridge), "--replace").code == 0
+    (kept,) = bridge.glob("monitor.replaced-*.joblib")
+    assert kept.read_bytes() == before
+    assert run("update", settings(bridge), "--now", now).code == ALARM  # of all records that the folder keeps
+    assert_same_course(load_monitor(bridge / "monitor.joblib"), seen)
+    lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
+    assert len({one["fitted"] for one in lines}) in (1, 2)  # the second fit may be of the same second
+
+
+def test_commands_that_an_engineer_uses(bridge, records):
+    now = write_day(records, bridge, FIRST, DAMAGED + 30)
+    run("update", settings(bridge), "--now", now)
+    status = run("status", settings(bridge), "--now", now, "--json")
+    (event,) = valid(status.json)["bridges"][0]["status"]["events"]
+    said = run("acknowledge", settings(bridge), event["event"], "--harmless", "--note", "a repair", "--json")
+    assert [one["what"] for one in valid(said.json)["bridges"][0]["transitions"]] == ["acknowledged"]
+    new = run("rebaseline", settings(bridge), "--since", str(records.index[DAMAGED]), "--now", now, "--json")
+    assert (new.code, "rebaseline" in [one["what"] for one in valid(new.json)["bridges"][0]["transitions"]]) == (
+        0,
+        True,
+    )
+    assert run("status", settings(bridge), "--now", now).code != ALARM
+    report = run("report", settings(bridge), "--now", now, "--report", bridge / "other.html", "--json")
+    assert valid(report.json)["bridges"][0]["written"] == [str(bridge / "other.html")]
+
+
+def test_status_by_the_clock_says_what_the_page_says(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 10)
+    assert run("update", settings(bridge), "--now", now).code == HEALTHY
+    assert run("status", settings(bridge), "--now", now).code == HEALTHY
+    late = run("status", settings(bridge), "--now", "2029-01-01", "--json")
+    assert (late.code, valid(late.json)["bridges"][0]["state"]) == (NOT_EVALUATED, "not evaluated")
+    early = run("status", settings(bridge), "--now", "2026-06-01")
+    assert (early.code, "state: not evaluated" in early.out) == (NOT_EVALUATED, True)
+    edit(settings(bridge), "# max_age = ...", 'max_age = "3650D"')
+    assert run("status", settings(bridge), "--now", "2029-01-01").code == HEALTHY
+
+
+@pytest.mark.parametrize("others", [0, 4])
+def test_with_records_of_a_time_to_come_nothing_is_healthy(bridge, records, others):
+    write_day(records, bridge, FIRST, FIRST + 10)
+    run("update", settings(bridge), "--now", str(records.index[FIRST + 9]))
+    new = records[FIRST + 10 : FIRST + 10 + others]
+    ahead = records[FIRST + 20 : FIRST + 21]
+    ahead = ahead.set_axis(ahead.index + pd.Timedelta("3653D"))
+    pd.concat([new, ahead]).to_csv(bridge / "new" / "b.csv", index_label="time")
+    done = run("update", settings(bridge), "--now", str(records.index[FIRST + 9 + others]))
+    assert (done.code, "state: not evaluated" in done.out, "state: healthy" in done.out) == (NOT_EVALUATED, True, False)
+
+
+def test_several_bridges_are_a_fleet(bridge, records, tmp_path):
+    second, third = (shutil.copytree(bridge, tmp_path / name) for name in ("second", "third"))
+    write_day(records, bridge, FIRST, FIRST + 40)  # its alarm is open
+    healthy = records[FIRST : DAMAGED - 1]
+    for one in (second, third):
+        healthy.to_csv(one / "new" / "a.csv", index_label="time")
+    files = [settings(one) for one in (bridge, second, third)]
+    now = str(records.index[DAMAGED - 2])
+    healthy_only = run("update", *files[1:], "--now", now, "--json")
+    assert (healthy_only.code, len(valid(healthy_only.json)["bridges"])) == (HEALTHY, 2)
+    page, metrics = tmp_path / "fleet.html", tmp_path / "m.prom"
+    now = str(records.index[FIRST + 39])
+    run("update", files[0], "--now", now)
+    done = run("status", *files, "--now", now, "--json", "--metrics", metrics, "--report", page)
+    assert done.code == ALARM
+    states = {one["name"]: one["state"] for one in valid(done.json)["bridges"]}
+    assert states == {"bridge": "alarm", "second": "not evaluated", "third": "not evaluated"}
+    assert {one["bridge"] for one in done.json["fleet"]["discoveries"]} == {"bridge"}
+    assert 'skthermo_state{bridge="bridge",state="alarm"} 1' in metrics.read_text()
+    (second / "monitor.joblib").write_bytes(b"")
+    edit(files[2], "[monitor]", "[monitr]")
+    failed = run("status", *files, "--now", now, "--json", "--metrics", metrics)
+    assert failed.code == ALARM  # which the errors of others do not hide
+    assert [len(one["errors"]) for one in valid(failed.json)["bridges"]] == [0, 1, 1]
+    assert 'skthermo_up{bridge="second"} 0' in metrics.read_text()
+    assert run("status", *files[1:], "--now", now).code == FAILED
+    run_twice = run("status", files[0], files[0], "--now", now)
+    assert (run_twice.code, "another name" in run_twice.err) == (FAILED, True)
+
+
+def test_bridges_in_one_file_of_metrics_and_each_in_its_own(bridge, records):
+    edit(settings(bridge), "# metrics = ...", 'metrics = "own.prom"')
+    now = write_day(records, bridge, FIRST, DAMAGED + 10)
+    run("update", settings(bridge), "--now", now, "--metrics", bridge / "given.prom")
+    own, given = ((bridge / f"{name}.prom").read_text() for name in ("own", "given"))
+    assert own == given or len(own) == len(given)  # written at different times
+    samples = dict(line.rsplit(" ", 1) for line in own.splitlines() if line[0] != "#")
+    monitor = load_monitor(bridge / "monitor.joblib")
+    assert float(samples['skthermo_threshold{bridge="bridge"}']) == pytest.approx(monitor.threshold_)
+    assert samples['skthermo_open_events{bridge="bridge",kind="damage"}'] == "1"
+    assert float(samples['skthermo_record_age_seconds{bridge="bridge"}']) == 0
+    newest = pd.Timestamp(now).to_pydatetime().timestamp()
+    assert float(samples['skthermo_newest_record_timestamp_seconds{bridge="bridge"}']) == newest
+    names = {line.split()[2] for line in own.splitlines() if line.startswith("# TYPE")}
+    assert all(any(sample.startswith(name) for name in names) for sample in samples)
+    metrics = (bridge / "own.prom").stat().st_mtime_ns
+    run("status", settings(bridge), "--now", now)
+    assert (bridge / "own.prom").stat().st_mtime_ns == metrics  # status writes only what it is asked for
+
+
+def test_what_is_done_is_logged(bridge, records, tmp_path):
+    now = write_day(records, bridge, FIRST, FIRST + 2)
+    done = run("update", settings(bridge), "--now", now, "--log", tmp_path / "log.txt")
+    assert done.err == ""
+    text = (tmp_path / "log.txt").read_text()
+    assert "skthermo.commands: update bridge: state healthy, exit code 0" in text
+    assert run("status", settings(bridge), "--log", tmp_path).code == FAILED  # no file
+
+
+def test_check_and_init_say_what_they_found(records, tmp_path):
+    stuck = records.copy()
+    stuck.iloc[300:340, 0] = 7.0
+    files = write_pair(stuck[:FIRST], tmp_path)
+    checked = run("check", *files, "--json")
+    assert (checked.code, valid(checked.json)["findings"][0]["what"]) == (1, "stuck sensor")
+    made = run("init", *files, "--into", tmp_path / "b", "--json")
+    assert (made.code, valid(made.json)["findings"]) == (0, checked.json["findings"])
+    assert "stuck" in (tmp_path / "b" / "monitor.toml").read_text()
+    again = run("init", *files, "--into", tmp_path / "b")
+    assert (again.code, "already" in again.err) == (FAILED, True)
+    write_pair(records[:FIRST], tmp_path)
+    assert run("check", *files).code == 0
+    missing = run("check", tmp_path / "no.csv", "--json")
+    assert (missing.code, len(valid(missing.json)["errors"])) == (FAILED, 1)
+
+
+def test_numbers_are_read_to_the_last_bit(bridge, records):
+    assert np.array_equal(load_monitor(bridge / "monitor.joblib").baseline_, records[:FIRST])
