@@ -157,7 +157,10 @@ class Interval(sklearn.utils._param_validation.Interval):
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN."""
+    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN.
+
+    With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
+    """
     return _as_numbers(partial(sklearn.utils.validation.validate_data, estimator), X, "X", options)
 
 
@@ -171,12 +174,14 @@ def _as_numbers(check: Callable[..., Any], values: Any, what: str, options: dict
     if options.get("ensure_2d", True):
         least = {"least_rows": options.get("ensure_min_samples", 1)}
         refuse_no_table(values, what, **least, least_columns=options.get("ensure_min_features", 1))
+    allow_infinite = options.pop("allow_infinite", False)
     try:
         array = check(with_nan(values), ensure_all_finite=False, **options)
     except TypeError as error:
         raise TypeError(f"{what} holds what is no number; expected numbers ({error})") from error
-    refuse_infinite(array, what, values)
-    refuse_huge(array, what)
+    if not allow_infinite:
+        refuse_infinite(array, what, values)
+        refuse_huge(array, what)
     return array
 
 

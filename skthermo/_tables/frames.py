@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, refuse_no_array, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, is_real, real_array, refuse_no_array
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
@@ -161,37 +161,6 @@ def warn_of_markers(X: ArrayLike) -> None:
             f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
             RecordsWarning,
             "markers",
-        )
-
-
-def warn_of_implausible(X: ArrayLike) -> None:
-    """Warn of values that are implausibly far from the median of their column."""
-    values = as_floats(X)
-    values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
-    if np.isnan(values).all(axis=0).any():
-        return
-    deviations = robust_deviation(values)
-    far = (np.abs(values - median(values)) > IMPLAUSIBLE * deviations) & (deviations > 0)
-    if far.any():
-        row, column = np.argwhere(far)[0]
-        warn_user(
-            f"{far.sum()} of {far.size} baseline values are implausibly far from the others of their column, the first "
-            f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
-            f"damage; expected NaN where a value is wrong (more than {IMPLAUSIBLE} robust deviations away)",
-            RecordsWarning,
-            "implausible values",
-        )
-
-
-def warn_of_disorder(X: Any) -> None:
-    """Warn of a frame whose stamps are not in order."""
-    row = first_disorder(X)
-    if row:
-        warn_user(
-            f"row {row} ({X.index[row]}) is earlier than the row before it: folds are periods of time only for rows in "
-            "order; expected X.sort_index()",
-            RecordsWarning,
-            "rows in disorder",
         )
 
 

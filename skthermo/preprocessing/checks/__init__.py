@@ -2,9 +2,18 @@
 
 from skthermo.preprocessing.checks._findings import check_records
 from skthermo.preprocessing.checks._gross import gross_errors
-from skthermo.preprocessing.checks._kinds import Finding
+from skthermo.preprocessing.checks._kinds import OF_TRAINING, Finding
 from skthermo.preprocessing.checks._plausible import Plausible
 from skthermo.preprocessing.checks._record_findings import RecordFindings
 from skthermo.preprocessing.checks._signs import equal_runs, residual_trend
 
-__all__ = ["Finding", "Plausible", "RecordFindings", "check_records", "equal_runs", "gross_errors", "residual_trend"]
+__all__ = [
+    "OF_TRAINING",
+    "Finding",
+    "Plausible",
+    "RecordFindings",
+    "check_records",
+    "equal_runs",
+    "gross_errors",
+    "residual_trend",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 import pandas as pd
@@ -83,15 +83,20 @@ class RecordFindings(SavesFrames):
             if kind not in UNWARNED:
                 yield RecordsWarning(WARNINGS[kind].format(_listed(rows["detail"])), kind)
 
-    def refuse_meaningless(self) -> None:
+    def refuse_meaningless(self, *, but: Collection[str] = ()) -> None:
         """Raise an error that lists everything with which results of a fit would be meaningless.
+
+        Parameters
+        ----------
+        but : collection of str, default=()
+            Kinds of findings that do no harm to what is done with the records.
 
         Raises
         ------
         ValueError
             If the severity of a finding is "meaningless".
         """
-        severe = self.table[self.table["severity"] == MEANINGLESS]
+        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(but))]
         if len(severe):
             kinds = severe.groupby("what", sort=False)
             texts = [WARNINGS[kind].format(_listed(rows["detail"])) for kind, rows in kinds]
