@@ -109,17 +109,11 @@ def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None
     return np.array(positions, dtype=np.intp)
 
 
-def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal."""
+def check_columns(X: ArrayLike, what: str) -> None:
+    """Raise an error for columns without a value."""
     for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
-        present = column[~np.isnan(column)]
-        if not present.size:
+        if np.isnan(column).all():
             raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
-        if varying and len(column) > 1 and np.ptp(present) == 0:
-            raise ValueError(
-                f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
-                "expected one that varies: leave it out"
-            )
 
 
 def check_temperatures(T: ArrayLike) -> None:

@@ -143,7 +143,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
         findings = gross_errors(frequencies=frame_like(X, F), unit="")
         findings.refuse_meaningless()
-        warn_each(warning for warning in findings.warnings() if warning.kind not in OF_ORDER)
+        warn_each(findings.warnings(but=OF_ORDER))
         records = self._records(X, F)
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)

@@ -450,8 +450,6 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         return self.spread_.log_volumes(weather, known, errors) - certain
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
-        if isinstance(self.estimator, type):
-            raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2, allow_infinite=True)
         check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))

@@ -3,7 +3,8 @@
     python -m tests.bad_input.counts [ROOM ...] [--every 1]
 
 ROOM, such as ``detection`` or ``monitoring.Monitor``, is what the names of the callables begin with; by default all are
-tried, which takes minutes. "legal" are values that are read by name after all.
+tried, which takes minutes. "legal" are values of which the answer is that of good ones: columns are read by name, or
+rows without their times.
 """
 
 import argparse

@@ -71,8 +71,13 @@ class RecordFindings(SavesFrames):
     def __repr__(self) -> str:
         return self.summary()
 
-    def warnings(self) -> Iterator[RecordsWarning]:
+    def warnings(self, *, but: Collection[str] = ()) -> Iterator[RecordsWarning]:
         """One warning for each kind of finding.
+
+        Parameters
+        ----------
+        but : collection of str, default=()
+            Kinds of findings of which there is no warning.
 
         Yields
         ------
@@ -80,7 +85,7 @@ class RecordFindings(SavesFrames):
             Its ``kind`` is what was found.
         """
         for kind, rows in self.table.groupby("what", sort=False):
-            if kind not in UNWARNED:
+            if kind not in UNWARNED.union(but):
                 yield RecordsWarning(WARNINGS[kind].format(_listed(rows["detail"])), kind)
 
     def refuse_meaningless(self, *, but: Collection[str] = ()) -> None:
