@@ -56,8 +56,8 @@ print(results.sort_values("found (%)", ascending=False).to_string(index=False))
 # %%
 # Is it true?
 # -----------
-# A third year judges the winner, with weather and noise that took no part. The optimism is what the search promised too
-# much.
+# A third year evaluates the winner, with weather and noise that took no part. The optimism is what the search predicted
+# too much.
 
 later, truth = true_year(seed=2, damages=[one.damage for one in scenarios])
 table = task.confirm({"tuned": search, "before": before}, later, random_state=0)
@@ -65,7 +65,7 @@ shown = ["tuned", "fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "false_a
 print((100 * table[shown]).round(1).to_string())
 
 # %%
-# The true records of that year, which no real bridge would have, judge all settings:
+# The true records of that year, which no real bridge would have, evaluate all settings:
 
 fitted = [clone(before).set_params(**setting).fit(task.baseline) for setting in search.cv_results_["params"]]
 true = [100 * true_score(one, later, truth)[0] for one in fitted]

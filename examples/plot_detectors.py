@@ -3,8 +3,8 @@ Detectors of the field, ranked by simulation
 ============================================
 
 Which detector suits a bridge? The literature has many: some see frequencies only, others temperatures beside them. A
-chain that has learned the bridge simulates the damage that is feared, and each detector judges the same records. Here
-the truth is known: the 28-bar truss, whose thermo-mechanical law gives true records beside the simulated ones.
+chain that has learned the bridge simulates the damage that is feared, and each detector evaluates the same records.
+Here the truth is known: the 28-bar truss, whose thermo-mechanical law gives true records beside the simulated ones.
 
 Run it with ``python examples/plot_detectors.py``. It needs :download:`detector_recipes.py` and
 :download:`page_recipes.py` beside it, and statsmodels for cointegration.
@@ -43,8 +43,8 @@ detectors = {name: one for name, one in field_detectors(list(year.frequencies)).
 print(f"{len(detectors)} detectors:", *detectors, sep="\n")
 
 # %%
-# One simulation, judged by all
-# -----------------------------
+# One simulation, evaluated by all
+# --------------------------------
 # A :class:`~skthermo.studies.DetectabilityStudy` simulates each scenario once in every repeat. ``reference`` gives it
 # true records, which a real bridge does not have.
 

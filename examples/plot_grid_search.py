@@ -142,8 +142,8 @@ print(next(str(one.message) for one in caught if "is searched" in str(one.messag
 # ``memory`` keeps them, so that the search solves the FE model's Monte Carlo once and inverts the records of each fold
 # once.
 #
-# ``frequency_scorer`` gives the error of the predicted frequencies and the share of rows that it could judge. Folds are
-# contiguous: each is a stretch of weather that the model has not seen.
+# ``frequency_scorer`` gives the error of the predicted frequencies and the share of rows that it could evaluate. Folds
+# are contiguous: each is a stretch of weather that the model has not seen.
 
 grid = {"mapper__lagfeatures__lags": [1, 24], "mapper__temperaturemapper__regressor__alpha": [0.5, 50.0]}
 if options.full:
@@ -168,28 +168,28 @@ print(f"{made['simulations']} Monte Carlo of the FE model, {made['inversion']} i
 # ----------------------------------------
 # Neighbouring hours share 23 of their 24 lagged values and almost the same drift. With random folds, every tested hour
 # has such neighbours among the training rows, and a model that is flexible enough memorises the hour instead of
-# learning the effect of temperature. Here extremely randomised trees, which can memorise, are judged by both kinds of
-# folds.
+# learning the effect of temperature. Here extremely randomised trees, which can memorise, are evaluated by both kinds
+# of folds.
 
 folds = {"contiguous folds": contiguous, "random folds": KFold(4, shuffle=True, random_state=0)}
 lags = [1, 6, 24] if options.full else [1, 24]
-promised = pd.DataFrame(index=pd.Index(lags, name="lags"), columns=list(folds), dtype=float)
+expected = pd.DataFrame(index=pd.Index(lags, name="lags"), columns=list(folds), dtype=float)
 for n in lags:
     trees = chain(ExtraTreesRegressor(50, min_samples_leaf=2)).set_params(mapper__lagfeatures__lags=n)
     for name, cv in folds.items():
         scores = cross_validate(trees, T, F, cv=cv, scoring=frequency_scorer)
-        promised.loc[n, name] = -scores["test_neg_mape"].mean()
+        expected.loc[n, name] = -scores["test_neg_mape"].mean()
 memory.cleanup()
-print(promised.round(3))
+print(expected.round(3))
 
 fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
 for name, marker in zip(folds, "os", strict=True):
-    ax.plot(promised[name], marker=marker, label=name)
+    ax.plot(expected[name], marker=marker, label=name)
 ax.set(xlabel="lags (hours, the current one included)", ylabel="MAPE of frequencies (%)", xticks=lags)
 ax.legend()
 
 # %%
-# Random folds promise less error. Only contiguous folds test the model on weather that it has not seen, which is its
+# Random folds predict less error. Only contiguous folds test the model on weather that it has not seen, which is its
 # purpose. :doc:`/guide/validation` says more.
 
 save_figures(options.figures)

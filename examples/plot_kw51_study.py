@@ -11,7 +11,7 @@ Run it with ``python examples/plot_kw51_study.py``, or on the measurements with
 ``python examples/plot_kw51_study.py trackedmodes.zip`` (doi 10.5281/zenodo.3745914). With ``--full --jobs 2``, which
 takes three to four minutes on two cores, a last table shows what each of the paper's choices costs. The page needs
 :download:`kw51_recipes.py` (records and chains), :download:`kw51_tables_recipes.py` and :download:`page_recipes.py`
-beside it. The guide is :doc:`/guide/kw51`.
+beside it. The guide is :doc:`/accuracy_kw51`.
 """
 
 # sphinx_gallery_thumbnail_number = 7
@@ -216,7 +216,7 @@ show(table_of_gaps_in_detection(best))
 
 # %%
 # What does each of the paper's choices cost? Here are the first and the best chain; ``--full`` shows the steps between,
-# which :doc:`/guide/kw51` discusses.
+# which :doc:`/accuracy_kw51` discusses.
 
 show(table_of_choices(records, fits, options.jobs).T)
 

@@ -28,7 +28,7 @@ options = command_line().parse_args()
 # Before the works
 # ----------------
 # Every fourth hour is enough here. The baseline has seen winter and spring, and the monitor says so: nothing is
-# promised for the summer. One hard frost stands out, and raises the threshold.
+# asked for in the summer. One hard frost stands out, and raises the threshold.
 
 campaign = make_kw51_campaign(random_state=0)
 modes = list(campaign.frequencies)
@@ -59,8 +59,8 @@ print(monitor.rebaseline(works_end).summary())
 
 # %%
 # A month later, a refit would add the new records. It says whether that is a gain; here it is none, because the hard
-# frost then raises the threshold, and the detector of the new baseline judges on. No record of the strengthened bridge
-# is in alarm until January.
+# frost then raises the threshold, and the detector of the new baseline stays in charge. No record of the strengthened
+# bridge is in alarm until January.
 
 month = works_end + pd.Timedelta(days=30)
 monitor.update(after[(after.index >= soon) & (after.index < month)])

@@ -9,8 +9,8 @@ boosting. The small network is M1's default, and piecewise-linear regression is 
 
 Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
 its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
-minutes, and :doc:`/guide/regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the file
-that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
+minutes, and :doc:`/accuracy_regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the
+file that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
 :download:`page_recipes.py` beside it.
 """
 
@@ -146,6 +146,6 @@ ax.set(xlabel=label, ylabel=f"$f_{mode + 1}$ (Hz)")
 ax.legend(ncols=2)
 
 # %%
-# :doc:`/guide/regressors` says which regressor to choose, with means of five seeds.
+# :doc:`/accuracy_regressors` says which regressor to choose, with means of five seeds.
 
 save_figures(options.figures)

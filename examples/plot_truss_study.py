@@ -96,7 +96,7 @@ PredictionDisplay.from_predictions(true, simulated, labels=labels, kind="lines",
 # --------------
 # The detector of the paper, :class:`~skthermo.detection.MahalanobisDetector`, learns the healthy year. A
 # :class:`~skthermo.studies.DetectabilityStudy` then simulates a later year with damage of three groups of members, in
-# steps of 10 %. The truth is known here, and is judged beside the simulations.
+# steps of 10 %. The truth is known here, and is evaluated beside the simulations.
 
 later = make_truss_campaign(noise=NOISE, random_state=3)
 
@@ -144,20 +144,20 @@ for ax, group in zip(axes, GROUPS, strict=True):
 # %%
 # Which detector?
 # ---------------
-# All detectors judge the same simulated records: some see frequencies only, others remove the effect of temperature by
-# a regression before. On a real structure there are no damaged records to choose by. Here the true ones are judged, too
-# (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
+# All detectors evaluate the same simulated records: some see frequencies only, others remove the effect of temperature
+# by a regression before. On a real structure there are no damaged records to choose by. Here the true ones are
+# evaluated, too (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
 
 several = field_detectors(list(year.frequencies))
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "piecewise-linear"]
 tenth = [{}, *({group: 0.1} for group in GROUPS)]
-bench = DetectabilityStudy(
+comparison = DetectabilityStudy(
     fem, {name: several[name] for name in chosen}, tenth, n_repeats=10, random_state=0, uncertainty="noise"
 )
-bench.run(later.temperatures, reference=true_records)
-print(bench.ranking()[["false_alarms", "pod", "pod_deficit", "significantly_worse"]].round(2).to_string())
-print(bench.summary())
-display = DetectorsDisplay.from_estimator(bench, "agreement")
+comparison.run(later.temperatures, reference=true_records)
+print(comparison.ranking()[["false_alarms", "pod", "pod_deficit", "significantly_worse"]].round(2).to_string())
+print(comparison.summary())
+display = DetectorsDisplay.from_estimator(comparison, "agreement")
 
 # %%
 # False alarms are the exception. All detectors were set to 2 %, and in truth they are off by what their one baseline

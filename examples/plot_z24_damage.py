@@ -5,7 +5,8 @@ Z24: where the damage is
 :doc:`plot_z24_detection` finds the damage that was done to the Z24 bridge. Here the detector looks at parameters of an
 FE model in place of frequencies, and the parameter that changes says where. Then the damage that explains the shift of
 all four modes is identified, with its uncertainty, and put into the FE model: for 22 detectors, the rates of alarms
-that a simulation promises stand beside the measured ones. At last, simulation chooses a detector before any damage.
+that a simulation predicts are compared with the measured ones. At last, simulation chooses a detector before any
+damage.
 
 .. note::
 
@@ -169,12 +170,12 @@ IdentifiedDamageDisplay.from_predictions(found)
 #    :alt: Explanations with their probabilities, 49 % for three groups and 25 % for the soil and something else;
 #          average severities of five groups with 90 % bands, that of the soil the largest; shifts of four modes
 #
-# Would a simulation have told the same?
-# --------------------------------------
+# Simulated rates beside measured ones
+# ------------------------------------
 # The identified damage, drawn with its uncertainty, is put into the FE model, which simulates the weather of the test
 # and of the last month with noise like that of the records. The detectors of :doc:`plot_z24_detection` learn the
-# measured baseline and judge them. Rates of alarms in percent, measured, and the mean and the band that holds 95 % of
-# 40 simulated campaigns:
+# measured baseline and evaluate them. Rates of alarms in percent, measured, and the mean and the band that holds 95 %
+# of 40 simulated campaigns:
 
 memory = tempfile.TemporaryDirectory()  # what compensators learn is kept there from one study to the next
 candidates = detectors(memory.name)
@@ -235,8 +236,8 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 # 0.943 with 120 campaigns; this one gives 0.948 with 40 and with 120. So the lower number here is no more than scatter
 # of the simulation.
 #
-# A promise before the damage
-# ---------------------------
+# A prediction before the damage
+# ------------------------------
 # The same with nothing that came later: a chain that has learned the baseline alone, and a damage that one might have
 # assumed of a pier that is to be lowered, a loss of 18 % in the soil below it. The weather is still that of the test
 # and of the last month. Since the severity is fixed, only noise is in the band.
@@ -277,18 +278,19 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 #    false alarms             0.884        0.500       22.0
 #    damage found             0.861        0.136       22.0
 #
-# Who finds much and who finds little is still told, but the order is not as good. Only 3 of 22 rates of found damage
-# lie in these narrow bands, and 11 of 22 of false alarms. The order suffers from the chain, not from the damage: the
-# baseline's pavement is never warmer than 15 °C, and the damaged month has 18 to 41 °C. There this chain expects the
-# first, third and fourth frequency 0.8 to 1.2 % lower than that of all healthy records does, and detectors take its
-# error for damage. With the chain of all healthy records, the same assumed damage gives a rank correlation of 0.98, and
-# all false alarms lie in their bands; of found damage still only 5 of 22 rates do, since the bands hold noise alone.
+# Detectors that find much still come before those that find little, but the order is not as good. Only 3 of 22 rates of
+# found damage lie in these narrow bands, and 11 of 22 of false alarms. The order suffers from the chain, not from the
+# damage: the baseline's pavement is never warmer than 15 °C, and the damaged month has 18 to 41 °C. There this chain
+# expects the first, third and fourth frequency 0.8 to 1.2 % lower than that of all healthy records does, and detectors
+# take its error for damage. With the chain of all healthy records, the same assumed damage gives a rank correlation of
+# 0.98, and all false alarms lie in their bands; of found damage still only 5 of 22 rates do, since the bands hold noise
+# alone.
 # :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` warns of such weather.
 #
 # Which detector would simulation have chosen?
 # --------------------------------------------
 # An engineer before the damage knows neither its place nor the weather to come. So every group of the model loses 10 to
-# 50 %. Detectors learn the first three quarters of the baseline, and judge simulated records in the weather of the
+# 50 %. Detectors learn the first three quarters of the baseline, and evaluate simulated records in the weather of the
 # last, which is ahead of them. They are ranked by the mean probability of detection (POD), those first that keep the
 # limit of 2 % false alarms. The last column moves all thresholds to 2 %.
 
@@ -335,8 +337,8 @@ memory.cleanup()
 #
 # The local outlier factor finds most, but raises 4.1 % false alarms and is out. Had the weather been the one that the
 # detectors have learned (``choose(bridge, candidates, ahead=False)``), it would have kept the limit and been chosen: it
-# raises 17 % in spring. Judge detectors in weather that is ahead of their baseline. (We came to that after the weather
-# of the baseline had chosen so badly.)
+# raises 17 % in spring. Evaluate detectors in weather that is ahead of their baseline. (We came to that after the
+# weather of the baseline had chosen so badly.)
 #
 # :doc:`/guide/studies` plans such a study for your own bridge.
 

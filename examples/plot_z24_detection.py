@@ -59,19 +59,19 @@ for expected in (
 ):
     warnings.filterwarnings("ignore", expected)
 records = Records.of(bridge)
-print(f"Baseline: {len(records.baseline)} healthy records. Judged: {len(records.later)} later healthy ones and the")
+print(f"Baseline: {len(records.baseline)} healthy records. Evaluated: {len(records.later)} later healthy ones and the")
 print(f"{len(records.damaged)} after damage began. Every detector is asked for 2 % false alarms.")
 
 # %%
 # .. code-block:: none
 #
-#    Baseline: 2240 healthy records. Judged: 560 later healthy ones and the
+#    Baseline: 2240 healthy records. Evaluated: 560 later healthy ones and the
 #    130 after damage began. Every detector is asked for 2 % false alarms.
 #
 # The field's detectors
 # ---------------------
 # "Raw" ones see frequencies only. For the others, a :class:`~skthermo.detection.TemperatureCompensator` explains the
-# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance judges what is left, the
+# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates what is left, the
 # residuals; "whitened", residuals are divided by their spread in similar weather. Each threshold comes from the
 # baseline by one rule: its records are scored by what was learned without them and without their neighbours in time.
 # (:doc:`plot_detectors` explains each detector.) The last two columns count as others do: another publication takes the
@@ -241,8 +241,8 @@ print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 #
 # A day's records together
 # ------------------------
-# A :class:`~skthermo.detection.WindowedAlarm` judges the records of a day together, and a day by its last window. For
-# comparison, one of the compensators has learned forward in time, from the past alone.
+# A :class:`~skthermo.detection.WindowedAlarm` evaluates the records of a day together, and a day by its last window.
+# For comparison, one of the compensators has learned forward in time, from the past alone.
 
 forward = compensate(records, TemperatureMapper(), "local", TimeSeriesSplit(5))[0]
 seen = {name: inputs[name, WHITENED] for name in ("piecewise-linear", "boosted trees")}
@@ -351,7 +351,7 @@ print(pd.DataFrame(rows).round(1).to_string())
 #    beyond known weather       36.4       48.2       34.5       65.7
 #    far beyond                  3.2        6.6        0.5       46.2
 #
-# :doc:`plot_z24_damage` asks where the damage is, and whether simulation alone would have told the same of all these
-# detectors; :doc:`/guide/detection` explains them.
+# :doc:`plot_z24_damage` asks where the damage is, and whether simulation alone would have given the same rates of all
+# these detectors; :doc:`/guide/detection` explains them.
 
 save_figures(folder)

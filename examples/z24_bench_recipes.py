@@ -106,8 +106,9 @@ def agreement(table):
 def choose(bridge, candidates=None, n_repeats=10, ahead=True):
     """A study of all damage groups, from training rows and simulation alone, to choose a detector by.
 
-    The chain has learned all training rows. Detectors learn the first three quarters of them, and judge the weather of
-    the last, which is ahead of them as it will be in service; or they learn all, and judge every fourth row's weather.
+    The chain has learned all training rows. Detectors learn the first three quarters of them, and evaluate the weather
+    of the last, which is ahead of them as it will be in service; or they learn all, and evaluate every fourth row's
+    weather.
     """
     T, F = bridge.split()[:2]
     n = 3 * len(T) // 4 if ahead else len(T)

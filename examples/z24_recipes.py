@@ -106,7 +106,7 @@ def hold_out_table(bridge, kinds=((True, 0.3), (True, 0.5), (False, 0.3), (False
 
 
 class Records(NamedTuple):
-    """What a detector learns from, and the healthy and the damaged records that it judges."""
+    """What a detector learns from, and the healthy and the damaged records that it evaluates."""
 
     baseline: pd.DataFrame
     later: pd.DataFrame
@@ -123,7 +123,7 @@ class Records(NamedTuple):
         return self.damaged.index[0]
 
     def stream(self):
-        """All records that are judged, in order of time."""
+        """All records that are evaluated, in order of time."""
         return pd.concat([self.later, self.damaged])
 
     @classmethod

@@ -14,7 +14,7 @@ RNG = np.random.default_rng(0)
 
 
 def read_all(path):
-    return read_named_matrices(path, lambda name: True)
+    return read_named_matrices(path, lambda name: True).matrices
 
 
 def test_matrix_market_is_mirrored_as_scipy_does(tmp_path):
@@ -89,5 +89,5 @@ def test_entries_outside_a_sparse_npz_are_refused(tmp_path, in_process):
         else:
             matrix.indices[0] = 9
         scipy.sparse.save_npz(tmp_path / "E_2.npz", matrix)
-        with pytest.raises(ValueError, match=r"E_2\.npz: not readable as a sparse matrix"):
+        with pytest.raises(ValueError, match=r"E_2\.npz: not readable as \.npz"):
             read_all(tmp_path)

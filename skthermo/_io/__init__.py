@@ -1,10 +1,11 @@
 """Files that may be damaged or shared: MATLAB, Matrix Market and NumPy files, text; locks; a progress bar."""
 
-from skthermo._io._matrix_files import read_half, read_matlab, read_named_matrices
+from skthermo._io._matrix_files import MASS, read_half, read_matlab, read_named_matrices
 from skthermo._io._progress import as_they_come, bars_of, run_jobs, with_progress, without_bars
 from skthermo._io._shared_files import alone_with, lock, write_when_complete
 
 __all__ = [
+    "MASS",
     "alone_with",
     "as_they_come",
     "bars_of",

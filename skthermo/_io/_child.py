@@ -21,16 +21,24 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
+from skthermo._io._text_matrices import (
+    BYTES_FOR_EACH_ROW,
+    numbers_of,
+    read_dmig,
+    read_dofs,
+    read_entries,
+    read_harwell_boeing,
+    read_op4,
+)
+
 Bytes = bytes | memoryview
 
 HEADER = 128  # bytes of a MATLAB file
 MATRIX, COMPRESSED = 14, 15  # types of its elements
 CELL, STRUCT, CHARACTERS, SPARSE, NUMERIC, OPAQUE = 1, 2, 4, 5, range(6, 16), 17  # classes of its variables
 COMPLEX_FLAG = 0x0800
-BYTES_FOR_EACH_ROW = 100  # that checks of a sparse matrix take, its entries apart
 SIZE_LINE = re.compile(rb"(?:[ \t\r]*(?:%.*)?\n)*.*(?:\n|\Z)")
 COMMENTS = re.compile(rb"^[ \t]*%.*$", re.MULTILINE)
-HEADING = re.compile(rb"\A(?:[ \t]*(?![ \t\d]).*(?:\n|\Z))*")
 
 
 def read_matlab(content: bytes) -> dict[str, Any]:
@@ -157,22 +165,14 @@ def read_npz(content: bytes) -> dict[str, Any]:
     return arrays
 
 
-def read_sparse_npz(content: bytes) -> Any:
-    """A sparse matrix of `scipy.sparse.save_npz`."""
-    read_npz(content)
-    return _numbers(scipy.sparse.load_npz(io.BytesIO(content)))
-
-
-def read_half(content: bytes) -> Any:
-    """A symmetric matrix from lines of row, column and value, below a heading whose lines do not start with a digit."""
-    text = HEADING.sub(b"", content, count=1)
-    n_lines = sum(bool(line.strip()) for line in text.splitlines())
-    numbers = _numbers_of_text(text)
-    if numbers.size != 3 * n_lines or not n_lines:
-        raise ValueError(f"{numbers.size} numbers in {n_lines} lines; expected three in each")
-    size = int(numbers.reshape(n_lines, 3)[:, :2].max())
-    head = f"%%MatrixMarket matrix coordinate real symmetric\n{size} {size} {n_lines}\n"
-    return read_matrix_market(head.encode() + text)
+def read_zip(content: bytes) -> Any:
+    """A sparse matrix of `scipy.sparse.save_npz`, arrays of NumPy by name, or the variables of a MATLAB file."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        names = archive.namelist()
+    if any(name.lower().endswith(".mat") for name in names):
+        return read_matlab(content)
+    arrays = read_npz(content)
+    return _numbers(scipy.sparse.load_npz(io.BytesIO(content))) if {"format.npy", "shape.npy"} <= {*names} else arrays
 
 
 def read_matrix_market(content: bytes) -> Any:
@@ -182,7 +182,7 @@ def read_matrix_market(content: bytes) -> Any:
         raise ValueError(f"{n_rows} x {n_columns}, {field}, {symmetry}; expected numbers, and a square if symmetric")
     start = SIZE_LINE.match(content).end()  # type: ignore[union-attr]
     body = COMMENTS.sub(b"", content[start:])
-    numbers = _numbers_of_text(body)
+    numbers = numbers_of(body)
     width = (3 if layout == "coordinate" else 1) + (field == "complex")
     if layout == "array" and symmetry != "general":
         n_entries = n_rows * (n_rows - 1) // 2 + (0 if symmetry == "skew-symmetric" else n_rows)
@@ -199,25 +199,15 @@ def read_matrix_market(content: bytes) -> Any:
     return _numbers(scipy.io.mmread(io.BytesIO(content[:start] + body)))
 
 
-def _numbers_of_text(text: bytes) -> np.ndarray:
-    """All numbers of a text in a row."""
-    try:
-        return np.fromstring(text, sep=" ") if text.strip() else np.empty(0)
-    except (DeprecationWarning, ValueError):
-        for word in text.split():
-            try:
-                float(word)
-            except ValueError:
-                raise ValueError(f"{word[:30].decode('latin-1')!r} is not a number") from None
-        raise
-
-
 READERS = {
     "MATLAB v5": read_matlab,
-    ".npz": read_npz,
-    "a sparse matrix of scipy.sparse.save_npz": read_sparse_npz,
+    ".npz": read_zip,
     "Matrix Market": read_matrix_market,
-    "lines of row, column and value": read_half,
+    "Harwell-Boeing": read_harwell_boeing,
+    "Nastran's DMIG": read_dmig,
+    "Nastran's OUTPUT4": read_op4,
+    "lines of entries": read_entries,
+    "labels of rows": read_dofs,
 }
 
 

@@ -12,13 +12,14 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
 
 from skthermo._io._child import read
-from skthermo._tables.arrays import Matrix
+from skthermo._io._text_matrices import Labelled
+from skthermo._tables.arrays import Label, Matrix
 
 CHILD = Path(__file__).with_name("_child.py")
 LEAST_MEMORY = 256_000_000
@@ -39,7 +40,10 @@ def read_matlab(file: Path) -> dict[str, Any]:
 
 def read_half(file: Path) -> Any:
     """A symmetric matrix from lines of row, column and value for each entry of a half."""
-    return read_files([(file, "lines of row, column and value")])[0]
+    matrix = read_files([(file, "lines of entries")])[0]
+    if isinstance(matrix, Labelled):
+        raise ValueError(f"{file} holds labels of nodes; expected row, column and value in each line, or load_affine")
+    return matrix
 
 
 def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
@@ -83,48 +87,172 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
     return f"ended the process with exit code {done.returncode} {done.stderr[-300:].decode(errors='replace')}".strip()
 
 
-HALVES = dict.fromkeys((".sti", ".mas", ".txk", ".txm"), "lines of row, column and value")
-FORMS = {".mtx": "Matrix Market", ".npz": "a sparse matrix of scipy.sparse.save_npz"} | HALVES
-FORMATS = f"a MATLAB v5 file (.mat), a NumPy file (.npz) or a folder of files {', '.join(FORMS)}"
+BEGINNING = 65536  # bytes by which a form is recognised
+NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd]?[+-]\d+|[EeDd]\d+)?"
+ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + NUMBER
+FORMS = {
+    "MATLAB v5": rb".{124}(?:\x00\x01IM|\x01\x00MI)|\x89HDF",
+    ".npz": rb"PK",
+    "Matrix Market": rb"%|(?i:[^\n]*MatrixMarket)",
+    "Harwell-Boeing": rb"[^\n]*\n(?:[ \t]*\d+){4,5}[ \t]*\n(?i:[A-Z]{3})(?:[ \t]+\d+){4}[^\n]*\n[^\n]*\(",
+    "Nastran's DMIG": rb"(?i:(?:.*\n)?DMIG[ *,])",
+    "Nastran's OUTPUT4": rb"[ \d-]{32}[A-Z][\w ]{7} *(?:1P,)?\d+[ED]\d+",
+    "labels of rows": rb"\s*Matrix Eqn|(?:\s*\d+\.\d\s)+\s*(?:\d+(?:\.\d?)?)?\Z",
+    "lines of entries": rb"(?:[ \t]*(?![ \t\d+\-.])[^\n]*\n)*[ \t]*" + ENTRIES + rb"[ \t]*(?:\n|\Z)",
+}
+"""How files of each of the child's ``READERS`` begin."""
+
+KINDS = {".sti": "stiffness", ".stif": "stiffness", ".stiff": "stiffness", ".txk": "stiffness"} | dict.fromkeys(
+    (".mas", ".mass", ".txm"), "mass"
+)
+SUFFIXES = (
+    {".mat": "MATLAB v5", ".npz": ".npz", ".mtx": "lines of entries", ".op4": "Nastran's OUTPUT4"}
+    | dict.fromkeys((".pch", ".dmig"), "Nastran's DMIG")
+    | dict.fromkeys((".hb", ".rb", ".rsa", ".rua", ".matrix"), "Harwell-Boeing")
+    | dict.fromkeys((".dof", ".mapping"), "labels of rows")
+    | dict.fromkeys(KINDS, "lines of entries")
+)
+"""What a file is expected to be, if it does not begin as any form does."""
+
+FORMATS = (
+    "a file of MATLAB v5, NumPy (.npz), Matrix Market, Abaqus (.mtx), CalculiX, SAP2000, Harwell-Boeing (ANSYS) or "
+    "Nastran (DMIG, OUTPUT4), or a folder of such files"
+)
+ABAQUS = re.compile(r"(?P<name>.+)_(?P<kind>STIF|MASS|DMP[VS]|LOAD)\d*", re.IGNORECASE)
+MASS = " (mass)"  # after the name of an export whose stiffness has that name
+HELD = 1e36  # what Abaqus puts on the diagonal where a degree of freedom is held
 
 
-def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
-    """Matrices by name, in the file's order; None for what is not a matrix of numbers.
+class NamedMatrices(NamedTuple):
+    """Matrices by name, None for what is not one of numbers, and the labels of their rows, if there are such."""
 
-    Values may be complex or not finite. Of a folder, only files whose stem is used are read, the others are None.
+    matrices: dict[str, Matrix | None]
+    dofs: tuple[Label, ...]
+
+
+def form_of(file: Path) -> str | None:
+    """The form of a file's content or, if it begins as none does, of its name; None if both are unknown."""
+    with open(file, "rb") as stream:
+        beginning = stream.read(BEGINNING)
+    text = beginning.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    both = {beginning, text}
+    found = (form for form, pattern in FORMS.items() if any(re.match(pattern, one, re.DOTALL) for one in both))
+    return next(found, SUFFIXES.get(file.suffix.lower()))
+
+
+def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
+    """Matrices by name, in the file's order.
+
+    Values may be complex or not finite. Of a folder, only files whose name is used are read, the others are None.
     """
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected {FORMATS}")
     if path.is_dir():
         return _read_folder(path, is_used)
-    if path.suffix.lower() not in (".mat", ".npz"):
+    form = form_of(path) if path.is_file() else None
+    if form is None or form == "labels of rows":
         raise ValueError(f"{path} is none of these: {FORMATS}")
-    values = read_matlab(path) if path.suffix.lower() == ".mat" else read_files([(path, ".npz")])[0]
-    return {name: value if _is_matrix(value) else None for name, value in values.items()}
+    content = read_files([(path, form)])[0]
+    return _joined(content if isinstance(content, dict) else {path.stem: content}, path)
+
+
+def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
+    """The matrices of each file, named after it, in the order of these names, E_2 before E_10."""
+    forms = {file: form for file in folder.iterdir() if file.is_file() and (form := form_of(file))}
+    files = sorted(forms, key=lambda file: [int(s) if s.isdecimal() else s for s in re.split(r"(\d+)", file.name)])
+    exports = {file: _export_of(file) for file in files if forms[file] != "labels of rows"}
+    stiff = {name for name, kind in exports.values() if kind == "stiffness"}
+    named: dict[str, Path] = {}
+    for file, (name, kind) in exports.items():
+        key = name + MASS if kind == "mass" and name in stiff else name
+        if kind == "other":
+            continue
+        if key in named and is_used(key):
+            both = f"{named[key].suffix.lower()} and as {file.suffix.lower()}"
+            raise ValueError(f"{folder} holds {key!r} as {both}; expected one of them, or another name for one")
+        named[key] = file
+    if not named:
+        raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
+    of_rows = [file for file in files if forms[file] == "labels of rows"]
+    used = [name for name in named if is_used(name)]
+    contents = read_files([(file, forms[file]) for file in (*(named[name] for name in used), *of_rows)])
+    labels = {file.stem: rows for file, rows in zip(of_rows, contents[len(used) :], strict=True)}
+    matrices: dict[str, Any] = dict.fromkeys(named)
+    for name, content in zip(used, contents[: len(used)], strict=True):
+        if isinstance(content, dict) and len(named) == 1:
+            return _joined(content, folder)
+        matrices |= _parts(name, content, named[name]) if isinstance(content, dict) else {name: content}
+    unsized = [m for name, m in matrices.items() if name in used and _is_unsized(forms[named[name]], m)]
+    for matrix in unsized:  # the last rows of a mass may be zero
+        matrix.resize([max(one.shape[0] for one in unsized)] * 2)
+    for name, matrix in matrices.items():
+        rows = labels.get(name.removesuffix(MASS), next(iter(labels.values())) if len(labels) == 1 else None)
+        if rows is not None and scipy.sparse.issparse(matrix) and matrix.shape == (len(rows), len(rows)):
+            matrices[name] = Labelled(matrix, rows)
+    return _joined(matrices, folder)
+
+
+def _export_of(file: Path) -> tuple[str, str | None]:
+    """Name of an export, and whether a file is its stiffness, its mass or something else, where its name says so."""
+    if found := ABAQUS.fullmatch(file.stem):
+        return found["name"], {"STIF": "stiffness", "MASS": "mass"}.get(found["kind"].upper(), "other")
+    return file.stem, KINDS.get(file.suffix.lower())
+
+
+def _parts(name: str, content: dict[str, Any], file: Path) -> dict[str, Any]:
+    """The stiffness of a file of several matrices, which has its name, and the mass."""
+    square = {key: one for key, one in content.items() if _is_square(one)}
+    if len(square) == 1:
+        return {name: next(iter(square.values()))}
+    by_letter = {letter: [key for key in square if key.lower().startswith(letter)] for letter in "km"}
+    if len(by_letter["k"]) != 1 or len(by_letter["m"]) > 1:
+        raise ValueError(f"{file} holds {list(content)}; expected one stiffness K... and at most one mass M...")
+    masses = {name + MASS: square[by_letter["m"][0]]} if by_letter["m"] else {}
+    return {name: square[by_letter["k"][0]]} | masses
+
+
+def _is_square(value: object) -> bool:
+    matrix: Any = value.matrix if isinstance(value, Labelled) else value
+    return _is_matrix(matrix) and matrix.shape[0] == matrix.shape[1]
+
+
+def _is_unsized(form: str, matrix: object) -> bool:
+    return form == "lines of entries" and not isinstance(matrix, Labelled)
 
 
 def _is_matrix(value: object) -> bool:
     return scipy.sparse.issparse(value) or (isinstance(value, np.ndarray) and value.ndim == 2)
 
 
-def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> dict[str, Matrix | None]:
-    """One matrix for each file, in the order of their names, E_2 before E_10.
-
-    Files that state no size are taken to be of the largest of their sizes: the last rows of a mass may be zero.
-    """
-    found = [file for file in folder.iterdir() if file.suffix.lower() in FORMS]
-    files = sorted(found, key=lambda file: [int(s) if s.isdecimal() else s for s in re.split(r"(\d+)", file.name)])
-    if not files:
-        raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
-    used: dict[str, Path] = {}
-    for file in filter(lambda file: is_used(file.stem), files):
-        if file.stem in used:
-            both = f"{used[file.stem].suffix.lower()} and as {file.suffix.lower()}"
-            raise ValueError(f"{folder} holds {file.stem!r} as {both}; expected one of them, or another name for one")
-        used[file.stem] = file
-    read = read_files([(file, FORMS[file.suffix.lower()]) for file in used.values()]) if used else []
-    matrices = dict.fromkeys(file.stem for file in files) | dict(zip(used, read, strict=True))
-    halves: list[Any] = [matrices[name] for name, file in used.items() if file.suffix.lower() in HALVES]
-    for half in halves:
-        half.resize([max(matrix.shape[0] for matrix in halves)] * 2)
-    return matrices
+def _joined(named: dict[str, Any], path: Path) -> NamedMatrices:
+    """Matrices on the union of their labels, if they have such, and without degrees of freedom that are held."""
+    dofs: tuple[Label, ...] = ()
+    labelled = {name: one for name, one in named.items() if isinstance(one, Labelled)}
+    if labelled:
+        plain = [name for name, one in named.items() if name not in labelled and _is_square(one)]
+        if plain:
+            raise ValueError(
+                f"{path}: the rows of {next(iter(labelled))!r} have labels of nodes, and those of {plain[0]!r} have "
+                "none; expected labels for all or none"
+            )
+        labels = {
+            name: [tuple(dof) for dof in np.asarray(one.dofs, dtype=object).tolist()] for name, one in labelled.items()
+        }
+        dofs = tuple(dict.fromkeys(dof for rows in labels.values() for dof in rows))
+        if all(isinstance(part, int) for dof in dofs for part in dof):
+            dofs = tuple(sorted(dofs))
+        places = {dof: i for i, dof in enumerate(dofs)}
+        for name, one in labelled.items():
+            at = np.array([places[dof] for dof in labels[name]])
+            entries = one.matrix.tocoo()
+            coordinates = at[entries.row], at[entries.col]
+            named[name] = scipy.sparse.coo_array((entries.data, coordinates), shape=(len(dofs),) * 2).tocsc()
+    matrices = {name: value if _is_matrix(value) else None for name, value in named.items()}
+    diagonals = [
+        m.diagonal() for m in matrices.values() if m is not None and scipy.sparse.issparse(m) and _is_square(m)
+    ]
+    if any((diagonal == HELD).any() for diagonal in diagonals) and len({len(d) for d in diagonals}) == 1:
+        free = np.flatnonzero((np.array(diagonals) != HELD).all(axis=0))
+        matrices = {name: m[free][:, free] if _is_square(m) else m for name, m in matrices.items()}  # type: ignore[index]
+        dofs = tuple(dofs[i] for i in free) if dofs else ()
+    return NamedMatrices(matrices, dofs)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 DECIMALS = 6  # of a damage index
@@ -32,6 +34,8 @@ MOST_MODES = 3  # that are named
 SET_ASIDE = 3  # of the last five records with a response that is set aside open an event
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
+BLIND, LEAST_BLIND = 3.0, 0.05  # smallest changes seen in the baseline's weather, and share, beyond which a record
+# of other weather has to raise an alarm to count as healthy without one
 PROBED = (5.0, 20.0, 80.0)  # standard deviations by which each response is lowered to see whether there is an alarm
 
 
@@ -106,6 +110,7 @@ class ActiveDetector(SavesFrames):
     weather: TrainingRange
     corrections: Corrections
     direction: Direction | None
+    lowered: LoweredIndices
     estimates: dict[str, FalseAlarmEstimate]
     prior: pd.DataFrame | None = None
     since: pd.Timestamp | None = None
@@ -136,11 +141,17 @@ class ActiveDetector(SavesFrames):
             direction = Direction.of(detector, trained[columns], targets)
             is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
+        step = pd.Timedelta(np.median(np.diff(trained.index.as_unit("ns").asi8)), "ns")
+        within = memory.duration(step) + (2 * persistence - 1) * step
+        changes = LoweredIndices.of(partial(_index_of, detector, columns), trained, targets, usual[1], within)
+        options = {"hold": DAY, "persistence": persistence, "release": release}
         estimates = {
-            kind: estimate_false_alarms(one, per_year, hold=DAY, persistence=persistence, release=release)
+            kind: estimate_false_alarms(
+                one, per_year, **options, smallest_at=changes.smallest if kind == DAMAGE else None
+            )
             for kind, one in by_kind.items()
         }
-        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, estimates)
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)
         return cls(detector, trained, *parts)
 
     @property
@@ -153,6 +164,11 @@ class ActiveDetector(SavesFrames):
     def threshold(self) -> float:
         """A damage event opens with an index above it."""
         return self.estimates[DAMAGE].rule.threshold
+
+    @property
+    def smallest(self) -> SmallestChanges:
+        """Falls of the responses that raise an alarm in the weather of the baseline."""
+        return self.lowered.smallest(self.threshold)
 
     @property
     def baseline_index(self) -> pd.Series:
@@ -252,8 +268,7 @@ class ActiveDetector(SavesFrames):
             )
 
     def _exact(self, records: pd.DataFrame) -> Array:
-        with without_warnings():
-            return -np.asarray(self.detector.score_samples(records[self.columns]), dtype=float)
+        return _index_of(self.detector, self.columns, records)
 
     def drivers(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
         """Names of the modes that drive the damage index of some records, the worst first."""
@@ -321,12 +336,31 @@ class ActiveDetector(SavesFrames):
         )
         return ["; ".join(filter(None, parts)) for parts in phrases]
 
+    @property
+    def most_unseen(self) -> float:
+        """Fall of all responses below which a record that raises no alarm says too little; NaN if there is none."""
+        return max(BLIND * self.smallest.common, LEAST_BLIND)
+
+    def is_blind(self, records: pd.DataFrame, first: int) -> NDArray[np.bool_]:
+        """Which records from a position on are in weather in which the detector would not see even a large fall."""
+        blind, share = self.extrapolated(records.iloc[first:]), self.most_unseen
+        if np.isnan(self.smallest.common) or not blind.any():
+            return np.zeros(len(blind), dtype=bool)
+        fallen = lowered(records, {name: share * records[name] for name in self.targets})
+        return blind & (self.index(fallen, first) <= self.threshold)
+
     def extrapolated(self, records: pd.DataFrame) -> NDArray[np.bool_]:
         """Which records have a temperature outside those of the baseline, by more than a twentieth of their range."""
         if not self.temperatures:
             return np.zeros(len(records), dtype=bool)
         excess = self.weather.excess(records[self.temperatures])
         return (np.nan_to_num(excess) > BEYOND).any(axis=1)
+
+
+def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
+    """Damage index of records by a fitted detector."""
+    with without_warnings():
+        return -np.asarray(detector.score_samples(records[columns]), dtype=float)
 
 
 def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:

@@ -11,9 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import MARKERS
 from skthermo.monitoring._transitions import Transition, fault_changes
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.sensors import SensorWatch
+from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -30,7 +31,8 @@ class Corrected:
     """Records as the detector sees them, and what became of their values.
 
     ``n_held`` counts the responses of a record that were set aside although the structure may have moved them, and
-    ``held`` names them: where there are some, ``is_held``, a record is not healthy.
+    ``held`` names them: where there are some, ``is_held``, a record is not healthy. ``disputes`` say which thermometers
+    contradict each other.
     """
 
     records: pd.DataFrame
@@ -38,6 +40,7 @@ class Corrected:
     held: list[str]
     notes: list[str]
     n_left_out: NDArray[np.int64]
+    disputes: list[Dispute | None]
 
     @property
     def is_held(self) -> NDArray[np.bool_]:
@@ -53,6 +56,7 @@ class Corrected:
             [name for part in parts for name in part.held],
             [note for part in parts for note in part.notes],
             np.concatenate([part.n_left_out for part in parts]),
+            [one for part in parts for one in part.disputes],
         )
 
 
@@ -106,8 +110,9 @@ class Corrections:
         if self.drift is not None:
             T_seen, F_seen = self._masked(state, T, F)
             drift = self.drift.advance(drift, T_seen, F_seen.where(F_seen > 0))
-        if self.sensors is not None:
-            sensors = self.sensors.advance(sensors, T, F)
+        if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
+            seen = raw.mask(day.isna() & raw.isin(MARKERS))
+            sensors = self.sensors.advance(sensors, seen[self.temperatures], seen[self.targets])
         return CorrectionState(sensors, drift)
 
     def _masked(self, state: CorrectionState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -126,6 +131,7 @@ class Corrections:
         T, F = day[self.temperatures], day[self.targets]
         held = np.zeros(F.shape, dtype=bool)
         notes, n_left_out = self._said_of(raw, wrong), wrong.sum(axis=1)
+        dispute = None if self.sensors is None else self.sensors.dispute(state.sensors, list(T.columns))
         if self.sensors is None:
             T = T.drop(columns=self.reference)
         else:
@@ -136,7 +142,7 @@ class Corrections:
             F = self.drift.corrected(state.drift, F)
         names = [", ".join(str(self.targets[k]) for k in np.flatnonzero(row)) if row.any() else "" for row in held]
         records = pd.concat([T, F], axis=1)[[name for name in raw.columns if name not in self.reference]]
-        return Corrected(records, held.sum(axis=1).astype(float), names, notes, n_left_out)
+        return Corrected(records, held.sum(axis=1).astype(float), names, notes, n_left_out, [dispute] * len(raw))
 
     def _said_of(self, raw: pd.DataFrame, wrong: NDArray[np.bool_]) -> list[str]:
         """A phrase about each record that has values which no sensor measures."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -17,7 +18,8 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
-from skthermo.exceptions import FewRecordsWarning, RecordsWarning, WeatherWarning
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, WeatherWarning
+from skthermo.monitoring._smallest import LARGE, SmallestChanges
 
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
 N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
@@ -269,13 +271,15 @@ def estimate_false_alarms(
     hold: str | pd.Timedelta = "1D",
     persistence: int = 1,
     release: float | None = None,
+    smallest_at: Callable[[float], SmallestChanges] | None = None,
 ) -> FalseAlarmEstimate:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
     An excursion lasts from the first level above the release level until all levels of ``hold`` have stayed within
     it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
     it, and the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only
-    departures of one kind count, ``release`` should be the `release_level` of all.
+    departures of one kind count, ``release`` should be the `release_level` of all. ``smallest_at`` gives the smallest
+    changes that a threshold sees, for warnings.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     n_years = _years(known.index, hold)
@@ -294,10 +298,9 @@ def estimate_false_alarms(
     years = counted_number(n_years, "year", 2)
     if len(squares) < FEWEST_PEAKS or asked > len(squares):
         raise ValueError(
-            f"false_alarms_per_year is {per_year:g}, but the {years} of the baseline have only "
-            f"{counted_number(len(squares), 'excursion')} that end with "
-            f"{counted_number(hold / DAY, 'day')} of quiet; expected at "
-            f"least {FEWEST_PEAKS}, and as many as alarms are asked for"
+            f"false_alarms_per_year is {per_year:g}, but the baseline of {years} has only "
+            f"{counted_number(len(squares), 'excursion')} followed by {counted_number(hold / DAY, 'day')} of quiet; "
+            f"expected at least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
     scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
     tail = Tail.of(squares, asked, tuple(scales.tolist()))
@@ -310,12 +313,20 @@ def estimate_false_alarms(
     method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
         ", extrapolated" if asked < FAR else ""
     )
-    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen)
+    seen = None if smallest_at is None else smallest_at(rule.threshold)
+    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen, seen)
     return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
 
 
 def _warn_of_baseline(
-    excursions: pd.DataFrame, tail: Tail, rule: EventRule, asked: float, per_year: float, years: str, unseen: str
+    excursions: pd.DataFrame,
+    tail: Tail,
+    rule: EventRule,
+    asked: float,
+    per_year: float,
+    years: str,
+    unseen: str,
+    seen: SmallestChanges | None,
 ) -> None:
     """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
     highest, second = excursions["index"].iloc[:2]
@@ -330,9 +341,18 @@ def _warn_of_baseline(
         warn_user(
             f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
             f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
-            f"{asked:.2g} events are asked for in its time; expected {FAR} or more: a longer baseline or more alarms",
+            f"{asked:.2g} events are asked for in its time. {'' if seen is None else f'Now {seen}. '}Expected {FAR} or "
+            "more events in its time: a longer baseline or more alarms a year",
             FewRecordsWarning,
             "threshold beyond the baseline",
+        )
+    elif seen is not None and seen.is_large:
+        warn_user(
+            f"the threshold {rule.threshold:.3g} is so high that {seen}: smaller changes count as healthy; expected an "
+            f"alarm from {100 * LARGE:g} % of all responses on: more records in a window, less scatter, or more alarms "
+            "a year",
+            ResultWarning,
+            "large changes unseen",
         )
     if tail.has_outlier(DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)

@@ -37,6 +37,7 @@ from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._records import RecordStore, read_records
+from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring._status import MonitorStatus, facts_of
 from skthermo.monitoring._transitions import Transition
@@ -103,6 +104,11 @@ class Monitor(SavesFrames, Estimator):
         A damage event opens with an index above it, of ``persistence`` of the last evaluated records.
     clear_threshold_ : float
         An event closes when, for a day, fewer than ``persistence`` of the last records have been above it.
+    smallest_changes_ : object
+        By how much responses have to fall until half of the records are above the threshold, in the weather of the
+        baseline: ``common`` (all by one share), ``single`` (each alone, by name), and ``within`` which time an alarm
+        follows. Shares of the mean, or, where not all responses are positive, in their units without a ``common``
+        change; NaN where none is seen.
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
@@ -677,13 +683,16 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         counts, drift = self.counts_, self.drift_
+        evaluations = self.status_.evaluations
+        newest = [f"newest record {self.last_}", evaluations["reason"].iloc[-1]] if len(evaluations) else []
         lines = [
-            f"state: {self.state()} ({f'newest record {self.last_}' if len(self.records_) else 'no record came yet'})",
+            f"state: {self.state()} ({'; '.join(filter(None, newest)) or 'no record came yet'})",
             f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
             f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
             f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
             f"damage events: open with {self.persistence} of {2 * self.persistence - 1} records above "
             f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            f"smallest change: {self.smallest_changes_}, in weather of the baseline",
             *_events_in_words(self.events_),
         ]
         faults = self.faults_
@@ -730,6 +739,11 @@ class Monitor(SavesFrames, Estimator):
     def clear_threshold_(self) -> float:
         """An event closes when the index has stayed at or below it."""
         return self.false_alarm_estimate_.rule.release
+
+    @property
+    def smallest_changes_(self) -> SmallestChanges:
+        """By how much responses have to fall until there is an alarm."""
+        return self.active_.smallest
 
     @property
     def prior_(self) -> pd.DataFrame | None:
@@ -844,7 +858,8 @@ def _events_in_words(events: pd.DataFrame) -> list[str]:
         lines.append(f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}")
     lines += [f"events: {n_earlier} earlier ones are in events_"] if n_earlier else []
     waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
-    return lines + ([f"ended, not acknowledged: event {', '.join(map(str, waiting))}"] if len(waiting) else [])
+    which = f"event{'s' if len(waiting) > 1 else ''} {', '.join(map(str, waiting))}"
+    return lines + ([f"ended, not acknowledged: {which}"] if len(waiting) else [])
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:

@@ -133,7 +133,11 @@ class MonitorState(SavesFrames):
         known = self.evaluations.iloc[slice(*self.evaluations.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
         new = n_memory + len(known)
         index = np.append(known["index"].to_numpy(), active.index(records, new))
-        series, times = active.by_kind(records, n_memory, _not_closing(index, seen, active)), raw.index.asi8
+        index, is_contested = _by_rivals(index, seen, active, records, n_memory)
+        is_blind = active.is_blind(records, n_memory) & ~seen.is_held
+        is_doubtful = seen.is_held | is_contested
+        series = active.by_kind(records, n_memory, _not_closing(index, is_doubtful, active))
+        times = raw.index.asi8
         drivers = np.full(len(raw), "", dtype=object)
         is_open = np.any([begin.log.is_open_after(rules, kind, one, times) for kind, one in series.items()], axis=0)
         rows = np.flatnonzero(is_open & ~np.isnan(index))
@@ -154,16 +158,20 @@ class MonitorState(SavesFrames):
         reasons = known["reason"].tolist() + reasons
         before = self.evaluations["state"].iloc[: self.evaluations.index.searchsorted(begin.day)]
         pending = _pending(
-            (index > active.threshold) & (numbers[DAMAGE] == 0), seen.is_held | np.isnan(index), [*before[-1:]]
+            (index > active.threshold) & (numbers[DAMAGE] == 0),
+            is_doubtful | is_blind | np.isnan(index),
+            [*before[-1:]],
         )
         remarks = {
             "stiffer than the baseline": numbers.get(STIFFENING, np.zeros(len(raw))) > 0,
             "above the threshold, not yet for long": pending,
+            "thermometers contradict each other, and without one of them it would be in alarm": is_contested,
+            f"even a fall of all responses by {100 * active.most_unseen:.2g} % would not be seen there": is_blind,
         }
         for row in range(len(known), len(raw)):
             said = [reasons[row], *(remark for remark, rows in remarks.items() if rows[row])]
             reasons[row] = "; ".join(filter(None, said))
-        is_held = seen.is_held | pending | self._unexplained(log, numbers[MEASUREMENT], times)
+        is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
         points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
@@ -243,10 +251,33 @@ class MonitorState(SavesFrames):
         return pd.concat([before, new]) if len(before) else new
 
 
-def _not_closing(index: Array, seen: Corrected, active: ActiveDetector) -> Array:
-    """Indices by which events open and close: where a response was set aside, the others cannot close one."""
+def _by_rivals(
+    index: Array, seen: Corrected, active: ActiveDetector, records: pd.DataFrame, first: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Indices of the records from a position on, and which of them thermometers that contradict each other leave open.
+
+    Each of these is left out in turn: the lowest index counts, and a record is open unless the highest is low, too.
+    """
+    index, is_contested = index.copy(), np.zeros(len(index), dtype=bool)
+    for dispute in {one for one in seen.disputes if one is not None}:
+        rows = np.array([one == dispute for one in seen.disputes])
+        since = pd.Timestamp(dispute.since, tz="UTC").tz_convert(records.index.tz)
+        each = []
+        for columns in dispute.rivals:
+            without = records.copy()
+            without.loc[since:, [name for name in columns if name in records]] = np.nan
+            each.append(active.index(without, first)[rows])
+        index[rows], is_contested[rows] = np.fmin.reduce(each), ~(np.maximum.reduce(each) <= active.threshold)
+    return index, is_contested & ~np.isnan(index)
+
+
+def _not_closing(index: Array, is_doubtful: NDArray[np.bool_], active: ActiveDetector) -> Array:
+    """Indices by which events open and close: where a response was set aside, the others cannot close one.
+
+    Nor can records that thermometers leave open.
+    """
     above = np.nextafter(active.rules[DAMAGE].release, np.inf)
-    return np.where(seen.is_held, np.maximum(index, above), index)
+    return np.where(is_doubtful, np.maximum(index, above), index)
 
 
 def _pending(is_above: NDArray[np.bool_], is_unknown: NDArray[np.bool_], before: Sequence[str]) -> NDArray[np.bool_]:

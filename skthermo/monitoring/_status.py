@@ -51,6 +51,10 @@ class MonitorStatus:
         A damage event opens with indices above the first, and closes at or below the second.
     false_alarms_per_year : float or None
         Number of false alarms a year for which the threshold was set.
+    smallest_change : dict or None
+        Falls of the responses that raise an alarm in the weather of the baseline: ``common`` (of all by one share),
+        ``single`` (of each alone, by name), and ``within`` how many seconds. Shares of the mean, or in the unit of the
+        response where not all are positive; None where none is seen.
     events : tuple of dict
         Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes`` and
         ``acknowledged``.
@@ -92,6 +96,7 @@ class MonitorStatus:
     threshold: float | None = None
     clear_threshold: float | None = None
     false_alarms_per_year: float | None = None
+    smallest_change: dict[str, Any] | None = None
     events: tuple[dict[str, Any], ...] = ()
     faults: tuple[dict[str, Any], ...] = ()
     counts: Mapping[str, int] | None = None
@@ -166,6 +171,7 @@ def facts_of(monitor: Any) -> MonitorStatus:
         threshold=float(monitor.threshold_),
         clear_threshold=float(monitor.clear_threshold_),
         false_alarms_per_year=float(monitor.false_alarms_per_year),
+        smallest_change=monitor.smallest_changes_.as_dict(),
         events=tuple(_open_events(monitor.events_)),
         faults=tuple(_lasting_faults(monitor.faults_)),
         counts=dict(monitor.counts_),

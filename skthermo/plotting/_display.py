@@ -153,21 +153,35 @@ def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
     """One legend of all panels' labels above those of a new figure, or within the first of given axes."""
+    handles, labels, scale = _labelled(axes)
+    if not handles:
+        return
+    if is_own_figure:
+        style = {"ncols": legend_columns(labels, axes[0].figure, n_columns), "frameon": False, "markerscale": scale}
+        axes[0].figure.legend(handles, labels, loc="outside upper center", **style)
+    else:
+        axes[0].legend(handles, labels, frameon=False, markerscale=scale, fontsize="small")
+
+
+def panel_legend(ax: Axes, is_own_figure: bool, n_columns: int = 4) -> None:
+    """The legend of one panel: above it in a new figure, within given axes."""
+    handles, labels, scale = _labelled(np.array([ax]))
+    style: dict[str, object] = {"frameon": False, "markerscale": scale, "fontsize": "small"}
+    if is_own_figure:
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.2}
+        style |= place | {"ncols": legend_columns(labels, ax.figure, n_columns) if labels else 1}
+    if handles:
+        ax.legend(handles, labels, **style)
+
+
+def _labelled(axes: np.ndarray) -> tuple[list[Artist], list[str], float]:
+    """Symbols and labels of panels, each label once, and how much larger small symbols are shown."""
     by_label: dict[str, Artist] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             by_label.setdefault(label, handle)
-    handles, labels = list(by_label.values()), list(by_label)
-    scale = 2.0 if any(getattr(h, "get_markersize", lambda: 9)() < 4 for h in handles) else 1.0
-    if not handles:
-        return
-    if is_own_figure:
-        n_columns = legend_columns(labels, axes[0].figure, n_columns)
-        axes[0].figure.legend(
-            handles, labels, loc="outside upper center", ncols=n_columns, frameon=False, markerscale=scale
-        )
-    else:
-        axes[0].legend(frameon=False, markerscale=scale, fontsize="small")
+    is_small = any(getattr(handle, "get_markersize", lambda: 9)() < 4 for handle in by_label.values())
+    return list(by_label.values()), list(by_label), 2.0 if is_small else 1.0
 
 
 def legend_columns(labels: Sequence[str], figure: Figure, most: int) -> int:

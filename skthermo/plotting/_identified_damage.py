@@ -156,7 +156,7 @@ class IdentifiedDamageDisplay(Display):
         probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()
         if "highest_if_damaged" in table:
             possible = np.where(is_known, 100 * table["highest_if_damaged"].to_numpy(dtype=float), np.nan)
-            ax.barh(places, possible, height=0.5, color=LIGHT, alpha=0.5, label="if damaged, up to (95 %)")
+            ax.barh(places, possible, height=0.5, color=LIGHT, alpha=0.5, label="if damaged, up to here (95 %)")
         errors = np.clip([severity - lowest, highest - severity], 0, None)[:, is_known]
         style = {"linestyle": "", "color": GREY, "capsize": 3, "elinewidth": 1.2, "label": "credible interval, 90 %"}
         drawn = ax.errorbar(severity[is_known], places[is_known], xerr=errors, **style)
@@ -192,7 +192,7 @@ class IdentifiedDamageDisplay(Display):
             "marker": "o",
             "color": BLUE,
             "capsize": 3,
-            "label": f"measured ± {N_ERRORS} std. errors",
+            "label": f"measured, ± {N_ERRORS} standard errors",
         }
         known = np.where(np.isfinite(errors), errors, 0)
         self.shifts_ = ax.errorbar(places - 0.1, shifts["measured"].to_numpy(), yerr=known, **style)
@@ -202,5 +202,7 @@ class IdentifiedDamageDisplay(Display):
         is_long = max(len(str(name)) for name in shifts.index) > SHORT_NAME
         leaning = {"rotation": 45, "ha": "right", "rotation_mode": "anchor"} if is_long else {}
         ax.set_xticks(places, [label_of(name) for name in shifts.index], **leaning)
-        ax.set(title="shift of frequencies", ylabel="shift (%)", xlim=(-0.5, len(shifts) - 0.5))
+        ax.set(
+            title="shift of frequencies", ylabel="shift from the healthy prediction (%)", xlim=(-0.5, len(shifts) - 0.5)
+        )
         ax.legend(frameon=False, fontsize="small")

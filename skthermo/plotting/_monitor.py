@@ -19,11 +19,11 @@ from skthermo.plotting._display import (
     SKY,
     Display,
     date_axis,
-    figure_legend,
     hold_outliers,
     line_style,
     mark_not_evaluated,
     marker_style,
+    panel_legend,
     shortened,
 )
 from skthermo.plotting._tables import in_time, with_breaks
@@ -56,7 +56,7 @@ class MonitorDisplay(Display):
     """Damage index of a monitor over time with its threshold and events; below it, drift and failed sensors.
 
     Records in alarm are orange triangles, others blue dots. Records or days that are not evaluated are grey ticks at
-    the bottom, with their number. Events are shaded.
+    the bottom, with their number. Events are shaded. Drift is the change of stiffness since the baseline.
 
     It is best made by `from_estimator`.
 
@@ -200,10 +200,10 @@ class MonitorDisplay(Display):
         room = DODGE * self.drift.shape[1] * (last - first) if "drift" in self.parts else pd.Timedelta(0)
         for one, part in zip(self.axes_, self.parts, strict=True):
             draw[part](one)
+            panel_legend(one, ax is None)
             one.set_xlim(first, last + room)
             if ax is not None or part == self.parts[-1]:
                 date_axis(one, self.index.index)
-        figure_legend(self.axes_, ax is None, n_columns=4)
         return self
 
     def _ends(self) -> tuple[pd.Timestamp, pd.Timestamp]:
@@ -231,7 +231,7 @@ class MonitorDisplay(Display):
                 self.points_ += ax.plot(x[rows], index[rows], **style, label=label)
         mark_not_evaluated(ax, {"": x[np.isnan(index)]}, "day" if is_daily else "")
         threshold = self.index["threshold"].to_numpy()
-        style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold of an alarm"}
+        style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold"}
         if (threshold == threshold[0]).all():
             self.threshold_line_ = ax.axhline(threshold[0], **style)
         else:
@@ -252,9 +252,11 @@ class MonitorDisplay(Display):
             if len(known) and np.isfinite(error):
                 first, last = self._ends()
                 beside = last + (number + 0.5) * DODGE * (last - first)
-                ax.errorbar([beside], values[known[-1:], 0], error, color=style["color"], marker="o", capsize=3)
+                label = None if number else f"at the end, ± {N_ERRORS} standard errors"
+                bar = {"color": style["color"], "marker": "o", "capsize": 3, "label": label}
+                ax.errorbar([beside], values[known[-1:], 0], error, **bar)
         ax.axhline(0, color=BLACK, linewidth=0.8)
-        ax.set_ylabel("change of\nstiffness (%)")
+        ax.set_ylabel("change of stiffness\nsince baseline (%)")
 
     def _draw_sensors(self, ax: Axes) -> None:
         columns = list(dict.fromkeys(self.faults["column"]))

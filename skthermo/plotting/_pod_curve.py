@@ -68,7 +68,7 @@ class PODCurveDisplay(Display):
     ...         return tuple(expit(25 * (np.asarray(severity) - middle)) for middle in (0.19, 0.21, 0.17))
     >>> display = PODCurveDisplay.from_predictions(Curve(), label="bottom")
     >>> display.ax_.get_xlabel(), display.ax_.get_ylabel(), sorted(display.marks_)
-    ('severity (%)', 'probability of detection (%)', ['a90', 'a90_95'])
+    ('severity: loss of stiffness (%)', 'probability of detection (%)', ['a90', 'a90_95'])
     >>> plt.close(display.figure_)
     """
 
@@ -170,15 +170,17 @@ class PODCurveDisplay(Display):
         colour = COLOURS[number % len(COLOURS)]
         marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
         severities = np.asarray(self.curve.severities, dtype=float)
-        self._draw_shares(severities, colour, marker)
+        self._draw_shares(severities, colour, marker, number > 0)
         drawn = np.linspace(severities.min(), severities.max(), N_DRAWN)
         pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
-        self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, color=colour, alpha=0.15, linewidth=0)
+        label = None if number else f"its {100 * getattr(self.curve, 'confidence', 0.95):g} % interval"
+        band = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
+        self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, **band)
         self.replicates_ = self._draw_campaigns(drawn, colour)
         self.marks_ = self._draw_marks(colour) if marks else {}
-        self.ax_.set(xlabel="severity (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
+        self.ax_.set(xlabel="severity: loss of stiffness (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
         self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
         return self
 
@@ -192,7 +194,8 @@ class PODCurveDisplay(Display):
             100 * drawn, low, high, label="prediction interval of one campaign", zorder=0, **style
         )
 
-    def _draw_shares(self, severities: Array, colour: str, marker: str) -> None:
+    def _draw_shares(self, severities: Array, colour: str, marker: str, is_later: bool) -> None:
+        """Observed shares; the legend names those of the first curve."""
         n_detected, n_records, severities = np.broadcast_arrays(
             np.asarray(self.curve.n_detected, dtype=float), np.asarray(self.curve.n_records, dtype=float), severities
         )
@@ -207,6 +210,7 @@ class PODCurveDisplay(Display):
             color=colour,
             capsize=2,
             elinewidth=0.8,
+            label=None if is_later else "tested, with 95 % interval",
         )
 
     def _draw_marks(self, colour: str) -> dict[str, Artist]:

@@ -166,7 +166,7 @@ class PredictionDisplay(Display):
         if what == "parameters":
             tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
             measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
-            options = {"labels": PARAMETERS, "unit": "", "quantity": "multiplier"} | options
+            options = {"labels": PARAMETERS, "unit": "", "quantity": "multiple of nominal"} | options
             return cls.from_predictions(measured, predicted, **options)
         if sensor is not None or options.get("kind") == "scatter":
             confidence = None

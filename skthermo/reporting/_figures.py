@@ -78,8 +78,10 @@ def draw(
 
 
 def fold_legend(figure: Figure, place: str, n_columns: int) -> None:
-    """Put the legend of a figure into fewer columns, so that it fits a narrow drawing."""
-    for legend in list(figure.legends):
+    """Put the legends of a figure into fewer columns and one place, so that they fit a narrow drawing."""
+    for legend in [*figure.legends, *(ax.get_legend() for ax in figure.axes)]:
+        if legend is None:
+            continue
         labels = [text.get_text() for text in legend.get_texts()]
         legend.remove()
         n_columns = n_columns if max(map(len, labels)) <= LONGEST_LABEL else 1

@@ -61,9 +61,9 @@ def owner_report(
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
-    Of a study, it says which damage the monitoring would detect, what was monitored, how good the model is, which
-    damage was identified, and with which settings and warnings all this was computed. Of several detectors, it
-    says which one is recommended and why, and the rest is on that one.
+    Of a study, it says which damage the monitoring would detect, the smallest one first, what was monitored, how good
+    the model is, which damage was identified, and with which settings and warnings all this was computed. Of several
+    detectors, it says which one is recommended and why, and the rest is on that one.
 
     Of a monitor, it says whether the structure is healthy today, in alarm or not evaluated, since when and why; which
     events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and how many
@@ -115,7 +115,8 @@ def owner_report(
 
     Notes
     -----
-    The file needs no network and no script, follows the reader's choice of light or dark, and can be printed.
+    The file needs no network, follows the reader's choice of light or dark, and can be printed. Its only script shows
+    the values of drawings; all else works without it.
 
     Examples
     --------

@@ -11,8 +11,10 @@ return [...document.querySelectorAll("a[href], button, input, select, textarea, 
   .filter((one) => one.checkVisibility({visibilityProperty: true}) && !one.disabled && !one.closest("[inert]"))
 """
 FOCUS = """
-const one = document.activeElement, box = one.getBoundingClientRect(), style = getComputedStyle(one);
-return {place: arguments[0].indexOf(one), is_marked: style.outlineStyle !== "none" || style.boxShadow !== "none",
+for (const motion of document.getAnimations()) motion.finish();
+const focused = document.activeElement, one = focused.closest(".sd-card") ?? focused; // a card is its link
+const box = one.getBoundingClientRect(), style = getComputedStyle(one);
+return {place: arguments[0].indexOf(focused), is_marked: style.outlineStyle !== "none" || style.boxShadow !== "none",
         is_seen: box.bottom > 0 && box.top < innerHeight && box.width > 0 && box.height > 0}
 """
 CUT = """
@@ -41,8 +43,9 @@ class Browser:
         """Open a file; a telephone has a finger and no pointer."""
         size = {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 600}
         self.command("Emulation.setDeviceMetricsOverride", **size)
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if is_dark else "light"}
-        self.command("Emulation.setEmulatedMedia", media="", features=[scheme])
+        wishes = {"prefers-color-scheme": "dark" if is_dark else "light", "prefers-reduced-motion": "reduce"}
+        features = [{"name": name, "value": value} for name, value in wishes.items()]
+        self.command("Emulation.setEmulatedMedia", media="", features=features)
         for log in ("performance", "browser"):
             self.chrome.get_log(log)
         self.chrome.get(Path(file).as_uri())

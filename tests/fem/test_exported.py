@@ -107,7 +107,7 @@ def test_what_is_not_used_does_no_harm(tmp_path, form):
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [
-        ({"M0": None}, {}, "no matrix is called m, m0, mass; say mass=..., one of"),
+        ({"M0": None}, {}, "no matrix is called m, m0, mass, .*; say mass=..., one of"),
         ({"M0": np.ones((1, N))}, {}, r"'M0' is 1 x 6, not square, and so not the mass; say mass=.*'k_base'\]$"),
         ({"M0": M * 1j}, {}, "'M0' is 6 x 6, complex, and so not the mass"),
         ({"mass": M}, {}, r"\['M0', 'mass'\] could each be the mass; say mass="),
@@ -127,7 +127,7 @@ def test_errors_name_file_and_variable(tmp_path, writer, changes, arguments, mes
 
 
 def test_errors_of_paths(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"no_such\.mat does not exist; expected a MATLAB v5 file"):
+    with pytest.raises(FileNotFoundError, match=r"no_such\.mat does not exist; expected a file of MATLAB v5"):
         load_affine(tmp_path / "no_such.mat")
     with pytest.raises(ValueError, match="holds no matrix; expected"):
         load_affine(tmp_path)

@@ -111,7 +111,6 @@ def test_complex_matrices_are_real_or_refused(tmp_path, form):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "Not a Matrix Market file"),
         ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "1 x 1, pattern, general; expected numbers"),
         ("%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n", "would take .* MB of memory; exp"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n", "3 numbers; expected 9999"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skthermo.fem import load_affine, read_triplets
+from skthermo.fem import AffineModel, load_affine, read_triplets
 from tests.fem.exported_files import EXPECTED, MATRICES, TERMS, TOTAL, M, N, assert_same
 
 pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
@@ -38,29 +38,33 @@ def test_a_mass_whose_last_rows_are_zero_has_the_size_of_the_stiffness(tmp_path)
     assert load_affine(tmp_path, n_modes=3).n_dof == N
 
 
-def test_stiffness_and_mass_of_one_job_need_different_names(tmp_path):
+def test_stiffness_and_mass_of_one_job_have_one_name(tmp_path):
     write_half(tmp_path / "bridge.sti", TOTAL)
     write_half(tmp_path / "bridge.mas", M)
-    with pytest.raises(ValueError, match=r"holds 'bridge' as \.mas and as \.sti; expected one .*or another name"):
+    assert_same(load_affine(tmp_path, n_modes=4), AffineModel({("bridge",): TOTAL}, M, n_modes=4))
+    write_half(tmp_path / "bridge.txk", TOTAL)
+    with pytest.raises(ValueError, match=r"holds 'bridge' as \.sti and as \.txk; expected one .*or another name"):
         load_affine(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "0 numbers in 0 lines; expected three in each"),
-        ("row column value\n", "0 numbers in 0 lines"),
-        ("1 1 2.0\n2 2", "5 numbers in 2 lines; expected three"),
-        ("1 1 2.0\n2 2 x", "'x' is not a number"),
-        ("1 1 2.0\n1 2 -1.0\n2 1 -1.0", "entries on both sides of its diagonal"),
-        ("1.5 1 2.0", "rows or columns that are not whole"),
-        ("0 1 2.0", "Row index out of bounds"),
-        ("1e300 1 2.0", "Integer out of range"),
+        ("", "line 1 holds 0 words; expected three or five numbers"),
+        ("row column value\n", "line 2 holds 0 words"),
+        ("1 1 2.0\n2 2", "line 2 holds 2 words; expected 3"),
+        ("row column value\n1 1 2.0\n\n2 2 2.0\n2 2 x", "line 5: 'x' is not a number"),
+        ("1 1 2.0\n1 2 -1.0\n3 1 -1.0\n3 3 2.0", "entries on both sides of its diagonal"),
+        ("1 1 2.0\n1 2 -1.0\n1 1 2.0", "row 1 and column 1 is given more than once"),
+        ("1 1 2.000e+00\n2 2 1.000e+00\n3 3 1.0", "line 3 ends within a number"),
+        ("1.5 1 2.0", "a row is 1.5; expected whole numbers"),
+        ("0 1 2.0", "a row is 0; expected"),
+        ("1e300 1 2.0", "a row is 1e.300; expected"),
     ],
 )
 def test_errors_name_the_file(tmp_path, text, message):
     (tmp_path / "bridge.sti").write_text(text)
-    with pytest.raises(ValueError, match=rf"bridge\.sti: not readable as lines of row, column and value .*{message}"):
+    with pytest.raises(ValueError, match=rf"bridge\.sti: not readable as lines of entries .*{message}"):
         read_triplets(tmp_path / "bridge.sti")
 
 

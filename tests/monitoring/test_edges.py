@@ -313,3 +313,16 @@ def test_results_do_not_share_the_state():
     assert monitor.counts_["n_records"] == 8
     assert set(monitor.evaluations_["state"]) == {"healthy"}
     assert (monitor.records_ != 0).all(axis=None)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"), [(1e6, "implausible"), (-1e6, "implausible"), (300.0, "implausible"), (-999.0, "dead")]
+)
+def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_marker_is_a_missing_value(value, kind):
+    monitor, new = fitted(), changed({})
+    name = new.columns[0]
+    new[name] = value
+    monitor.update(new)
+    faults = monitor.faults_.set_index("column")
+    assert faults.loc[name, "kind"] == kind
+    assert list(faults.index) == [name]

@@ -64,7 +64,7 @@ def test_histories_of_estimated_and_predicted_parameters(fem, year):
         np.testing.assert_allclose(drawn(display.lines_["from frequencies"][column]), fem.parameters_[name])
         learned = fem.predict_parameters(year.temperatures)[name]
         np.testing.assert_array_equal(drawn(display.lines_["from temperatures"][column]), learned)
-    assert display.axes_[0].get_ylabel() == "bottom\nmultiplier"
+    assert display.axes_[0].get_ylabel() == "bottom\nmultiple of nominal"
 
 
 def test_time_goes_on_a_date_axis_in_order_and_lines_break_in_gaps():

@@ -1,6 +1,7 @@
 """The page for the owner of many bridges: the worst first, and no bridge healthy of which nothing is known."""
 
 import re
+import time
 from urllib.parse import unquote
 
 import numpy as np
@@ -166,6 +167,15 @@ def test_by_the_size_of_alarm_drift_and_silence():
     assert silent[1].order < silent[0].order
     assert silent[1].since == FakeMonitor(n_days=20).last_
     assert [bridge.days for bridge in silent] == ["1 of 31\xa0days", "0 of 31\xa0days"]
+
+
+@pytest.mark.nightly
+def test_pages_of_two_hundred_bridges_are_small_and_soon_written(tmp_path):
+    fleet = FakeFleet({f"bridge {number:03d}": FakeMonitor(n_days=365) for number in range(200)})
+    start = time.process_time()
+    owner_report(fleet, tmp_path / "fleet.html", now=NOW)
+    assert time.process_time() - start < 10
+    assert sum(path.stat().st_size for path in tmp_path.rglob("*.html")) < 8e6
 
 
 @pytest.mark.nightly

@@ -13,10 +13,11 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import read_half, read_named_matrices
+from skthermo._io import MASS, read_half, read_named_matrices
 from skthermo._tables.arrays import Matrix, check_names, check_path
 from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
+from skthermo.fem.external._differences import difference_terms
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -76,8 +77,8 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
 Key = tuple[str, ...]
 Total = str | Literal[False] | None
 
-MASS_NAMES = ("m", "m0", "mass")
-TOTAL_NAMES = ("k", "k0", "stiffness")
+MASS_NAMES = ("m", "m0", "mass", "maax", "maa", "mgg")
+TOTAL_NAMES = ("k", "k0", "stiffness", "nominal", "kaax", "kaa", "kgg")
 SAME = 1e-6
 EXACTLY_SAME = 1e-8
 
@@ -88,6 +89,7 @@ def load_affine(
     stiffness: Collection[str] | Mapping[str, str | Key] | None = None,
     mass: str | None = None,
     total: Total = None,
+    factor: float | Mapping[str, float] | None = None,
     n_modes: int = 6,
     parameter_names: Sequence[str] | None = None,
     groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
@@ -100,20 +102,23 @@ def load_affine(
     Parameters
     ----------
     path : str or path-like
-        A MATLAB v5 file (``.mat``; ``save -v7`` writes it), a NumPy file (``.npz``) of named arrays, or a
-        folder with one file for each matrix, whose stem is the name: Matrix Market (``.mtx``), what
-        `scipy.sparse.save_npz` writes (``.npz``), or the text of CalculiX (``.sti``, ``.mas``) and SAP2000 (``.TXK``,
-        ``.TXM``), see `read_triplets`. Matrices are dense or sparse.
+        A file of several matrices, which have names in it, or a folder with one file for each matrix, whose stem is the
+        name. Files are recognised by their content, see Notes. Matrices are dense or sparse; of a symmetric one, one
+        half or all of it may be given.
     stiffness : collection of str, or mapping of str to str or tuple of str, optional
         Names of the matrices that are terms. A mapping also gives the parameters that multiply each matrix, as in
         `AffineModel`: ``()`` for none, ``("E", "A")`` for a product; several matrices may have the same parameter. By
         default every square matrix except the mass and the total is a term.
     mass : str, optional
-        The mass matrix. By default the one called M, M0 or mass, in lower or upper case.
+        The mass matrix. By default the one called M, M0, mass, MAAX, MAA or MGG, in lower or upper case, or the mass
+        of the exports.
     total : str or False, optional
-        The whole nominal stiffness, with which the terms are compared. By default the matrix called K, K0 or
-        stiffness, in lower or upper case, if there are other matrices and ``stiffness`` does not name it. False means
-        that there is no total: the stiffness is the sum of the terms, whatever else the file holds.
+        The whole nominal stiffness, with which the terms are compared. By default the matrix called K, K0, stiffness,
+        nominal, KAAX, KAA or KGG, in lower or upper case, if there are other matrices and ``stiffness`` does not name
+        it. False means that there is no total: the stiffness is the sum of the terms, whatever else the file holds.
+    factor : float or mapping of str to float, optional
+        Matrices are not terms but whole stiffness matrices, each with one parameter multiplied by this factor; the
+        total is the one as built. `difference_terms` makes the terms and checks them.
     n_modes : int, default=6
         How many of the lowest modes the model gives.
     parameter_names : sequence of str, optional
@@ -134,17 +139,44 @@ def load_affine(
     FileNotFoundError
         If the path does not exist.
     ValueError
-        Names the file and the variable that is damaged, missing, of another size than the mass, or not
-        finite; or names the total if it holds less stiffness than the terms summed.
+        Names the file, the line if it is a text, and the variable that is damaged, missing, of another size than the
+        mass, or not finite; names the total if it holds less stiffness than the terms summed; or, with ``factor``,
+        names the parameter whose matrix cannot be explained, as `difference_terms` does.
 
     See Also
     --------
     AffineModel : From matrices in memory.
+    difference_terms : Terms from whole matrices in memory.
     probe : From a program that returns matrices.
     read_triplets : One matrix from the text of CalculiX or SAP2000.
 
     Notes
     -----
+    These files are read:
+
+    =====================  =============================================================================================
+    program                files
+    =====================  =============================================================================================
+    Abaqus                 ``.mtx`` of ``*MATRIX GENERATE``, with ``FORMAT=MATRIX INPUT``, whose nodes and directions
+                           label the rows, or ``FORMAT=COORDINATE``. What is held (1e36 on the diagonal) is left out.
+    ANSYS                  Harwell-Boeing, as ``HBMAT`` writes it in ASCII, real, symmetric (RSA) or not (RUA), and its
+                           mapping file, which labels the rows; Rutherford-Boeing
+    Nastran, OptiStruct    DMIG in a punch file (small, large and free field; form 6 or 1), whose grid points and
+                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big
+    CalculiX, SAP2000      lines of row, column and value (``.sti``, ``.mas``; ``.TXK``, ``.TXM``), and CalculiX's
+                           ``.dof``, which labels the rows
+    MATLAB, Python         MATLAB v5 (``save -v7``), ``.npz`` of named arrays or of `scipy.sparse.save_npz`, Matrix
+                           Market
+    =====================  =============================================================================================
+
+    Rows with labels are joined by them, so that a group's matrix needs its own nodes only; ``model.dofs`` holds them.
+    A file in a folder that begins as none of these is ignored, unless its name ends like theirs.
+
+    Of a job ``E_deck`` that wrote stiffness and mass, the stiffness is called E_deck, and the mass is used as that of
+    the model if it is the same in all jobs: ``E_deck_STIF1.mtx`` and ``E_deck_MASS1.mtx`` (Abaqus), ``E_deck.sti`` and
+    ``.mas``, ``.TXK`` and ``.TXM``, ``.stif`` and ``.mass``, or K... and M... in ``E_deck.pch`` or ``E_deck.op4``. With
+    ``factor=2``, a folder of such jobs is one job called ``nominal``, and one for each group with its modulus doubled.
+
     The role of each matrix is decided by these rules alone. Roles that were found and are doubtful, such as a total
     that is more than the sum of the terms, or a term proportional to the mass, give a warning.
 
@@ -163,6 +195,7 @@ def load_affine(
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> import numpy as np
     >>> from skthermo.fem import load_affine
     >>> k1, k2 = np.array([[400.0, 0], [0, 0]]), np.array([[400.0, -400], [-400, 400]])
@@ -173,6 +206,21 @@ def load_affine(
     ('k_base', 'k_top')
     >>> model.frequencies([[1.0, 1.0]]).round(3)
     array([[1.967, 5.15 ]])
+
+    The same tower as Abaqus writes it, as built and with the stiffness of each spring doubled:
+
+    >>> from pathlib import Path
+    >>> text = "1,1, 1,1, {}\\n2,1, 1,1, {}\\n2,1, 2,1, {}\\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     jobs = {"nominal": (800, -400, 400), "base": (1200, -400, 400), "top": (1200, -800, 800)}
+    ...     for job, k in jobs.items():
+    ...         _ = Path(folder, f"{job}_STIF1.mtx").write_text(text.format(*k))
+    ...     _ = Path(folder, "nominal_MASS1.mtx").write_text(text.format(1, 0, 1))
+    ...     model = load_affine(folder, factor=2.0, n_modes=2)
+    >>> model.parameter_names, model.dofs
+    (('base', 'top'), ((1, 1), (2, 1)))
+    >>> model.frequencies([[1.0, 1.0]]).round(3)
+    array([[1.967, 5.15 ]])
     """
     file = check_path(path)
     for what, one in (("mass", mass), ("total", None if total is False else total)):
@@ -180,9 +228,14 @@ def load_affine(
             raise ValueError(f"{what} is {one!r:.100}; expected the name of a matrix")
     named = None if stiffness is None else {*_keys(stiffness), mass, total}
     usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
-    matrices = read_named_matrices(file, lambda name: named is None or name in named or name.lower() in usual)
+
+    def is_used(name: str) -> bool:
+        return named is None or name in named or name.lower() in usual or (mass is None and name.endswith(MASS))
+
+    matrices, dofs = read_named_matrices(file, is_used)
     square = _square(matrices)
-    mass = mass or _usual(square, MASS_NAMES, "mass", file)
+    masses = [name for name in square if name.endswith(MASS)]
+    mass = mass or _usual(square, MASS_NAMES, "mass", file) or _mass_of_exports(masses, matrices, file)
     if mass is None:
         raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
     mass_matrix = _find(matrices, mass, file)
@@ -196,29 +249,74 @@ def load_affine(
             if (matrix := matrices[name]) is not None and matrix.shape == shape and _is_finite(matrix)
         ]
         total = _usual(fitting, TOTAL_NAMES, "total", file)
+    if factor is not None and total is None:
+        total = _usual(square, TOTAL_NAMES, "total", file)
     if stiffness is None:
         others = {
             name: _find(matrices, name, file, shape)
             for name, one in matrices.items()
-            if name != mass and (name in square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
+            if name not in (mass, *masses)
+            and (name in square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
         if total is None and len(others) > 1:
             total = _usual(others, TOTAL_NAMES, "total", file)
-        stiffness = _terms(others, total, mass, mass_matrix, file)
+        stiffness = (
+            _terms(others, total, mass, mass_matrix, file) if factor is None else [n for n in others if n != total]
+        )
     keys = _keys(stiffness)
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
     terms = {name: _find(matrices, name, file, shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
-    if total:
+    if factor is not None:
+        pairs = _differences(matrices, total, keys, terms, factor, file)
+    elif total:
         rest = _rest(_find(matrices, total, file, shape), terms, f"{file}: {total!r}", says_total)
         pairs += [] if rest is None else [((), rest)]
     try:
         return AffineModel(
-            pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track
+            pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
+
+
+def _differences(
+    matrices: Mapping[str, Matrix | None],
+    total: Total,
+    keys: Mapping[str, Key],
+    changed: Mapping[str, Matrix],
+    factor: float | Mapping[str, float],
+    file: Path,
+) -> list[tuple[Key, Matrix]]:
+    """Terms from the nominal stiffness and the whole stiffness with each parameter multiplied."""
+    if not total:
+        raise ValueError(
+            f"{file}: factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the stiffness as "
+            f"built, or total=..., one of {list(matrices)}"
+        )
+    nominal = _find(matrices, total, file, next(iter(changed.values())).shape)
+    try:
+        terms = difference_terms(nominal, changed, factor=factor)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+    return [(keys[key[0]] if key else (), term) for key, term in terms.items()]
+
+
+def _mass_of_exports(names: Sequence[str], matrices: Mapping[str, Matrix | None], file: Path) -> str | None:
+    """The mass that every export has; None without any."""
+    if not names:
+        return None
+    nominal = [name for name in names if name.removesuffix(MASS).lower() in TOTAL_NAMES]
+    chosen = (nominal or list(names))[0]
+    reference = _find(matrices, chosen, file)
+    for name in names:
+        if not _same(_find(matrices, name, file, reference.shape), reference, SAME):
+            raise ValueError(
+                f"{file}: the mass of {name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}; "
+                "expected exports of the same mass, or mass=..., one of them"
+            )
+    return chosen
 
 
 def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:

@@ -11,7 +11,8 @@ import pandas as pd
 
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring.retraining._shift import block_mean, blocks_of
+from skthermo.monitoring._smallest import blocks_of, crossing, lowered, whole_weeks
+from skthermo.monitoring.retraining._shift import block_mean
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
@@ -85,28 +86,18 @@ def _medians(old: Array, new: Array) -> list[Any]:
     return [*medians, medians[1] - medians[0], np.nan, False]
 
 
-def _weeks(records: pd.DataFrame) -> pd.DataFrame:
-    """Whole weeks, evenly spread, of at most some number of records."""
-    if len(records) <= MOST_PROBED:
-        return records
-    blocks = blocks_of(records.index)
-    n_blocks = blocks.max() + 1
-    chosen = np.unique(np.linspace(0, n_blocks - 1, max(n_blocks * MOST_PROBED // len(records), 1)).astype(int))
-    return records[np.isin(blocks, chosen)]
-
-
 def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
     """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 
     For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
     """
-    records = _weeks(records)
+    records = whole_weeks(records, MOST_PROBED)
     blocks = blocks_of(records.index)
     found, start = np.full((len(targets), blocks.max() + 2), np.nan), active.ratio(records)
     for mode, target in enumerate(targets):
-        lowered = (records.assign(**{target: records[target] - step * spread[target]}) for step in STEPS[1:])
+        fallen = (lowered(records, {target: step * spread[target]}) for step in STEPS[1:])
         steps = np.array(STEPS) * (spread[target] / (records[target].mean() if records[target].min() > 0 else 1.0))
-        ratios = [active.ratio(one) for one in lowered]
+        ratios = [active.ratio(one) for one in fallen]
         curve = np.array([start, *ratios])
         found[mode, -1] = _crossing(steps, curve)
         for block in range(blocks.max() + 1):
@@ -130,20 +121,9 @@ def _rows_of_changes(old: Array, new: Array, targets: list[Any]) -> Iterator[tup
 
 
 def _crossing(steps: Array, curve: Array) -> float:
-    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any.
-
-    Squared indices grow with squared steps, nearly on straight lines.
-    """
+    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any."""
     curve = curve[:, ~np.isnan(curve).any(axis=0)]
-    if not curve.size:
-        return np.nan
-    squares = np.median(curve, axis=1) ** 2
-    above = np.flatnonzero(squares > 1)
-    if len(above) and above[0] == 0:
-        return np.nan
-    after = above[0] if len(above) else len(steps) - 1
-    slope = (squares[after] - squares[after - 1]) / (steps[after] ** 2 - steps[after - 1] ** 2)
-    return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
+    return crossing(steps, np.median(curve, axis=1)) if curve.size else np.nan
 
 
 def _unknown(old: ActiveDetector, new: ActiveDetector, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:

@@ -17,8 +17,9 @@ from skthermo._tables.frames import DAY, YEAR, correlation_time
 from skthermo._tables.text import counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._smallest import WEEK, blocks_of
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
-from skthermo.monitoring.retraining._shift import WEEK, ShiftsTried, WeatherFree, blocks_of
+from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree
 
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun unseen
 FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors

@@ -16,21 +16,15 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.frames import correlation_time
 from skthermo._tables.text import probability_text
 from skthermo.detection import TemperatureCompensator
+from skthermo.monitoring._smallest import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.surrogate import TemperatureMapper
 
-WEEK = pd.Timedelta("7D")
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
 MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
 HIDDEN = 0.5  # the same of a standard error, from which a change may hide behind weather that is new
 FEWEST_MORE = 3  # independent blocks than modes, from which there is a test
 N_STEPS = 8  # days of the new period at which a change may have begun
-
-
-def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
-    """Number of the block of each record, counted without gaps."""
-    numbers = (times - times[0]) // length
-    return np.unique(numbers, return_inverse=True)[1]
 
 
 def block_mean(values: Array, blocks: NDArray[np.intp]) -> tuple[float, float]:

@@ -45,7 +45,7 @@ class Fault:
             "drift": f"{self.rate * MONTH:+.2f} degrees a month, {self.size:+.1f} so far, beside what the other "
             "thermometers predict; left out",
             "disagree": f"{abs(self.size):.1f} degrees between what it, {other!r} and any others predict: which is "
-            "wrong is not known, none is left out",
+            "wrong is not known; records are healthy only if they are so without either",
             "swapped": f"its values are in the column of {other!r}; put back in place",
         }[self.kind]
 

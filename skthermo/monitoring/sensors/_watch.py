@@ -134,6 +134,14 @@ class Watched:
 
 
 @dataclass(frozen=True)
+class Dispute:
+    """Thermometers of which one is wrong, it is not known which, by their columns; and since when, in nanoseconds."""
+
+    rivals: tuple[tuple[Hashable, ...], ...]
+    since: int
+
+
+@dataclass(frozen=True)
 class SensorWatch:
     """Watches thermometers and responses in service, and distinguishes faults of sensors from damage where data can.
 
@@ -209,6 +217,13 @@ class SensorWatch:
     def faults(self, state: WatchState) -> pd.DataFrame:
         """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
         return state.faults.table([*self.sensors, *self.modes], self.zone, self.units)
+
+    def dispute(self, state: WatchState, names: Sequence[Hashable]) -> Dispute | None:
+        """The thermometers that contradict each other, by the names of all columns of T."""
+        for fault in state.faults.lasting("disagree"):
+            rivals = (fault.column, fault.other)
+            return Dispute(tuple(tuple(names[k] for k in self.columns[one]) for one in rivals), fault.since)
+        return None
 
     def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Watched:
         """Records without what sensors at fault show: NaN there, and exchanged responses back in place.

@@ -1,0 +1,122 @@
+"""Folders of whole exports, one as built and one with each group's modulus multiplied, read in one call."""
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+from skthermo.fem import AffineModel, load_affine
+from tests.fem.exported_files import (
+    DOFS,
+    TERMS,
+    M,
+    assert_same,
+    coordinates_text,
+    dmig_text,
+    harwell_boeing_text,
+    matrix_input_text,
+    op4_text,
+    spring,
+)
+
+pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
+
+REST = spring(3, 3, 500.0)
+
+
+def whole(group=None, factor=2.0):
+    return REST + sum(term * (factor if name == group else 1.0) for name, term in TERMS.items())
+
+
+EXPECTED = AffineModel([((name,), term) for name, term in TERMS.items()] + [((), REST)], M, n_modes=4)
+
+
+def abaqus(folder, job, K, M):
+    (folder / f"{job}_STIF2.mtx").write_text(matrix_input_text(K, DOFS, half="both"))
+    (folder / f"{job}_MASS2.mtx").write_text(matrix_input_text(M, DOFS, half="both"))
+    (folder / f"{job}_LOAD2.mtx").write_text("*CLOAD\n3,1, 1.0e3\n")
+    (folder / f"{job}.inp").write_text("*HEADING\n*NODE\n1, 0., 0.\n")
+
+
+def ansys(folder, job, K, M):
+    (folder / f"{job}.stif").write_text(harwell_boeing_text(K, n=1, digits=15, letter="D", sides=True))
+    (folder / f"{job}.mass").write_text(harwell_boeing_text(M, n=1, digits=15, letter="D"))
+    lines = (f"{i:14d}{node:14d}    U{'XYZ'[d - 1]}\n" for i, (node, d) in enumerate(DOFS, start=1))
+    (folder / f"{job}.mapping").write_text("    Matrix Eqn          Node    DOF\n" + "".join(lines))
+
+
+def nastran(folder, job, K, M):
+    text = dmig_text(K, DOFS, name="KAAX", width=16) + dmig_text(M, DOFS, name="MAAX", width=16)
+    (folder / f"{job}.pch").write_text(text)
+
+
+def output4(folder, job, K, M):
+    (folder / f"{job}.op4").write_text(op4_text(K, name="KAA") + op4_text(M, name="MAA"))
+
+
+def calculix(folder, job, K, M):
+    (folder / f"{job}.sti").write_text(coordinates_text(K, half="upper"))
+    (folder / f"{job}.mas").write_text(coordinates_text(M, half="upper"))
+    (folder / f"{job}.dof").write_text("".join(f"{node}.{direction}\n" for node, direction in DOFS))
+
+
+def sap2000(folder, job, K, M):
+    (folder / f"{job}.TXK").write_text("Row Column Value\n" + coordinates_text(K))
+    (folder / f"{job}.TXM").write_text("Row Column Value\n" + coordinates_text(M))
+
+
+def numpy_arrays(folder, job, K, M):
+    np.savez(folder / f"{job}.npz", K=K, M=M)
+
+
+PROGRAMS = [abaqus, ansys, nastran, output4, calculix, sap2000, numpy_arrays]
+
+
+def write(program, folder, factor=2.0, **changes):
+    for job in ("nominal", *TERMS):
+        program(folder, job, whole(job, factor), changes.get(job, M))
+    return folder
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("factor", [2.0, 0.5])
+def test_a_folder_of_jobs_is_a_model(tmp_path, program, factor):
+    model = load_affine(write(program, tmp_path, factor), factor=factor, n_modes=4)
+    assert set(model.parameter_names) == set(TERMS)
+    assert_same(model, EXPECTED, 1e-6 if program is nastran else 1e-11)
+    labels = tuple((node, f"U{'XYZ'[d - 1]}") for node, d in DOFS) if program is ansys else tuple(DOFS)
+    assert model.dofs == (() if program in (output4, sap2000, numpy_arrays) else labels)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_another_mass_names_the_job(tmp_path, program):
+    write(program, tmp_path, E_10=2 * M)
+    with pytest.raises(ValueError, match="mass of 'E_10' differs from that of 'nominal'"):
+        load_affine(tmp_path, factor=2.0, n_modes=4)
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4, mass="nominal (mass)"), EXPECTED, 1e-6)
+
+
+def test_a_wrong_factor_and_a_missing_nominal_job_are_errors_that_name_folder_and_group(tmp_path):
+    write(abaqus, tmp_path, 3.0)
+    with pytest.raises(ValueError, match=r"test_a_wrong.*'E_2'.*factor was 2"):
+        load_affine(tmp_path, factor=2.0, n_modes=4)
+    for file in tmp_path.glob("nominal*"):
+        file.rename(tmp_path / file.name.replace("nominal", "asbuilt"))
+    with pytest.raises(ValueError, match=r"no matrix is called .*nominal.*total=.*asbuilt"):
+        load_affine(tmp_path, factor=3.0, n_modes=4)
+    assert_same(load_affine(tmp_path, factor=3.0, n_modes=4, total="asbuilt"), EXPECTED)
+
+
+def test_only_some_groups_may_be_named_and_their_parameters(tmp_path):
+    write(nastran, tmp_path)
+    model = load_affine(tmp_path, factor=2.0, n_modes=4, stiffness={"E_2": "E", "k_base": "k"})
+    rest = REST + TERMS["E_10"]
+    assert_same(model, AffineModel({("E",): TERMS["E_2"], ("k",): TERMS["k_base"], (): rest}, M, n_modes=4), 1e-6)
+
+
+def test_one_file_of_whole_matrices(tmp_path):
+    matrices = {"K0": whole()} | {name: whole(name, 5.0) for name in TERMS}
+    np.savez(tmp_path / "bridge.npz", M=M, **matrices)
+    assert_same(load_affine(tmp_path / "bridge.npz", factor=5.0, n_modes=4), EXPECTED)
+    scipy.sparse.save_npz(tmp_path / "other.npz", scipy.sparse.csc_array(M))
+    with pytest.raises(ValueError, match=r"bridge\.npz holds .*; expected one stiffness K"):
+        load_affine(tmp_path, factor=5.0, n_modes=4)

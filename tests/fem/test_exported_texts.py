@@ -1,0 +1,201 @@
+"""Matrices as Abaqus, ANSYS, Nastran, CalculiX and SAP2000 write them: the same model from every text."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from skthermo._io import read_named_matrices
+from skthermo.fem import AffineModel, evaluate_modes, load_affine
+from tests.fem.exported_files import (
+    DOFS,
+    EXPECTED,
+    MATRICES,
+    TERMS,
+    TEXTS,
+    TOTAL,
+    M,
+    N,
+    assert_same,
+    dmig_text,
+    harwell_boeing_text,
+    matrix_input_text,
+    op4_text,
+    write_texts,
+)
+
+pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
+LABELLED = [kind for kind in TEXTS if "matrix input" in kind or "DMIG" in kind]
+
+
+def read_all(path):
+    return read_named_matrices(path, lambda name: True)
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_every_text_is_the_same_model(tmp_path, kind):
+    model = load_affine(write_texts(kind)(tmp_path, MATRICES), n_modes=4)
+    assert model.parameter_names == tuple(TERMS)
+    assert_same(model, EXPECTED, np.clip(10 * TEXTS[kind][1], 1e-12, 1e-6))
+    assert model.dofs == (tuple(DOFS) if kind in LABELLED else ())
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    kind=st.sampled_from(list(TEXTS)),
+    seed=st.integers(0, 2**32 - 1),
+    size=st.integers(1, 12),
+    density=st.floats(0.0, 1.0),
+    scale=st.integers(-30, 30),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    change=st.sampled_from([str, str.lower, str.upper]),
+)
+def test_what_is_written_is_read(tmp_path, kind, seed, size, density, scale, line_end, change):
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((size, size)) * (rng.random((size, size)) < density) * 10.0**scale
+    matrix = matrix + matrix.T + np.diag(rng.uniform(1, 2, size) * 10.0**scale)
+    nodes = np.sort(rng.choice(10_000, size, replace=False)) + 1
+    dofs = [(int(node), int(rng.integers(1, 7))) for node in nodes]
+    suffix, tolerance, write = TEXTS[kind]
+    text = write(matrix, dofs)
+    text = text if "OP4" in kind else change(text)
+    file = tmp_path / f"K{suffix}"
+    file.write_bytes(text.replace("\n", line_end).encode())
+    found = read_all(file)
+    (read,) = found.matrices.values()
+    assert found.dofs in ((), tuple(dofs))
+    assert bool(found.dofs) == (kind in LABELLED)
+    largest = np.abs(matrix).max()
+    np.testing.assert_allclose(read.toarray(), matrix, rtol=tolerance, atol=1e-16 * largest)
+
+
+@pytest.mark.parametrize("kind", LABELLED)
+def test_matrices_of_some_nodes_are_joined_by_label(tmp_path, kind):
+    suffix, tolerance, text = TEXTS[kind]
+    order = [4, 0, 5, 2, 1, 3]
+    for name, matrix in (TERMS | {"M": M}).items():
+        kept = [i for i in order if matrix[i].any()]
+        content = text(matrix[np.ix_(kept, kept)], [DOFS[i] for i in kept])
+        (tmp_path / f"{name}{suffix}").write_text(content)
+    model = load_affine(tmp_path, n_modes=4)
+    assert model.dofs == tuple(DOFS)
+    assert_same(model, EXPECTED, np.clip(10 * tolerance, 1e-12, 1e-6))
+    shapes = [evaluate_modes(model, [[1.0] * 3], dofs)[1] for dofs in ([5, 0], [DOFS[5], DOFS[0]])]
+    np.testing.assert_array_equal(*shapes)
+
+
+def test_labels_for_some_matrices_only_are_refused(tmp_path):
+    write_texts("Abaqus matrix input, half")(tmp_path, TERMS)
+    write_texts("Abaqus coordinates, half")(tmp_path, {"M": M})
+    with pytest.raises(ValueError, match=r"rows of 'E_2' have labels .* those of 'M' have none"):
+        load_affine(tmp_path)
+
+
+def test_degrees_of_freedom_that_abaqus_holds_are_left_out(tmp_path):
+    ground = np.zeros((N + 1, N + 1))
+    for name, matrix in (TERMS | {"M": M}).items():
+        wider = ground.copy()
+        wider[:N, :N] = matrix
+        if name != "M":
+            wider[N, N] = 1e36
+        (tmp_path / f"{name}.mtx").write_text(matrix_input_text(wider, [*DOFS, (50, 1)]))
+    model = load_affine(tmp_path, n_modes=4)
+    assert model.dofs == tuple(DOFS)
+    assert_same(model, EXPECTED)
+
+
+@pytest.mark.parametrize(("suffix", "written"), [(".dof", "{0}.{1}\n"), (".mapping", "{2:14d}{0:14d}    U{1}\n")])
+def test_rows_get_their_labels_from_a_file_beside_the_matrices(tmp_path, suffix, written):
+    write_texts("ANSYS")(tmp_path, MATRICES)
+    heading = "    Matrix Eqn          Node    DOF\n" if suffix == ".mapping" else ""
+    lines = (written.format(*dof, i + 1) for i, dof in enumerate(DOFS))
+    (tmp_path / f"bridge{suffix}").write_text(heading + "".join(lines))
+    model = load_affine(tmp_path, n_modes=4)
+    assert model.dofs == tuple((n, f"U{d}" if heading else d) for n, d in DOFS)
+    assert_same(model, EXPECTED)
+
+
+def test_one_punch_file_holds_a_whole_model(tmp_path):
+    card = "DMIG    {0:8s}{1:8d}{2:8d}{3:8d}{4:8d}{5:8d}{6:8.1f}\n"
+    load = card.format("PAX", 0, 9, 2, 0, 1, 1.0) + "DMIG    PAX            1       0               3       1     1.0\n"
+    named = {"KAAX": TOTAL, "MAAX": M} | TERMS
+    text = "".join(dmig_text(matrix, DOFS, name=name.upper()) for name, matrix in named.items())
+    (tmp_path / "bridge.pch").write_text("$TITLE = BRIDGE\n" + text + load + "GRID,1,,0.,0.,0.\nENDDATA\n")
+    names = {name.upper(): name for name in TERMS}
+    expected = AffineModel({(name.upper(),): TERMS[name] for name in names.values()}, M, n_modes=4)
+    for path in (tmp_path, tmp_path / "bridge.pch"):
+        model = load_affine(path, n_modes=4)
+        assert model.dofs == tuple(DOFS)
+        assert_same(model, expected, 1e-8)
+
+
+def test_one_op4_file_holds_a_whole_model(tmp_path):
+    named = {"KAA": TOTAL, "MAA": M} | TERMS
+    (tmp_path / "bridge.op4").write_text("".join(op4_text(one, name=name.upper()) for name, one in named.items()))
+    expected = AffineModel({(name.upper(),): term for name, term in TERMS.items()}, M, n_modes=4)
+    assert_same(load_affine(tmp_path / "bridge.op4", n_modes=4), expected)
+
+
+def test_scipy_writes_what_is_read(tmp_path):
+    scipy.io.hb_write(tmp_path / "K.hb", scipy.sparse.csc_array(TOTAL))
+    np.testing.assert_array_equal(read_all(tmp_path / "K.hb").matrices["K"].toarray(), TOTAL)
+
+
+BAD = {
+    "RSA": [
+        (r"RSA", "PSA", "a matrix PSA of 6 x 6; expected"),
+        (r"RSA", "CUA", "a matrix CUA"),
+        (r"\n +1 +3", "\n             1             9", "pointers that do not rise|from 1 to"),
+        (r"\n[^\n]*\n$", "\n", "lines; expected as many as the heading says"),
+        (r"1\.0000000000000000E\+03", "1.00000000000x0000E+03", r"line \d+: .*is not a number"),
+    ],
+    "DMIG, large": [
+        (r"^DMIG +KAAX.*\n", "", "line 1: matrix 'KAAX' has no entry that states its form"),
+        (r"D\+03", "Q+03", r"line \d+: .*Q.03' is not a number"),
+        (r"^\* .*\n", lambda found: found.group() * 2, "more than once"),
+    ],
+    "OP4, strings": [
+        (r"\n +7 +1 +1\n.*\n$", "\n", "line 1: no end after 6 columns: the file seems to be cut off"),
+        (r"327681|196609|458753", "196610", r"line \d+ states 2 words, and|given more than once|both sides"),
+        (r"E\+03", "x+03", r"line \d+: .* is not a number"),
+    ],
+    "Abaqus matrix input, half": [
+        (r"3,1, 3,1,", "3,1, 3,", r"line \d+ holds 4 words; expected 5"),
+        (r"3,1, 3,1,", "3,1, 3.5,1,", "a node is 3.5; expected whole numbers"),
+        (r"e\+03\n", "e+0x3\n", r"line \d+: .*e.0x3' is not a number"),
+        (r"3\n$", "", r"line \d+ ends within a number"),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "pattern", "new", "message"), [(kind, *one) for kind, some in BAD.items() for one in some]
+)
+def test_errors_name_file_and_line(tmp_path, kind, pattern, new, message):
+    suffix, _, text = TEXTS[kind]
+    changed, count = re.subn(pattern, new, text(TOTAL), count=1, flags=re.MULTILINE)
+    assert count
+    (tmp_path / f"K{suffix}").write_text(changed)
+    with pytest.raises(ValueError, match=rf"K\{suffix}: not readable as .*({message})"):
+        load_affine(tmp_path / f"K{suffix}")
+
+
+@pytest.mark.parametrize("in_process", [False], indirect=True)
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("K.mtx", "1000000000 1 2.0\n"),
+        ("K.hb", harwell_boeing_text(TOTAL).replace("             6             6", "    1000000000    1000000000")),
+        ("K.op4", op4_text(TOTAL).replace("       6       6", "99999999        99999999"[:8] + "99999999", 1)),
+    ],
+)
+def test_a_matrix_too_large_for_its_file_is_refused(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(
+        ValueError, match=rf"{re.escape(name)}: .*(more than 256 MB of memory|expected as many|cut off)"
+    ):
+        load_affine(tmp_path / name)

@@ -1,0 +1,154 @@
+"""What a threshold still sees, and that no record is healthy in which even a large change would go unseen."""
+
+import itertools
+import warnings
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.exceptions import FewRecordsWarning, ResultWarning
+from skthermo.monitoring import Monitor
+from skthermo.monitoring._smallest import LARGE, LoweredIndices
+
+MODES, PER_DAY = ["f1", "f2", "f3"], 4
+ANSWER = ["state", "index", "reason", "event"]
+pytestmark = pytest.mark.filterwarnings("ignore:.*(season|independent|not evaluated|of fold|is extrapolated)")
+
+
+@cache
+def bridge(n_days=500, noise=0.003, slope=1e-3, seed=0):
+    """Two thermometers and three natural frequencies, six-hourly, from January on."""
+    rng, n = np.random.default_rng(seed), n_days * PER_DAY
+    day = np.arange(n) / PER_DAY
+    slow = np.repeat(rng.normal(0, 2.5, n_days), PER_DAY)
+    air = 10 - 12 * np.cos(2 * np.pi * day / 365.25) + 5 * np.sin(2 * np.pi * day) + slow
+    T = air[:, np.newaxis] + [0, 1] + rng.normal(0, 0.3, (n, 2))
+    F = np.array([2.0, 3.0, 5.0]) * (1 - slope * air[:, np.newaxis] + rng.normal(0, noise, (n, 3)))
+    stamps = pd.date_range("2025-01-01", periods=n, freq="6h")
+    return pd.DataFrame(np.hstack([T, F]), stamps, ["T1", "T2", *MODES])
+
+
+def fitted(records, last=None, **options):
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
+    return Monitor(make_pipeline(compensator, last or WindowedAlarm("1D")), **options).fit(records)
+
+
+@cache
+def of_a_year(**options):
+    return fitted(bridge(**options)[:"2025"])
+
+
+@pytest.mark.parametrize("modes", [MODES, *([mode] for mode in MODES)], ids=str)
+@pytest.mark.parametrize("last", [None, MahalanobisDetector()], ids=["window", "record"])
+def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(modes, last):
+    monitor = fitted(bridge()[:"2025"], last)
+    changes = monitor.smallest_changes_
+    size = changes.common if len(modes) > 1 else changes.single[modes[0]]
+    new = bridge()["2026":].copy()
+    above = []
+    for factor in (0.7, 1.3):
+        active, fallen = monitor.active_, new.copy()
+        fallen[modes] *= 1 - factor * size
+        above.append((active.index(fallen, 8) > active.threshold).mean())
+    assert above[0] < 0.5 < above[1]
+    answers = monitor.update(fallen)
+    assert (answers.loc[answers.index[0] + changes.within :, "state"] == "alarm").mean() > 0.9
+    assert changes.within < pd.Timedelta("3D")
+
+
+def test_falls_are_shares_whatever_the_unit_and_grow_with_the_threshold():
+    monitor, lowered = of_a_year(), of_a_year().active_.lowered
+    scaled = bridge()[:"2025"].copy()
+    scaled[MODES] *= 1000
+    one, other = monitor.smallest_changes_, fitted(scaled).smallest_changes_
+    np.testing.assert_allclose(list(other.single.values()), list(one.single.values()), rtol=1e-6)
+    assert other.common == pytest.approx(one.common, rel=1e-6)
+    common = [lowered.smallest(level * monitor.threshold_).common for level in (0.5, 1.0, 2.0, 8.0)]
+    assert sorted(common) == common
+    assert one.common < min(one.single.values())  # in all modes more evidence adds up
+
+
+def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
+    about_zero = bridge()[:"2025"].copy()
+    about_zero[MODES] -= about_zero[MODES].mean()
+    first = fitted(about_zero).smallest_changes_
+    about_zero[MODES] *= 10
+    second = fitted(about_zero).smallest_changes_
+    assert np.isnan(first.common)
+    np.testing.assert_allclose(list(second.single.values()), 10 * np.array(list(first.single.values())), rtol=1e-6)
+    assert first.as_dict()["common"] is None
+
+
+def test_an_index_that_no_fall_moves_sees_none():
+    records = bridge()[:400]
+    flat = LoweredIndices.of(lambda table: np.ones(len(table)), records, MODES, np.ones(3), pd.Timedelta("1D"))
+    changes = flat.smallest(2.0)
+    assert np.isnan([changes.common, *changes.single.values()]).all()
+    assert "no fall" in str(changes)
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.03])
+def test_a_threshold_that_leaves_large_changes_healthy_is_one_warning(noise):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        monitor = fitted(bridge(noise=noise)[:"2025"], MahalanobisDetector())
+    found = [one for one in caught if issubclass(one.category, ResultWarning)]
+    assert (monitor.smallest_changes_.common > LARGE) == bool(found) == (noise == 0.03)
+    assert str(monitor.smallest_changes_) in monitor.summary()
+    assert all(str(monitor.smallest_changes_) in str(one.message) for one in found)
+    plain = monitor.status().as_dict()["smallest_change"]
+    assert plain["common"] == monitor.smallest_changes_.common
+
+
+def test_a_short_baseline_says_in_its_warning_what_is_seen():
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        monitor = fitted(bridge(noise=0.01)[: 24 * PER_DAY], MahalanobisDetector())
+    (found,) = [one for one in caught if "is extrapolated" in str(one.message)]
+    assert issubclass(found.category, FewRecordsWarning)
+    assert str(monitor.smallest_changes_) in str(found.message)
+
+
+def contradicting(offset, damage, n_days=40, **options):
+    """Records in service in which one of two thermometers is off, and all frequencies fall later."""
+    new = bridge(**options)["2026-01-01":][: n_days * PER_DAY].copy()
+    new.iloc[10 * PER_DAY :, 0] += offset
+    new.iloc[20 * PER_DAY :, 2:] *= 1 - damage
+    return new
+
+
+@pytest.mark.parametrize("damage", [0.0, 0.02, 0.1, 0.25])
+@pytest.mark.parametrize("offset", [-30.0, 30.0])
+def test_where_thermometers_contradict_each_other_nothing_is_healthy_that_one_of_them_denies(offset, damage):
+    monitor = fitted(bridge()[:"2025"])
+    answers = monitor.update(contradicting(offset, damage))
+    assert monitor.faults_["kind"].tolist() == ["disagree", "disagree"]
+    detected = monitor.faults_["detected"].iloc[0] + pd.Timedelta("1D")
+    later = answers[detected:]
+    assert "healthy" not in set(later["state"])
+    assert later.loc[later["state"] == "not evaluated", "reason"].ne("").all()
+    if damage >= 0.1:  # whichever is right
+        assert (later["2026-01-23":]["state"] == "alarm").all()
+
+
+def test_what_both_thermometers_call_healthy_is_healthy():
+    monitor = of_a_year(slope=1e-6)
+    answers = fitted(bridge(slope=1e-6)[:"2025"]).update(contradicting(3.0, 0.0, slope=1e-6))
+    assert monitor.threshold_ > 0
+    later = answers["2026-01-20":]
+    assert (later["state"] == "healthy").mean() > 0.98
+
+
+def test_batches_give_the_same_where_thermometers_contradict_each_other():
+    whole, parts = (fitted(bridge()[:"2025"]) for _ in range(2))
+    new = contradicting(30.0, 0.01, n_days=24)
+    answers = whole.update(new)
+    cuts = [0, 35, 41, 42, 50, 61, 77, len(new)]
+    found = pd.concat([parts.update(new[a:b]) for a, b in itertools.pairwise(cuts)])
+    pd.testing.assert_frame_equal(found[ANSWER], answers[ANSWER])
+    pd.testing.assert_frame_equal(whole.events_, parts.events_)
