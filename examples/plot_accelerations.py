@@ -68,7 +68,7 @@ left.set(xlabel="time (s)", ylabel="acceleration of one sensor (m/s²)")
 right.semilogy(frequency, spectrum.mean(axis=1))
 for value in truth:
     right.axvline(value, color="0.6", linestyle=":", zorder=0)
-right.set(xlabel="frequency (Hz)", ylabel="power spectral density (m²/s³)", title="mean of the sensors")
+right.set(xlabel="frequency (Hz)", ylabel="power spectral density (m²/s³, log scale)", title="mean of the sensors")
 
 # %%
 # The peaks of the spectrum are at the true frequencies (dotted lines) or, at 114 Hz, at that of the seventh mode.

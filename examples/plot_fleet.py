@@ -98,27 +98,36 @@ print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 # %%
 # What the fleet adds
 # -------------------
-# How parameters of a new girder change with temperature. Bands are two standard deviations. The girder's own records
-# cover the temperatures between the dotted lines. Outside this range, predictions rely on the fleet prior.
+# Change of two stiffnesses of a new girder with temperature, from their values at the mean temperature of June. Bands
+# are two standard deviations on either side: of a new bridge of the fleet, before it has records of its own, and of
+# this girder after 30 days. Outside the temperatures of its own records (grey), predictions rely on the fleet prior.
 
 girder = next(name for name in new if campaign[name].kind == "girder")
 mapper = chains[girder]["30 days and the fleet"].mapper_[-1]
 june = np.ravel(load_records(girder, 30, "2025-06-01")[0])
 temperatures = np.linspace(-15, 35, 101)
-figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
-for ax, part in zip(axes, ("deck", "bearings"), strict=True):
-    effects = {
-        "fleet": (prior.effects(temperatures, families[girder][part], reference=june.mean()), "tab:blue"),
-        "new girder": (mapper.effects(temperatures, part, reference=june.mean()), "tab:orange"),
-    }
-    for label, (effect, colour) in effects.items():
+
+
+def draw_effects(ax, part):
+    """Change of a stiffness with temperature: of single bridges, of the fleet and of the new girder."""
+    of_fleet = prior.effects(temperatures, families[girder][part], reference=june.mean())
+    singles = 100 * np.expm1(of_fleet.drop(columns=["mean", "standard_deviation"]))
+    lines = ax.plot(temperatures, singles, color="0.6", linewidth=0.7)
+    lines[0].set_label("single bridges")
+    of_girder = mapper.effects(temperatures, part, reference=june.mean())
+    for label, effect, colour in (("fleet", of_fleet, "tab:blue"), ("new girder", of_girder, "tab:orange")):
         low, mean, high = (100 * np.expm1(effect["mean"] + k * effect["standard_deviation"]) for k in (-2, 0, 2))
         ax.fill_between(temperatures, low, high, color=colour, alpha=0.25, linewidth=0)
-        ax.plot(temperatures, mean, color=colour, label=f"{label}, mean and band")
-    for end in (june.min(), june.max()):
-        ax.axvline(end, color="black", linestyle=":")
-    ax.set(xlabel="steady temperature (°C)", ylabel=f"change of {part} (%)")
-axes[0].legend()
+        ax.plot(temperatures, mean, color=colour, label=f"{label}, ± 2 standard deviations")
+    ax.axvspan(june.min(), june.max(), color="0.9", zorder=0, label="the girder's own records")
+    change = f"change of {part} stiffness\nfrom its value at {june.mean():.0f} °C (%)"
+    ax.set(xlabel="steady temperature (°C)", ylabel=change)
+    ax.legend(fontsize="small", frameon=False)
+
+
+figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+for ax, part in zip(axes, ("deck", "bearings"), strict=True):
+    draw_effects(ax, part)
 
 # %%
 # The next year

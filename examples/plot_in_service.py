@@ -114,9 +114,9 @@ print(history.summary())
 print(history.rates[["per_year", "standard_error", "drifts"]].round(4).to_string())
 change = 100 * (history.table - 1)
 estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "ci_low", "ci_high"))
-labels = {"labels": ("estimate", ""), "interval_label": "band of 95 %"}
+labels = {"labels": ("estimate", ""), "interval_label": "interval, 95 %"}
 PredictionDisplay.from_predictions(
-    estimate, None, *band, kind="lines", quantity="change of stiffness", unit="%", **labels
+    estimate, None, *band, kind="lines", quantity="change from nominal", unit="%", **labels
 )
 
 save_figures(options.figures)

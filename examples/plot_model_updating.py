@@ -117,7 +117,7 @@ for ax, (name, updater) in zip(axes, updaters.items(), strict=True):
     ax.set(title=name, xlabel="start, best first")
     ax.grid(axis="y", alpha=0.3)
     ax.legend(frameon=False, fontsize=9, loc="upper left")
-axes[0].set_ylabel("objective")
+axes[0].set_ylabel("objective (log scale)")
 
 # %%
 # Estimates beside the truth

@@ -87,9 +87,9 @@ for ax, name in zip(axes, models, strict=True):
         colour, marker = STYLES[regressor]
         ax.plot(row["training, s"], row["error"], marker, color=colour, ms=9, label=regressor)
         ax.plot(row["training, s"], row["refined"], marker, color=colour, ms=9, mfc="none")
-    ax.set(xscale="log", yscale="log", xlabel="training time (s)", title=f"{name}, noise-free")
+    ax.set(xscale="log", yscale="log", xlabel="training time (s, log scale)", title=f"{name}, noise-free")
     ax.grid(alpha=0.3)
-axes[0].set_ylabel("mean error of the parameters (%)")
+axes[0].set_ylabel("mean error of the parameters (%, log scale)")
 fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(STYLES))
 
 # %%

@@ -126,15 +126,15 @@ for name, estimator in (("piecewise-linear", TemperatureMapper()), ("boosted tre
 fig, ax = plt.subplots(figsize=(10, 4.6), layout="constrained")
 pavement = records.each(lambda frame: frame[PAVEMENT])
 plot_kinds(ax, pavement, inputs["piecewise-linear", PLAIN].each(lambda frame: frame["f2"]), ms=3)
-for whiten, style, label in (("global", "--", "2 deviations, all weather"), ("local", "-", "2 deviations, by weather")):
+for whiten, style, label in (("global", "--", "of all records"), ("local", "-", "of records in similar weather")):
     compensator = compensate(records, TemperatureMapper(), whiten)[1]
     weather = records.baseline.drop(columns=FREQUENCIES)
     deviation = pd.Series(compensator.spread_.deviations(weather)[:, 1], weather.index)
     deviation = deviation.groupby(pavement.baseline.round()).median()
-    ax.plot(2 * deviation, style, color="black", label=label)
+    ax.plot(2 * deviation, style, color="black", label=f"± 2 standard deviations {label}")
     ax.plot(-2 * deviation, style, color="black")
-ax.set(xlabel="pavement (°C)", ylabel=f"residual of {MODES[1]} (Hz)")
-fig.legend(loc="outside right upper", markerscale=3)
+ax.set(xlabel="pavement temperature (°C)", ylabel=f"residual of {MODES[1]} (Hz)")
+fig.legend(loc="outside upper center", markerscale=3, ncols=3)
 
 # %%
 # .. image:: /images/z24_spread.png
@@ -163,15 +163,15 @@ plot_indices(
         "raw frequencies": (MahalanobisDetector(), inputs["none", "raw frequencies"]),
         "raw frequencies, 20 neighbours": (candidates["raw, 20 neighbours"], inputs["none", "raw frequencies"]),
         "piecewise-linear residuals": (MahalanobisDetector(), inputs["piecewise-linear", PLAIN]),
-        "the same, whitened by weather": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
+        "piecewise-linear residuals, whitened": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
     },
     label="damage index",
 )
 
 # %%
 # .. image:: /images/z24_detection.png
-#    :alt: Damage index over time in four panels: of raw frequencies, the Mahalanobis distance leaves all damaged
-#          records below the threshold; by neighbours and by residuals, nearly all lie above it
+#    :alt: Damage index over time in four panels: of raw frequencies, the Mahalanobis distance leaves nearly all
+#          damaged records below the threshold; by neighbours and by residuals, nearly all lie above it
 #
 # Does it depend on the threshold?
 # --------------------------------

@@ -182,7 +182,7 @@ def read_matrix_market(content: bytes) -> Any:
         raise ValueError(f"{n_rows} x {n_columns}, {field}, {symmetry}; expected numbers, and a square if symmetric")
     start = SIZE_LINE.match(content).end()  # type: ignore[union-attr]
     body = COMMENTS.sub(b"", content[start:])
-    numbers = numbers_of(body)
+    numbers = numbers_of(body, content.count(b"\n", 0, start))
     width = (3 if layout == "coordinate" else 1) + (field == "complex")
     if layout == "array" and symmetry != "general":
         n_entries = n_rows * (n_rows - 1) // 2 + (0 if symmetry == "skew-symmetric" else n_rows)

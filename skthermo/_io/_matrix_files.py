@@ -88,8 +88,8 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
 
 
 BEGINNING = 65536  # bytes by which a form is recognised
-NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd]?[+-]\d+|[EeDd]\d+)?"
-ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + NUMBER
+REAL = rb"[+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EeDd]))(?:[EeDd][+-]?\d+)?"
+ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + REAL
 FORMS = {
     "MATLAB v5": rb".{124}(?:\x00\x01IM|\x01\x00MI)|\x89HDF",
     ".npz": rb"PK",
@@ -118,6 +118,15 @@ FORMATS = (
     "a file of MATLAB v5, NumPy (.npz), Matrix Market, Abaqus (.mtx), CalculiX, SAP2000, Harwell-Boeing (ANSYS) or "
     "Nastran (DMIG, OUTPUT4), or a folder of such files"
 )
+BINARY = {
+    "a binary file of ANSYS": (rb"\x64\0{3}.{4}[\x02\x04]\0{3}", "HBMAT writes it as text"),
+    "a binary file of Nastran": (
+        rb"\x18\0{3}|\0{3}\x18|\x04\0{3}.{4}\x04\0{3}",
+        "FORM=FORMATTED and DMIGPCH write text",
+    ),
+}
+"""How files begin that other packages read, and what writes the same matrices as text."""
+
 ABAQUS = re.compile(r"(?P<name>.+)_(?P<kind>STIF|MASS|DMP[VS]|LOAD)\d*", re.IGNORECASE)
 MASS = " (mass)"  # after the name of an export whose stiffness has that name
 HELD = 1e36  # what Abaqus puts on the diagonal where a degree of freedom is held
@@ -132,12 +141,16 @@ class NamedMatrices(NamedTuple):
 
 def form_of(file: Path) -> str | None:
     """The form of a file's content or, if it begins as none does, of its name; None if both are unknown."""
-    with open(file, "rb") as stream:
-        beginning = stream.read(BEGINNING)
+    beginning = _beginning(file, BEGINNING)
     text = beginning.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     both = {beginning, text}
     found = (form for form, pattern in FORMS.items() if any(re.match(pattern, one, re.DOTALL) for one in both))
     return next(found, SUFFIXES.get(file.suffix.lower()))
+
+
+def _beginning(file: Path, n_bytes: int) -> bytes:
+    with open(file, "rb") as stream:
+        return stream.read(n_bytes)
 
 
 def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
@@ -151,9 +164,22 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> NamedMatr
         return _read_folder(path, is_used)
     form = form_of(path) if path.is_file() else None
     if form is None or form == "labels of rows":
-        raise ValueError(f"{path} is none of these: {FORMATS}")
+        raise ValueError(_as_binary([path]) or f"{path} is none of these: {FORMATS}")
     content = read_files([(path, form)])[0]
     return _joined(content if isinstance(content, dict) else {path.stem: content}, path)
+
+
+def _as_binary(files: Sequence[Path]) -> str | None:
+    """Text for the error of the first binary file that another package reads; None if there is none."""
+    for file in files:
+        beginning = _beginning(file, 12) if file.is_file() else b""
+        for what, (pattern, instead) in BINARY.items():
+            if re.match(pattern, beginning, re.DOTALL):
+                return (
+                    f"{file} is {what}; expected text ({instead}), or matrices that you read with another package, as "
+                    'the guide shows in "From your FE program"'
+                )
+    return None
 
 
 def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
@@ -172,11 +198,15 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
             raise ValueError(f"{folder} holds {key!r} as {both}; expected one of them, or another name for one")
         named[key] = file
     if not named:
-        raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
+        raise ValueError(_as_binary(sorted(folder.iterdir())) or f"{folder} holds no matrix; expected {FORMATS}")
     of_rows = [file for file in files if forms[file] == "labels of rows"]
     used = [name for name in named if is_used(name)]
     contents = read_files([(file, forms[file]) for file in (*(named[name] for name in used), *of_rows)])
-    labels = {file.stem: rows for file, rows in zip(of_rows, contents[len(used) :], strict=True)}
+    labels = {
+        file.stem: rows
+        for file, rows in zip(of_rows, contents[len(used) :], strict=True)
+        if len(set(rows)) == len(rows)  # of beams and shells, CalculiX writes labels that occur more than once
+    }
     matrices: dict[str, Any] = dict.fromkeys(named)
     for name, content in zip(used, contents[: len(used)], strict=True):
         if isinstance(content, dict) and len(named) == 1:

@@ -17,7 +17,7 @@ Grid = NDArray[np.uint8]
 
 BYTES_FOR_EACH_ROW = 100  # that checks of a sparse matrix take, its entries apart
 LINES_AT_ONCE = 20_000
-SPACE, STAR, NEWLINE, POINT = b" *\n."
+SPACE, STAR, TAB, NEWLINE, POINT = b" *\t\n."
 MOST = 2**31 - 1  # rows, nodes and components are smaller
 HEADING = re.compile(rb"\A(?:[ \t]*(?![ \t\d+\-.]).*(?:\n|\Z))*")
 COMMENTS = re.compile(rb"^[ \t]*[*%#!$].*$", re.MULTILINE)
@@ -49,6 +49,10 @@ class Text:
         ends = np.flatnonzero(self.bytes == NEWLINE)
         self.ends = ends if content.endswith(b"\n") or not content else np.append(ends, len(content))
         self.starts = np.append(0, self.ends[:-1] + 1)[: len(self.ends)]
+        control = self.bytes < TAB
+        if control.any():
+            line = int(np.searchsorted(self.ends, np.argmax(control))) + 1
+            raise ValueError(f"line {line} holds the byte {self.bytes[np.argmax(control)]}, which no text does")
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -101,28 +105,32 @@ def numbers_of(text: bytes, n_before: int = 0) -> Numbers:
         raise
 
 
-def _fields(grid: Grid, lines: Integers, blank: bytes = b"") -> Numbers:
-    """One number for each row of characters; ``blank`` is what those of spaces alone mean."""
-    if blank:
+def _fields(grid: Grid, lines: Integers, if_blank: bytes = b"") -> Numbers:
+    """One number for each row of characters; ``if_blank`` is what those of spaces alone mean."""
+    if if_blank:
         empty = (grid == SPACE).all(axis=1)
-        grid[empty, grid.shape[1] - len(blank) :] = list(blank)
-    spaced = np.full((len(grid), grid.shape[1] + 1), SPACE, dtype=np.uint8)
-    spaced[:, :-1] = grid
+        grid[empty, grid.shape[1] - len(if_blank) :] = list(if_blank)
+    spaced = np.full((len(grid), grid.shape[1] + 2), SPACE, dtype=np.uint8)
+    spaced[:, 1:-1] = grid
+    blank = spaced <= SPACE
+    is_one = (blank[:, :-1] & ~blank[:, 1:]).sum(axis=1) == 1
     text = spaced.tobytes().translate(TO_FLOATS)
-    for attempt in (text, None):
+    for change in (lambda text: text, lambda text: BARE_EXPONENT.sub(rb"E\1", text)):
         try:
-            numbers = np.fromstring(BARE_EXPONENT.sub(rb"E\1", text) if attempt is None else attempt, sep=" ")
+            numbers = np.fromstring(change(text), sep=" ") if is_one.all() else np.empty(0)
         except (DeprecationWarning, ValueError):
             continue
         if len(numbers) == len(grid):
             return numbers
-    for row, line in zip(grid, lines, strict=True):
-        word = row.tobytes().translate(TO_FLOATS)
+    for row, line, is_word in zip(grid, lines, is_one, strict=True):
+        word = row.tobytes()
         try:
-            float(BARE_EXPONENT.sub(rb"E\1", word))
+            if not is_word:
+                raise ValueError
+            float(BARE_EXPONENT.sub(rb"E\1", word.translate(TO_FLOATS)))
         except ValueError:
-            raise ValueError(f"line {line + 1}: {row.tobytes().decode('latin-1').strip()!r} is not a number") from None
-    raise ValueError(f"lines {lines[0] + 1} to {lines[-1] + 1}: numbers that run into each other")
+            raise ValueError(f"line {line + 1}: {word.decode('latin-1').strip()!r} is not a number") from None
+    raise ValueError(f"lines {lines[0] + 1} to {lines[-1] + 1}: what is not a number")
 
 
 def _whole(numbers: Numbers, what: str, least: int = -MOST) -> Integers:
@@ -138,16 +146,22 @@ def _nodes(pairs: Numbers, least: int = -MOST) -> Integers:
     return np.column_stack([_whole(pairs[:, 0], "a node", least), _whole(pairs[:, 1], "a direction", 0)])
 
 
-def _symmetric(
-    rows: Integers, columns: Integers, values: Numbers, size: int, *, in_order: bool
-) -> scipy.sparse.csc_array:
-    """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
+def _square(rows: Integers, columns: Integers, values: Numbers, size: int) -> scipy.sparse.csc_array:
+    """A matrix each entry of which is given once."""
     bytearray(2 * BYTES_FOR_EACH_ROW * size)  # an error here if that is too much memory
     matrix = scipy.sparse.coo_array((values, (rows, columns)), shape=(size, size)).tocsc()
     if matrix.nnz < len(values):
         keys = np.sort(rows * size + columns)
         row, column = divmod(int(keys[:-1][keys[1:] == keys[:-1]][0]), size)
         raise ValueError(f"the entry of row {row + 1} and column {column + 1} is given more than once")
+    return matrix
+
+
+def _symmetric(
+    rows: Integers, columns: Integers, values: Numbers, size: int, *, in_order: bool
+) -> scipy.sparse.csc_array:
+    """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
+    matrix = _square(rows, columns, values, size)
     below, above = int((rows > columns).sum()), int((rows < columns).sum())
     if below and above:
         ones = np.ones(matrix.nnz, dtype=np.int8)
@@ -266,7 +280,7 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
     columns = np.repeat(np.arange(n_columns), np.diff(pointers))
     if kind[1] == "S":
         return _symmetric(rows, columns, found[2], n_rows, in_order=True)
-    return scipy.sparse.csc_array(scipy.sparse.coo_array((found[2], (rows, columns)), shape=(n_rows, n_columns)))
+    return _square(rows, columns, found[2], n_rows)
 
 
 def _block(text: Text, lines: Integers, words: Integers, n_numbers: int, n: int, width: int) -> Numbers:
@@ -274,6 +288,9 @@ def _block(text: Text, lines: Integers, words: Integers, n_numbers: int, n: int,
     if words.sum() == n_numbers:
         return _spaced_numbers(text, lines)
     numbers = [np.empty(0)]
+    for line in lines[(text.ends - text.starts)[lines] > n * width]:
+        if text.content[text.starts[line] + n * width : text.ends[line]].strip():
+            raise ValueError(f"line {line + 1} is longer than {n} fields of {width} characters")
     for part in text.parts(lines):
         fields = text.grid(part, n * width).reshape(-1, width)
         inside = np.repeat(part, n)[: n_numbers - n * int(part[0] - lines[0])]
@@ -309,8 +326,15 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
             line = int(cards.lines[np.argmax(cards.names == name)]) + 1
             raise ValueError(f"line {line}: matrix {name.decode('latin-1')!r} has no entry that states its form")
         form, kind = heads[name]
+        if form not in (1, 2, 6, 9) or kind not in (1, 2, 3, 4):
+            raise ValueError(
+                f"matrix {name.decode('latin-1')!r} has form {form:g} and type {kind:g}; expected 6 and 2, or such"
+            )
         mine = (cards.names[owner] == name) & ~is_head[owner]
         key = name.decode("latin-1")
+        without = mine & np.isnan(values[:, 2])
+        if without.any():
+            raise ValueError(f"line {at[np.argmax(without)] + 1}: matrix {key!r} has an entry without a value")
         if form in (1, 6) and kind in (1, 2):
             matrices[key] = _labelled(
                 _nodes(values[mine, :2], 1), _nodes(cards.fields[owner[mine]], 1), values[mine, 2]
@@ -365,10 +389,13 @@ def _dmig_lines(text: Text, wide: int) -> tuple[Cards, tuple[Integers, Numbers]]
 
 
 def _cards(grid: Grid, lines: Integers, width: int) -> Cards:
-    names = grid[:, 8:16].tobytes()
+    names = grid[:, 8 : 8 + width].tobytes()
     fields = [grid[:, i : i + width].copy() for i in range(8 + width, 8 + 4 * width, width)]
-    numbers = [_fields(field, lines, b"0") for field in fields]
-    stripped = [names[i : i + 8].strip() for i in range(0, len(names), 8)]
+    numbers = [_fields(field, lines, blank) for field, blank in zip(fields, (b"nan", b"0", b"0"), strict=True)]
+    stripped = [names[i : i + width].strip() for i in range(0, len(names), width)]
+    for name, line in zip(stripped, lines, strict=True):
+        if not 0 < len(name) <= 8:
+            raise ValueError(f"line {line + 1}: {name.decode('latin-1')!r} is no name of one to eight characters")
     return Cards(lines, np.array(stripped, dtype="S8"), np.column_stack(numbers))
 
 
@@ -376,7 +403,7 @@ def _quadruples(
     chosen: NDArray[np.bool_], at: int, width: int, grid: Grid, lines: Integers
 ) -> tuple[Integers, Numbers]:
     """Line, and grid point, component and value of the entries that stand at a place of some lines."""
-    chosen = chosen & (grid[:, at : at + width] != SPACE).any(axis=1)
+    chosen = chosen & (grid[:, at : at + 3 * width] != SPACE).any(axis=1)
     rows, on = grid[chosen], lines[chosen]
     fields = [rows[:, i : i + width].copy() for i in range(at, at + 3 * width, width)]
     blanks = (b"nan", b"0", b"nan")
@@ -431,9 +458,9 @@ def read_op4(content: bytes) -> dict[str, scipy.sparse.csc_array | None]:
 def _op4_strings(
     text: Text, lines: Integers, words: Integers, points: Integers, n_columns: int, *, is_big: bool
 ) -> Integers:
-    """Line, column, first row and number of words of each string of values, and whether it is a whole column.
+    """Line, column, first row and number of words of each string, and whether it begins a column.
 
-    The last is the end of the matrix.
+    A column of strings has no words itself, and one of a block is its only string. The last is the end of the matrix.
     """
     on = lines[(points == 0) & (words > 0)]
     words = words[(points == 0) & (words > 0)]
@@ -453,8 +480,8 @@ def _op4_strings(
     packed, second = numbers[begins], numbers[begins + 1]
     row = second if is_big else packed % OP4_STRING
     size = packed - 1 if is_big else packed // OP4_STRING - 1
-    row[is_column], size[is_column] = first, length
-    return np.column_stack([on, column, row, size, is_column])[~(is_column & (row == 0))]
+    row[is_column], size[is_column] = first, np.where(first > 0, length, 0)  # of strings, if it begins in row 0
+    return np.column_stack([on, column, row, size, is_column])
 
 
 def _op4_matrix(
@@ -479,13 +506,15 @@ def _op4_matrix(
     before = np.append(0, np.cumsum(counts))[np.searchsorted(on, np.append(strings[:, 0], lines[-1] + 1))]
     held, (line, column, row, size, is_block) = np.diff(before), strings.T
     wrong = (kind * held != size) & ~((is_block == 1) & (held == size))  # some programs count a block's values
-    if wrong.any():
+    if wrong.any() or before[0]:
         i = np.argmax(wrong)
-        raise ValueError(f"line {line[i] + 1} states {size[i]} words, and {held[i]} values follow")
-    rows = np.repeat(row - 1 - before[:-1], held) + np.arange(before[0], before[-1])
+        raise ValueError(
+            f"line {line[i] + 1} states {size[i]} words; {held[i]} values follow, and {before[0]} come before"
+        )
+    rows = np.repeat(row - 1 - before[:-1], held) + np.arange(before[-1])
     columns = np.repeat(column - 1, held)
     inner = columns < n_columns
     if len(rows) and (rows[inner].min(initial=0) < 0 or rows[inner].max(initial=0) >= n_columns):
         raise ValueError(f"row {rows[inner].max() + 1} of {n_columns}")
-    everything = np.concatenate([np.empty(0), *values])[before[0] :]
+    everything = np.concatenate([np.empty(0), *values])
     return _symmetric(rows[inner], columns[inner], everything[inner], n_columns, in_order=True)

@@ -9,7 +9,7 @@ from skthermo.fem._protocol import (
     LocalModel,
     ModalModel,
 )
-from skthermo.fem.affine import AffineModel, ReducedModel
+from skthermo.fem.affine import AffineModel, FrequencySurface, ReducedModel
 from skthermo.fem.assembly import ImportedStructure, Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
@@ -25,6 +25,7 @@ __all__ = [
     "DifferentiableModel",
     "Element",
     "FEModel",
+    "FrequencySurface",
     "ImportedStructure",
     "LocalModel",
     "LocalModes",

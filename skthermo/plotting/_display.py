@@ -29,7 +29,7 @@ BLACK, GREY, LIGHT = "#000000", "#555555", "#BBBBBB"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
 MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
-LONGEST_NAME = 30  # number of letters above which a name is shortened
+LONGEST_NAME = 36  # number of letters above which a name is shortened
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""

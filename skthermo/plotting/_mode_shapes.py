@@ -16,6 +16,7 @@ from skthermo.plotting._structures import (
     add_members,
     check_structure,
     corners,
+    dofs_of,
     draw_supports,
     set_view,
     sort_members,
@@ -204,7 +205,7 @@ def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashab
     """Places of the nodes in a mode, whose largest displacement is a share of the structure's extent."""
     nodes, axes = view.nodes, view.directions
     moves = {node: np.zeros(len(axes)) for node in nodes}
-    for (node, direction), value in zip(view.structure.dofs, shape, strict=True):
+    for (node, direction), value in zip(dofs_of(view.structure), shape, strict=True):
         if direction in list(axes) and node in moves:
             moves[node][axes.index(direction)] = value
     largest = max(np.linalg.norm(move) for move in moves.values())

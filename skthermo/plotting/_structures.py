@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, Label
 from skthermo.fem import Structure
 from skthermo.plotting._display import BLACK, drawing, panels, pyplot
 
@@ -18,6 +18,17 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 AXES = "xyz"
+OTHER_NAMES = {
+    "x": (1, "UX", "DX"),
+    "y": (2, "UY", "DY"),
+    "z": (3, "UZ", "DZ"),
+    "rx": (4, "ROTX", "DRX"),
+    "ry": (5, "ROTY", "DRY"),
+    "rz": (6, "ROTZ", "DRZ"),
+}
+DIRECTIONS = {name: direction for direction, names in OTHER_NAMES.items() for name in names}
+"""Directions by the names that other programs give them."""
+
 NORMALS = "yzx"  # a structure along one line is drawn with z upwards, if it moves there
 TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
 ELEVATION, AZIMUTH = 22, -60
@@ -37,7 +48,7 @@ class Projection:
         if structure.dimension == 2:
             return cls(structure, "xy")
         if not any(hasattr(one, "get_zlim") for one in np.ravel(np.asarray(ax, dtype=object))):
-            moving = {direction for _, direction in structure.dofs}
+            moving = {direction for _, direction in dofs_of(structure)}
             extent = np.ptp(list(structure.nodes.values()), axis=0)
             for normal in NORMALS:
                 plane = AXES.replace(normal, "")
@@ -59,9 +70,14 @@ class Projection:
     @property
     def supports(self) -> dict[Hashable, bool]:
         """Nodes that are held in a direction in which others move, and whether in every such direction."""
-        moving = ({direction for _, direction in self.structure.dofs} or set(AXES)).intersection(self.directions)
+        moving = ({direction for _, direction in dofs_of(self.structure)} or set(AXES)).intersection(self.directions)
         held = {node: moving.intersection(along) for node, along in self.structure.supports.items()}
         return {node: fixed == moving for node, fixed in held.items() if fixed}
+
+
+def dofs_of(structure: Structure) -> list[Label]:
+    """Nodes and directions of the degrees of freedom, with directions called "x" to "rz" where they are known."""
+    return [(node, DIRECTIONS.get(direction, direction)) for node, direction in structure.dofs]
 
 
 def check_structure(structure: object, groups: Iterable[str] | None) -> None:

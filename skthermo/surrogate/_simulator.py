@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pickle import PicklingError
 from threading import Lock
 from typing import Any
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import DEFAULT_TOLERANCE, Array, Bounds, Reduce, check_bounds, is_auto, tolerance
 from skthermo.exceptions import ModelWarning
-from skthermo.fem import FEModel, evaluate, linearise, linearise_modes
+from skthermo.fem import AffineModel, FEModel, FrequencySurface, ReducedModel, evaluate, linearise, linearise_modes
 
 NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
 MANY_FAR_ROWS = 0.05  # share of rows far outside the box that gives a warning
@@ -72,6 +74,9 @@ MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their 
 MOST_KEPT = 25_000_000  # numbers, of 8 bytes, in the bases of reduced models that are kept
 NO_BASIS = "no reduced model is accurate where the parameters of the records are"
 NO_GAIN = "a reduced model would save no time"
+NUMBERS_PER_DOF = 100  # that a simulator counts as beside bases, at most
+SHARE_OF_SURFACE = 0.4  # of the error that a reduced model may have
+ROWS_PER_SOLVE = 4  # rows for which frequencies are wanted, for each row that is solved to make a surface
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
@@ -98,15 +103,21 @@ def box_around(theta: Array, limits: Array | None = None) -> Array:
 class KnownChanges:
     """Simulators of changed structures, whose reduced models are made once; copies and other processes begin with none.
 
-    Those asked for last are kept, as many as have `MOST_KEPT` numbers in their bases.
+    Those asked for last are kept, as many as have `MOST_KEPT` numbers in their bases. ``surfaces`` are those of one
+    structure by the degree up to which they may go, None where none is accurate, and ``solved`` counts its rows.
     """
 
     def __init__(self) -> None:
         self._simulators: dict[str, Simulator] = {}
+        self.surfaces: dict[int, FrequencySurface | None] = {}
+        self.solved: Counter[str] = Counter()
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[type[KnownChanges], tuple[()]]:
         return KnownChanges, ()
+
+    def __iter__(self) -> Iterator[Simulator]:
+        return iter([*self._simulators.values()])
 
     def simulator(self, make: Callable[[], Simulator], *change: Any) -> Simulator:
         """What ``make`` gives for a change, made now or before."""
@@ -129,7 +140,8 @@ class KnownChanges:
 class Simulator:
     """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2).
 
-    Without one, the ``reason`` says why.
+    Without one, the ``reason`` says why. Frequencies of many rows come from a `~skthermo.fem.FrequencySurface` near the
+    rows of theta that the weather gives, ``usual``, if there are such.
     """
 
     model: FEModel
@@ -137,6 +149,7 @@ class Simulator:
     box: Array | None = None
     tol: float = DEFAULT_TOLERANCE
     reason: str = ""
+    usual: Array | None = None
     _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
 
     @classmethod
@@ -149,12 +162,13 @@ class Simulator:
         tol = tolerance(model, reduce, SOLVES_PER_ROW * len(theta))
         allowed = DEFAULT_TOLERANCE if auto else tol
         is_known = known is not None and known.model is model and known.covers(box)
+        usual = theta if reduce and isinstance(model, AffineModel | ReducedModel) else None
         if known is not None and is_known and allowed is not None and known.tol <= allowed:
-            return known
+            return replace(known, usual=usual)
         if tol is None:
-            return cls(model, reason=reason_of(model, reduce))
+            return cls(model, reason=reason_of(model, reduce), usual=usual)
         try:
-            return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol)
+            return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol, usual=usual)
         except RuntimeError as error:
             if not auto:
                 ranges = ", ".join(
@@ -168,7 +182,7 @@ class Simulator:
                     ModelWarning,
                     "no reduced model",
                 )
-            return cls(model, reason=NO_BASIS)
+            return cls(model, reason=NO_BASIS, usual=usual)
 
     @property
     def described(self) -> str:
@@ -182,8 +196,16 @@ class Simulator:
 
     @property
     def size(self) -> int:
-        """Number of numbers in the bases of reduced models."""
-        return sum(model.basis_size_ * model.n_dof for model in (self.model, self.reduced) if hasattr(model, "full"))
+        """Number of numbers in the bases of reduced models and in surfaces; 0 for a full model that has none."""
+        bases = sum(model.basis_size_ * model.n_dof for model in (self.model, self.reduced) if hasattr(model, "full"))
+        own = 0 if self.usual is None else NUMBERS_PER_DOF * self.model.n_dof
+        return bases + own + sum(one.size for one in self._known.surfaces.values() if one is not None)
+
+    @property
+    def solved(self) -> dict[str, int]:
+        """How many rows of frequencies came from surfaces, from reduced and from full models, of all structures."""
+        counts = [self._known.solved, *(one.solved for one in self._known)]
+        return {way: sum(count[way] for count in counts) for way in ("surface", "reduced", "full")}
 
     def covers(self, box: Array) -> bool:
         """Whether the reduced model is accurate within a whole box."""
@@ -218,7 +240,8 @@ class Simulator:
 
         def make() -> Simulator:
             reduced = None if self.reduced is None else getattr(self.reduced, method)(*args, **options)
-            return Simulator(getattr(self.model, method)(*args, **options), reduced, self.box, self.tol)
+            model = getattr(self.model, method)(*args, **options)
+            return Simulator(model, reduced, self.box, self.tol, self.reason, self.usual)
 
         return self._known.simulator(make, method, args, options) if self.size else make()
 
@@ -231,7 +254,7 @@ class Simulator:
         severities = (min(lowest, 0.0) - MARGIN_OF_SEVERITY, min(max(highest, 0.0) + MARGIN_OF_SEVERITY, 0.99))
         changed = self.changed("with_damage_parameters", groups, severities=severities)
         if self.box is None:
-            return changed
+            return replace(changed, usual=None)
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
 
@@ -251,11 +274,47 @@ class Simulator:
 
         return make() if box is None else self._known.simulator(make, "with_columns", list(groups), dict(masses), box)
 
-    def frequencies(self, theta: Array, n_jobs: int | None = None, *, warn: bool = True) -> Array:
-        """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""
+    def frequencies(
+        self, theta: Array, n_jobs: int | None = None, *, warn: bool = True, n_rows: int | None = None
+    ) -> Array:
+        """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN.
+
+        If frequencies of ``n_rows`` rows will be asked for, they come from a surface where that saves time. By default
+        these rows are all, and a model that is not reduced has no surface.
+        """
+        surface = self._surface(n_rows if n_rows is not None else len(theta) * (self.reduced is not None), n_jobs)
+        if surface is None:
+            return self._solved(theta, n_jobs, warn)
+        known = ~np.isnan(theta).any(axis=1)
+        frequencies = np.full((len(theta), self.model.n_modes), np.nan)
+        frequencies[known], served = surface.frequencies(theta[known])
+        self._known.solved["surface"] += int(served.sum())
+        left = np.flatnonzero(known)[~served]
+        if len(left):
+            frequencies[left] = self._solved(theta[left], n_jobs, warn)
+        return frequencies
+
+    def _surface(self, n_rows: int, n_jobs: int | None) -> FrequencySurface | None:
+        """The surface that saves time for so many rows; None where there is none."""
+        if self.usual is None:
+            return None
+        surfaces = self._known.surfaces
+        degree = FrequencySurface.degree_within(n_rows // ROWS_PER_SOLVE, self.usual.shape[1])
+        if degree not in surfaces:
+            tol, solve = SHARE_OF_SURFACE * self.tol, partial(self._solved, n_jobs=n_jobs, warn=False)
+            try:
+                found = FrequencySurface(solve, self.usual, tol=tol, highest_degree=degree, bounds=self.box)
+            except RuntimeError:
+                found = None
+            surfaces[degree] = found
+        return surfaces[degree]
+
+    def _solved(self, theta: Array, n_jobs: int | None, warn: bool) -> Array:
+        """Frequencies by the reduced model in its box, by the full one elsewhere."""
+        outside = self.outside(theta)
+        self._known.solved.update(reduced=int((~outside).sum()), full=int(outside.sum()))
         if self.reduced is None:
             return evaluate(self.model, theta, n_jobs=n_jobs)
-        outside = self.outside(theta)
         frequencies = np.full((len(theta), self.model.n_modes), np.nan)
         frequencies[~outside] = evaluate(self.reduced, theta[~outside], n_jobs=n_jobs)
         if outside.any():

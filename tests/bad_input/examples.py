@@ -486,8 +486,10 @@ use(
         None,
         bad(True, 3, b"c", str(FOLDER), __file__, Path, NAN),
     ),
+    groups=({"g": ["k"]}, bad("k", ["k"], 3, True, {"g": []}, {"g": ["E"]}, {"g": 1}, {"g": None}, {"g": ["k", "k"]})),
 )
 PROGRAMMED = fem.CallableModel(lambda theta: [theta[0] ** 0.5], ["k"], 1)
+method("fem.CallableModel.damaged", PROGRAMMED, damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
 method(
     "fem.CallableModel.frequencies",
     PROGRAMMED,

@@ -5,8 +5,14 @@
 Bytes are flipped, cut off, inserted or exchanged, and numbers that state lengths are changed; of compressed files also
 the content, which is then compressed again with right checksums. Files are read by `load_affine`, `load_z24` or
 `load_kw51`, 250 of them in one process, which starts a child for each. A file passes if it is read, or refused by a
-ValueError or OSError that names it, and that process takes at most 256 MB; the child has a limit of its own. The exit
-code is 1 if one does not. A thousand files take some 10 minutes.
+ValueError or OSError that names it, and that process takes at most 256 MB; the child has a limit of its own. Texts of
+matrices that are read are also compared with what slow readers, line by line, find in them. The exit code is 1 if one
+fails. A thousand files take some 10 minutes.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/fuzz_loaders.py --files 700 --formats Abaqus CalculiX RSA RUA ANSYS \\
+        Rutherford DMIG OP4
+
+reads only formats whose names have one of these words.
 """
 
 import argparse
@@ -28,8 +34,13 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
+from skthermo._io import read_named_matrices
 from skthermo.datasets import load_kw51, load_z24
 from skthermo.fem import load_affine
+
+sys.path.append(str(Path(__file__).parents[2]))  # which Python does not do itself for a file that it runs
+from tests.fem.exported_files import TEXTS
+from tests.fem.slow_readers import agrees
 
 MOST_MEGABYTES = 256
 FILES_IN_A_PROCESS = 250
@@ -140,6 +151,8 @@ def valid_files():
     }
     for form in ("csr", "csc", "coo", "bsr", "dia"):
         files[f"sparse npz, {form}"] = ("folder", "E_1.npz", sparse_npz(form))
+    for kind, (suffix, _, text) in TEXTS.items():
+        files[kind] = ("text", f"E_1{suffix}", text(E_1).encode())
     return files
 
 
@@ -200,9 +213,12 @@ def mutated_inside(content, random):
     return content[:HEADER_OF_MAT] + b"".join(struct.pack("<II", 15, len(element)) + element for element in elements)
 
 
-def read(loader, file):
+def read(loader, file, kind):
     """What became of one file: "read", "refused", or what was wrong."""
     try:
+        if loader == "text":
+            found = read_named_matrices(file, lambda name: True)
+            return "read" if agrees(kind, file.read_bytes(), found) else "another matrix than its text holds"
         if loader in OF_DATA:
             OF_DATA[loader](file)
         else:
@@ -232,7 +248,7 @@ def written_to(folder, jobs):
             random = np.random.default_rng(seed)
             content = (mutated_inside if random.integers(2) else mutated)(content, random)
         file.write_bytes(content)
-        yield loader, file
+        yield loader, file, format_name
 
 
 def reset_peak():
@@ -252,11 +268,11 @@ def peak_megabytes():
 def read_all(files, pipe):
     """Read files, and send for each what became of it and how much memory it took at most."""
     warnings.simplefilter("ignore")
-    for loader, file in files:
+    for loader, file, kind in files:
         reset_peak()
         before = peak_megabytes()
         pipe.send(None)
-        outcome = read(loader, file)
+        outcome = read(loader, file, kind)
         pipe.send((outcome, peak_megabytes() - before))
     pipe.close()
 
@@ -285,8 +301,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=int, default=1000, help="mutated files, of all formats together")
     parser.add_argument("--seed", type=int, default=0, help="of the first file")
+    parser.add_argument("--formats", nargs="*", default=[""], help="words of which names of formats have one")
     options = parser.parse_args()
-    names = list(valid_files())
+    names = [name for name in valid_files() if any(word in name for word in options.formats)]
     jobs = [(name, None) for name in names]
     jobs += [(names[seed % len(names)], seed) for seed in range(options.seed, options.seed + options.files)]
     counts, wrong, largest = collections.Counter(), [], (0.0, "no file")

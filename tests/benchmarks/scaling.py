@@ -80,7 +80,7 @@ def plot(samples, sizes, zones):
     fig, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
     for (name, points), marker, colour in zip(samples.items(), "os^", (BLUE, GREEN, ORANGE), strict=True):
         axes[0].loglog(*zip(*points, strict=True), marker=marker, color=colour, label=name)
-    axes[0].set(xlabel="samples", ylabel="seconds, basis included")
+    axes[0].set(xlabel="samples (log scale)", ylabel="seconds, basis included (log scale)")
     for ax, rows, x in ((axes[1], sizes, "degrees of freedom"), (axes[2], zones, "parameters")):
         for column, marker, colour in (
             ("full (ms)", "^", ORANGE),
@@ -88,8 +88,8 @@ def plot(samples, sizes, zones):
             ("reduced (ms)", "s", GREEN),
         ):
             ax.loglog([r[x] for r in rows], [r[column] for r in rows], marker=marker, color=colour, label=column[:-5])
-        ax.set(xlabel=x, ylabel="milliseconds a solve of 6 modes")
-    axes[2].set_xscale("linear")
+        ax.set(xlabel=f"{x} (log scale)", ylabel="milliseconds a solve of 6 modes (log scale)")
+    axes[2].set(xscale="linear", xlabel="parameters")
     axes[2].set_title(f"{zones[0]['degrees of freedom']} degrees of freedom", fontsize="medium")
     for ax in axes:
         ax.legend(fontsize="small")

@@ -120,3 +120,47 @@ def test_one_file_of_whole_matrices(tmp_path):
     scipy.sparse.save_npz(tmp_path / "other.npz", scipy.sparse.csc_array(M))
     with pytest.raises(ValueError, match=r"bridge\.npz holds .*; expected one stiffness K"):
         load_affine(tmp_path, factor=5.0, n_modes=4)
+
+
+def test_labels_that_occur_more_than_once_are_left_out(tmp_path):
+    """CalculiX writes such labels for beams: rows that share one are still different rows."""
+    write(calculix, tmp_path)
+    for job in ("nominal", *TERMS):
+        (tmp_path / f"{job}.dof").write_text("1.1\n1.2\n1.1\n2.1\n2.2\n2.3\n")
+    model = load_affine(tmp_path, factor=2.0, n_modes=4)
+    assert_same(model, EXPECTED)
+    assert model.dofs == ()
+
+
+def test_names_may_stand_anywhere_in_their_field(tmp_path):
+    """pyNastran writes names of matrices at the right end of large fields."""
+    write(nastran, tmp_path)
+    for file in tmp_path.iterdir():
+        lines = file.read_text().splitlines()
+        moved = [line[:8] + line[8:24].strip().rjust(16) + line[24:] if line[:5] == "DMIG*" else line for line in lines]
+        file.write_text("\n".join(moved) + "\n")
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, 1e-8)  # nine digits
+
+
+def ansys_binary(number):
+    return np.array([100, -(2**31), number, *[0] * 98, 100], dtype="<i4").tobytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "program"),
+    [
+        (ansys_binary(4), "ANSYS"),
+        (ansys_binary(2), "ANSYS"),
+        (np.array([24, 6, 6, 6, 2], dtype="<i4").tobytes() + b"KGG     ", "Nastran"),
+        (np.array([24, 6, 6, 6, 2], dtype=">i4").tobytes() + b"KGG     ", "Nastran"),
+        (np.array([4, 3, 4, 12], dtype="<i4").tobytes(), "Nastran"),
+    ],
+)
+def test_binary_files_of_programs_are_named(tmp_path, content, program):
+    file = tmp_path / "nominal.bin"
+    file.write_bytes(content)
+    for path in (file, tmp_path):
+        with pytest.raises(ValueError, match=f"nominal.bin is a binary file of {program}; expected text"):
+            load_affine(path)
+    write(abaqus, tmp_path)
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED)  # beside texts, they are ignored

@@ -105,6 +105,35 @@ def test_third_party_programs_run_row_by_row_or_all_at_once():
     assert clone(by_row) is by_row
 
 
+def test_a_program_is_damaged_by_its_parameters(tmp_path):
+    """As the affine model with the same stiffness: severities multiply parameters, one after the other."""
+    truss = make_truss()
+    rows = np.random.default_rng(0).uniform(0.8, 1.2, (4, 4))
+    asked = []
+
+    def program(theta):
+        asked.append(theta)
+        return truss.frequencies(theta)
+
+    names, cache = truss.parameter_names, tmp_path / "solved"
+    model = CallableModel(program, names, 6, vectorized=True, cache=cache)
+    assert list(model.groups) == list(names)
+    for damage in ({"bottom": 0.2}, {"top": -0.15, "diagonal": 0.4}, {}):
+        expected = truss.damaged(damage).frequencies(rows)
+        np.testing.assert_array_equal(model.damaged(damage).frequencies(rows), expected)
+    twice = model.damaged({"bottom": 0.2}).damaged({"bottom": 0.5})
+    np.testing.assert_allclose(twice.frequencies(rows), truss.damaged({"bottom": 0.6}).frequencies(rows), rtol=1e-12)
+    np.testing.assert_array_equal(model.frequencies(rows), truss.frequencies(rows))
+    n_asked = len(asked)
+    again = CallableModel(program, names, 6, vectorized=True, cache=cache, groups={"chords": ["bottom", "top"]})
+    np.testing.assert_array_equal(again.damaged({}).frequencies(rows), truss.frequencies(rows))
+    assert len(asked) == n_asked  # one cache for all states
+    both = again.damaged({"chords": 0.1}).frequencies(rows)
+    np.testing.assert_array_equal(both, truss.damaged({"bottom": 0.1, "top": 0.1}).frequencies(rows))
+    with pytest.raises(ValueError, match="unknown damage group 'bottom'"):
+        again.damaged({"bottom": 0.1})
+
+
 def test_noise_is_relative_gaussian_and_by_mode():
     clean = np.full((40_000, 2), [5.0, 50.0])
     noisy = add_noise(clean, [0.01, 0.02], random_state=0)

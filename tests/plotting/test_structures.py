@@ -49,21 +49,21 @@ def test_a_group_colours_its_members_and_a_member_its_own_line():
         np.testing.assert_array_equal(StructureDisplay.from_structure(structure, values).values, [1, 1, 2, 2, 3])
 
 
-@pytest.mark.parametrize("has_labels", [True, False])
-def test_members_from_another_program_are_drawn_as_our_own(has_labels):
+@pytest.mark.parametrize("directions", [("x", "y"), (1, 2), ("UX", "UY"), ()])
+def test_members_from_another_program_are_drawn_as_our_own(directions):
     own = king_post()
     alone = Structure(own.nodes, own.members, own.supports, {name: [name] for name in own.members})
-    exported = alone.assemble(list(own.members), n_modes=2)
-    if not has_labels:
-        terms = {(name,): K for name, K in zip(own.members, exported.stiffness_terms, strict=True)}
-        exported = AffineModel(terms, exported.matrices(np.ones(5))[1], n_modes=2)
+    model = alone.assemble(list(own.members), n_modes=2)
+    terms = {(name,): K for name, K in zip(own.members, model.stiffness_terms, strict=True)}
+    labels = [(node, directions["xy".index(direction)]) for node, direction in own.dofs] if directions else []
+    exported = AffineModel(terms, model.matrices(np.ones(5))[1], n_modes=2, dofs=labels)
     ends = {name: bar.nodes for name, bar in own.members.items()}
     imported = ImportedStructure(exported, own.nodes, ends, own.groups, supports=own.supports)
     values = {"rafters": 2.0, "post": 1.0}
     displays = [StructureDisplay.from_structure(one, values) for one in (own, imported)]
     assert colours(displays[1]) == pytest.approx(colours(displays[0]), nan_ok=True)
     assert len(displays[1].ax_.lines) == len(displays[0].ax_.lines) == 2
-    if has_labels:
+    if directions:
         ours, theirs = (ModeShapesDisplay.from_structure(one, modes=[0]).lines_[0][0] for one in (own, imported))
         shapes = [np.array(lines.get_segments()) for lines in (ours, theirs)]
         rest = np.array([[own.nodes[node] for node in pair] for pair in ends.values()])

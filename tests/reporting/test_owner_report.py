@@ -175,7 +175,7 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
 @pytest.mark.usefixtures("blank_drawings")
 def test_lags_are_no_sensors():
     fem, T, F = fitted_chain()
-    lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), T.rename(columns={SENSOR: "deck"})], axis=1)
+    lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), (0.9 * T).rename(columns={SENSOR: "deck"})], axis=1)
     lagged["deck_lag2"], lagged["north_lag3"] = T[SENSOR].shift(2).bfill(), T[SENSOR].shift(3).bfill()
     study = run_study(clone(fem).fit(lagged, F), lagged, [Scenario("healthy")])
     page = Page(monitored(study, None, []))

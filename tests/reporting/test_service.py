@@ -13,6 +13,7 @@ from skthermo._tables.text import share_text
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
+from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._sections import (
     drift,
@@ -187,6 +188,18 @@ def test_a_response_that_was_set_aside_is_named_and_what_to_do():
     assert "f2 is left out" in page.text
     assert "whether the sensors or the structure have changed" in page.text
     assert "a response was set aside: its sensor, or the structure, has changed" in str(events(standing_of(monitor)))
+
+
+def test_the_smallest_change_that_would_be_seen_is_said():
+    monitor = FakeMonitor()
+    text = "A fall of all responses by 1 %, or of one response alone by 2 % (f1) to 3 % (f2) raises an alarm"
+    assert text in today_of(monitor).text
+    page = Page(false_alarms(standing_of(monitor)))
+    falls = dict(zip(page.heads[-3:], page.cells[-3:], strict=True))
+    assert falls == {"all responses by one share": f"1{SPACE}%", "f1 alone": f"2{SPACE}%", "f2 alone": f"3{SPACE}%"}
+    monitor.smallest_changes_ = SmallestChanges(np.nan, {"f1": 0.5, "f2": np.nan}, False, pd.Timedelta("3D"))
+    page = Page(false_alarms(standing_of(monitor)))
+    assert page.cells[-2:] == [f"0.50{SPACE}Hz", "none is seen"]
 
 
 def test_events_that_nobody_has_explained_are_named():

@@ -196,9 +196,25 @@ def test_frequencies_that_no_change_of_a_structure_explains(fem, factors, messag
         identify_damage(fem, WEATHER, simulated(fem, WEATHER) * factors, GROUPS)
 
 
+class OwnModel:
+    """A user's model that offers frequencies alone."""
+
+    parameter_names, n_modes, frequencies = make_truss().parameter_names, 6, make_truss().frequencies
+
+
+def test_a_program_that_gives_frequencies_alone_has_its_parameters_as_groups(fem):
+    """Without matrices and derivatives, damage is identified as with them."""
+    truss, F = make_truss(), simulated(fem, WEATHER, damage={"bottom": 0.15})
+    program = CallableModel(truss.frequencies, truss.parameter_names, 6, vectorized=True)
+    chains = fem, fem.with_model(program)
+    ours, theirs = (identify_damage(one, WEATHER, F, GROUPS, random_state=0) for one in chains)
+    assert theirs.most_probable == ours.most_probable == ("bottom",)
+    columns = ["probability", "severity"]
+    np.testing.assert_allclose(theirs.table[columns], ours.table[columns], atol=2e-3)
+
+
 def test_a_model_that_cannot_be_damaged(fem):
-    truss = make_truss()
-    other = copy.copy(fem).set_params(model=CallableModel(truss.frequencies, list(truss.parameter_names), 6))
+    other = copy.copy(fem).set_params(model=OwnModel())
     with pytest.raises(ValueError, match="has no damage groups; expected a model that can be damaged"):
         identify_damage(other, WEATHER, fem.predict(WEATHER))
 

@@ -23,6 +23,10 @@ from tests.surrogate.chains import chain
 ONLY = "MahalanobisDetector"  # name of the only detector of a study
 
 
+WITHIN = {"rtol": 0, "atol": 2e-3}
+"""Of damage indices: surfaces err by 4e-6, a 2500th of the noise, in each of six modes."""
+
+
 def first_seed(random_state):
     return int(np.random.RandomState(random_state).randint(np.iinfo(np.int32).max, size=(1, 2))[0, 0])
 
@@ -37,7 +41,7 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
     for name, damage in (("healthy", None), ("a fifth", {"bottom": 0.2})):
         records = fem.simulate(WEATHER, damage=damage, noise=noise, random_state=first_seed(3))
         index = detector.damage_index(records)
-        pd.testing.assert_series_equal(study.indices_[ONLY, name, "simulated"], index)
+        pd.testing.assert_series_equal(study.indices_[ONLY, name, "simulated"], index, **WITHIN)
         assert results.loc[name, "rate"] == probability_of_detection(index, detector.threshold_)
         wait = time_to_detection(index, detector.threshold_)
         assert results.loc[name, "time_to_detection"] == wait
@@ -82,7 +86,7 @@ def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
     expected = -detector.score_samples(records.join(WEATHER)[[*MODES, "T2", "T1", "T3"]])
-    np.testing.assert_allclose(study.indices_[ONLY, "top 10 %", "simulated"], expected)
+    np.testing.assert_allclose(study.indices_[ONLY, "top 10 %", "simulated"], expected, **WITHIN)
 
 
 def test_a_detector_may_see_some_of_the_modes(fem):

@@ -187,6 +187,51 @@ def test_full_models_are_not_kept():
     assert simulator.damaged({"top": 0.1}) is not simulator.damaged({"top": 0.1})
 
 
+USUAL = np.exp(np.random.default_rng(1).normal(0, 1, (300, 1)) * [0.02, -0.01, 0.015, 0.01])
+
+
+def with_surfaces(known=None):
+    return Simulator.around(TRUSS, USUAL, 1e-5, known)
+
+
+def test_many_rows_come_from_a_surface_and_the_others_are_counted():
+    simulator = with_surfaces().damaged({"top": 0.2})
+    later = np.vstack([np.repeat(USUAL, 4, axis=0), [[1.3, 1, 1, 1]], [[np.nan, 1, 1, 1]], 2 * USUAL[:3]])
+    with pytest.warns(UserWarning, match="4 of .* rows are outside the box"):
+        found = simulator.frequencies(later)
+    exact = simulator.model.frequencies(later[~np.isnan(later).any(axis=1)])
+    np.testing.assert_allclose(found[~np.isnan(found).any(axis=1)], exact, rtol=1.5e-5)
+    assert np.isnan(found[1201]).all()
+    (surface,) = simulator._known.surfaces.values()
+    counts = simulator.solved
+    assert counts["surface"] >= 1150
+    assert sum(counts.values()) == 1204 + surface.n_solves_
+    assert counts["full"] == 4
+
+
+def test_a_surface_does_not_depend_on_what_was_asked_before():
+    rows = np.repeat(USUAL, 8, axis=0)
+    one, other = with_surfaces(), with_surfaces()
+    one.frequencies(rows[:900])
+    one.frequencies(USUAL[:1])
+    np.testing.assert_array_equal(one.frequencies(rows), pickle.loads(pickle.dumps(other)).frequencies(rows))
+    np.testing.assert_array_equal(one.frequencies(rows[:100], n_rows=2400), other.frequencies(rows, n_rows=2400)[:100])
+
+
+def test_few_rows_full_models_and_growing_damage_have_no_surface():
+    few, exact = with_surfaces(), Simulator.around(TRUSS, USUAL, False)
+    full = Simulator.around(TRUSS, USUAL, "auto")
+    rows = np.repeat(USUAL, 10, axis=0)
+    few.frequencies(USUAL)
+    exact.frequencies(rows, n_rows=30_000)
+    full.frequencies(rows)
+    growing = few.with_damage_parameters(["top"], 0.0, 0.2)
+    growing.frequencies(np.hstack([rows, np.full((3000, 1), 0.9)]))
+    assert all(one.solved["surface"] == 0 for one in (few, exact, full, growing))
+    np.testing.assert_allclose(full.frequencies(rows, n_rows=30_000), TRUSS.frequencies(rows), rtol=4e-6)
+    assert full.solved["surface"] > 2900
+
+
 def test_those_asked_for_last_are_kept(simulator, monkeypatch):
     severities = [0.1, 0.2, 0.3]
     one, two, three = (simulator.damaged({"top": severity}) for severity in severities)

@@ -18,7 +18,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
-from skthermo.fem.affine import check_different
+from skthermo.fem.affine import check_different, check_severities
 
 SECONDS = 600  # a process waits so long while others write
 
@@ -91,6 +91,22 @@ class SampleCache:
         return ValueError(f"{self.path}: the file holds {got}; expected {self._describes}, or a path of its own")
 
 
+def read_parameter_groups(
+    groups: Mapping[str, str | Sequence[str]] | None, parameter_names: Sequence[str]
+) -> dict[str, tuple[str, ...]]:
+    """Parameters of each damage group; by default each parameter is one."""
+    if groups is None:
+        return {name: (name,) for name in parameter_names}
+    if not isinstance(groups, Mapping):
+        raise ValueError(f"groups is {groups!r:.200}; expected a mapping of group to the parameters that it scales")
+    found = {group: check_different(names) for group, names in groups.items()}
+    for group, names in found.items():
+        unknown = [name for name in names if name not in parameter_names]
+        if unknown:
+            raise ValueError(f"group {group!r} names {unknown}; expected some of {list(parameter_names)}")
+    return found
+
+
 ROWS_PER_TASK = 32
 """Rows per task for a function that solves row by row: few, so that all workers are busy and progress is visible."""
 
@@ -113,16 +129,22 @@ class CallableModel:
     cache : str or path-like, optional
         A file, an SQLite database, that stores every solved row of theta, so that no row is solved twice, neither
         after a crash nor in a later process.
+    groups : mapping of str to str or sequence of str, optional
+        Damage group -> the parameters that its damage multiplies by 1 - severity, which should be of stiffness alone.
+        By default each parameter is a group.
 
     Attributes
     ----------
     cache : Path or None
         The file, as an absolute path.
+    groups : dict of str to tuple of str
+        Damage groups and their parameters.
 
     Raises
     ------
     ValueError
-        If the cache is a folder or belongs to other parameters or another number of modes.
+        If the cache is a folder or belongs to other parameters or another number of modes, or a group names unknown
+        parameters.
 
     See Also
     --------
@@ -142,6 +164,8 @@ class CallableModel:
     >>> model.frequencies([[1.0], [4.0]])
     array([[1., 2.],
            [2., 4.]])
+    >>> model.damaged({"E": 0.19}).frequencies([[1.0]])
+    array([[0.9, 1.8]])
     """
 
     def __init__(
@@ -152,6 +176,7 @@ class CallableModel:
         *,
         vectorized: bool = False,
         cache: str | PathLike | None = None,
+        groups: Mapping[str, str | Sequence[str]] | None = None,
     ):
         if not callable(function) or isinstance(function, type):
             raise ValueError(f"function is {function!r}; expected a callable")
@@ -159,6 +184,8 @@ class CallableModel:
         self.parameter_names = check_different(parameter_names)
         self.n_modes = positive_integer(n_modes, "n_modes")
         self.vectorized = check_flag(vectorized, "vectorized")
+        self.groups = read_parameter_groups(groups, self.parameter_names)
+        self._factors = np.ones(len(self.parameter_names))
         self._is_quiet = False
         self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
 
@@ -194,7 +221,7 @@ class CallableModel:
             If the function fails at all of several rows (cached rows count as solved) or, with ``vectorized=True``,
             raises an error for several rows at once. It names the first such theta.
         """
-        rows = check_theta(theta, self.parameter_names)
+        rows = check_theta(theta, self.parameter_names) * self._factors
         keys = [row.tobytes() for row in rows.astype("<f8")]
         known = {} if self._samples is None else self._samples.read(keys)
         missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
@@ -251,6 +278,31 @@ class CallableModel:
             )
             for row in np.flatnonzero(wrong.any(axis=1))
         }
+
+    def damaged(self, damage: Mapping[str, float]) -> CallableModel:
+        """A new model with damage: the parameters of each group are multiplied by 1 - severity.
+
+        Parameters
+        ----------
+        damage : mapping of str to float
+            Group -> severity: 0.5 is half, -0.15 a strengthening by 15 %. A parameter in several damaged groups is
+            multiplied by all their factors.
+
+        Returns
+        -------
+        CallableModel
+            Of the same function, which is called at other theta, and with the same cache.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or a severity is 1 or more or not finite.
+        """
+        twin = copy.copy(self)
+        twin._factors = self._factors.copy()
+        for group, severity in check_severities(damage, self.groups).items():
+            twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
+        return twin
 
     def quiet(self) -> CallableModel:
         """The same model, but without warnings and errors: it gives NaN where the function fails.

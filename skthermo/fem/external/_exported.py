@@ -35,15 +35,17 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     Returns
     -------
     csc_array of shape (n_dof, n_dof)
-        The whole matrix, in the units of the program; ``n_dof`` is the largest row or column that occurs.
+        The whole matrix, of which the file may hold one half or all, in the units of the program; ``n_dof`` is the
+        largest row or column that occurs.
 
     Raises
     ------
     FileNotFoundError
         If the path does not exist.
     ValueError
-        Names the file, if a line does not hold three numbers, rows or columns are not positive integers, there are
-        entries on both sides of the diagonal, or the matrix would need too much memory (see `load_affine`).
+        Names the file, and the line that does not hold three numbers; if rows or columns are not positive integers, an
+        entry is given twice, entries are on both sides of the diagonal but not in pairs, or the matrix would need too
+        much memory (see `load_affine`).
 
     See Also
     --------

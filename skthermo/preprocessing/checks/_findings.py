@@ -152,7 +152,8 @@ class _Records:
     index: pd.Index
     unit: str
     outliers: NDArray[np.bool_]
-    has_stuck_sensors: bool = False
+    has_faulty_sensors: bool = False
+    has_wrong_times: bool = False
     memory: MemoryFindings | None = None
 
     @classmethod
@@ -166,9 +167,13 @@ class _Records:
             index = T.index[rows]
         elif not isinstance(T.index, pd.DatetimeIndex):
             index = T.index
-        now = T.values[np.ix_(rows, [places[0] for places in sensors.values()])]
+        values, modes = (cleaned.useful_values(reading)[rows] for reading in (T, F))
+        now = values[:, [places[0] for places in sensors.values()]]
         outliers = np.zeros((len(rows), len(F.columns)), dtype=bool)
-        return cls(now, F.values[rows], list(sensors), F.columns, T.order[rows], index, unit, outliers)
+        records = cls(now, modes, list(sensors), F.columns, T.order[rows], index, unit, outliers)
+        records.has_faulty_sensors = cleaned.have_faulty_sensors
+        records.has_wrong_times = cleaned.have_wrong_times
+        return records
 
     @property
     def n_usable(self) -> int:
@@ -205,7 +210,7 @@ def _stuck(records: _Records) -> Iterator[Finding]:
                 detail = f"{name!r} is {column[rows[0]]:.6g} in {len(rows)} rows, {records.period(rows)}"
                 yield records.finding(what, name, rows, detail)
                 column[rows] = np.nan
-                records.has_stuck_sensors |= table is records.T
+                records.has_faulty_sensors |= table is records.T
 
 
 def _against_weather(records: _Records) -> Iterator[Finding]:
@@ -224,7 +229,7 @@ def _against_weather(records: _Records) -> Iterator[Finding]:
     if shift is not None:
         yield records.finding("time shift", "", *_shifted(records, shift))
         return
-    if len(share) and (share < NOTHING).all():
+    if len(share) and (share < NOTHING).all() and not records.has_faulty_sensors:
         detail = f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
         yield records.finding("weather", "", usable, detail)
         return
@@ -238,7 +243,13 @@ def _with_stamps(records: _Records) -> Table:
 
 def _slow_means(records: _Records) -> Iterator[tuple[Finding, Array]]:
     """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
-    if records.has_stuck_sensors:
+    names = {type(name) for name in (*records.sensors, *records.modes)}
+    if (
+        records.has_faulty_sensors
+        or records.has_wrong_times
+        or names != {str}
+        or len(set(records.modes)) < len(records.modes)
+    ):
         return
     tables = ((records.T, records.sensors), (records.F, records.modes))
     found = find_memory(*(pd.DataFrame(values, records.index, names) for values, names in tables))
@@ -269,24 +280,27 @@ def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iter
 
 
 def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
-    F = records.F
-    rest = F - np.where(np.isnan(lines).any(axis=1)[:, np.newaxis], median(F), out_of_fold(lines, F, folds))
+    F, has_weather = records.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
+    rest = F - np.where(has_weather, out_of_fold(lines, F, folds), median(F))
     distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
     floor = PREDICTABLE * robust_deviation(F)
     deviation = np.fmax(robust_deviation(rest), floor)
     local = np.fmax(np.fmax(local, robust_deviation(distances)), floor)
     with np.errstate(invalid="ignore"):
         far = (np.abs(distances) > OUTLYING * local) & (np.abs(rest - median(rest)) > OUTLYING * deviation)
-    yield from _outliers_found(records, far & (deviation > 0))
+    yield from _outliers_found(records, far & (deviation > 0) & (has_weather | _are_implausible(F)))
 
 
 def _implausible(records: _Records) -> Iterator[Finding]:
+    yield from _outliers_found(records, _are_implausible(records.F))
+
+
+def _are_implausible(F: Array) -> NDArray[np.bool_]:
     """Values of twice or half the median of their mode, which need no weather to be doubtful."""
-    middle, deviation = median(records.F), robust_deviation(records.F)
+    middle, deviation = median(F), robust_deviation(F)
     with np.errstate(invalid="ignore"):
-        far = (IMPLAUSIBLE * middle < records.F) | (middle / IMPLAUSIBLE > records.F)
-        far &= (middle > 0) & (np.abs(records.F - middle) > OUTLYING * deviation)
-    yield from _outliers_found(records, far)
+        far = (IMPLAUSIBLE * middle < F) | (middle / IMPLAUSIBLE > F)
+        return far & (middle > 0) & (np.abs(F - middle) > OUTLYING * deviation)
 
 
 def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[Finding]:
@@ -324,7 +338,7 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
     rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
     F, index = records.F[rows], records.index[rows]
     timed = isinstance(index, pd.DatetimeIndex)
-    if records.has_stuck_sensors or (timed and index[-1] - index[0] < SHORTEST_TREND):
+    if records.has_faulty_sensors or records.has_wrong_times or (timed and index[-1] - index[0] < SHORTEST_TREND):
         return found, level
     times = row_times(pd.DataFrame(index=records.index))
     table = trend_table(inputs[rows], F, times[rows], records.modes, timed)

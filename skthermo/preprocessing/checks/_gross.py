@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 
 from skthermo._tables.arrays import NORMAL, Array, check_model, median, spread_evenly
 from skthermo._tables.frames import IMPLAUSIBLE, MARKERS, columns_by_sensor
@@ -17,21 +18,25 @@ from skthermo.preprocessing.checks._record_findings import RecordFindings, findi
 from skthermo.preprocessing.checks._signs import equal_runs
 
 COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
-FREEZING, BOILING, DEGREES = 32.0, 212.0, 1.8  # of Fahrenheit's scale
+FREEZING, HOT, DEGREES = 32.0, 160.0, 1.8  # in Fahrenheit
 KELVIN = (183.0, 373.0)  # the same range in kelvin
 FAR = 50.0  # degrees beyond all others, of a value that is none
 JUMP = 30.0  # the same, of a value that repeats exactly
 WIDEST, WIDE = 180.0, 90.0  # degrees that a thermometer spans in the open, and that it does beside another
+SMOOTH = 4.0  # times a step between records, that temperatures span and errors do not
 SCALES = (10.0, 100.0, 1000.0)  # tenths, hundredths, thousandths of a degree
-NEAR, APART = 8.0, 15.0  # degrees between the medians of thermometers of one structure, in one unit and in two
+NEAR, APART = 15.0, 20.0  # degrees between the medians of thermometers of one structure, in one unit and in two
 ALIKE = (0.3, 3.0)  # ratio of the spreads of two thermometers
-WARM, WARMEST = 45.0, 70.0  # degrees of a median and of the warmest percent, which a bridge has only in Fahrenheit
+WARM, WARMEST = (45.0, 85.0), 70.0  # medians, and warmest percent, that a bridge has only in degrees Fahrenheit
 AGAINST = -0.6  # correlation of a sensor with the others whose sign is wrong
 LOGGED = (*MARKERS, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
 BEYOND = 3.0  # times the range of the inner 80 % of a column, from its median, of a value that is none
 OTHER_MODE = 2.0  # times the median of a mode, or its inverse, of a frequency that is none of the mode
 FEW_LEVELS, MANY_VALUES = 3, 5  # different values that repeat, far from so many others
 FEW_VALUES, LEAST_KNOWN = 4, 50  # different values of a column of so many
+AMONG = np.ones(3)  # rows, of which the middle one is as doubtful as the two others
+USELESS = frozenset({"missing column", "constant", "few values", "no numbers"})
+FEW_WRONG = 0.01  # share of the rows in which a sensor may be wrong without a doubt on the others
 FEW_ROWS = 50
 QUARTILES = NORMAL / 2  # standard deviations of a normal distribution in the distance of its quartiles
 STEADY, CHANGING = 0.1, 4.0  # quartile distance over the median of frequencies, and how often it is in temperatures
@@ -105,7 +110,7 @@ class CleanedRecords:
             reading.set_infinite_aside()
         records.findings += records._rows()
         confused = _confused(*tables, in_hertz=unit == "Hz") if len(tables) == 2 else []
-        for reading in [] if confused else tables:
+        for reading in tables if not confused and records.n_rows > 1 else []:
             if reading.what == "temperatures":
                 _look_at_temperatures(reading)
             else:
@@ -125,9 +130,14 @@ class CleanedRecords:
     @property
     def have_times(self) -> bool:
         """Whether the rows have times, which may be repeated or in disorder."""
-        wrong = {"missing stamps", "equal stamps", "stamps from numbers"}
         has_stamps = any(isinstance(reading.index, pd.DatetimeIndex) for reading in self.readings)
-        return has_stamps and not any(found.what in wrong for found in self.findings)
+        return has_stamps and not self.have_wrong_times
+
+    @property
+    def have_wrong_times(self) -> bool:
+        """Whether the rows have times that cannot be used."""
+        wrong = {"missing stamps", "equal stamps", "stamps from numbers", "stamps as text"}
+        return any(found.what in wrong for found in self.findings)
 
     def _index_of(self, reading: Reading) -> pd.Index:
         """Labels of the rows, those of the other table for an array beside a frame."""
@@ -139,7 +149,19 @@ class CleanedRecords:
         F = self.readings[-1]
         far = np.zeros(F.values.shape, dtype=bool)
         far[F.order] = F.were_known & np.isnan(F.values)
-        return pd.DataFrame(far, F.given_index if F.is_frame else None, F.columns)
+        return pd.DataFrame(far, F.given_index if F.is_frame else None, pd.Index(F.columns, tupleize_cols=False))
+
+    @property
+    def have_faulty_sensors(self) -> bool:
+        """Whether values of a sensor were put aside, or are of no use."""
+        T = self.readings[0]
+        is_useless = np.isnan(self.useful_values(T)) & (T.were_known | np.isnan(T.values).all(axis=0))
+        return bool(is_useless.mean(axis=0).max() > FEW_WRONG)
+
+    def useful_values(self, reading: Reading) -> Array:
+        """Values, NaN in columns that are constant or have very few different values."""
+        useless = {found.column for found in reading.findings if found.what in USELESS}
+        return np.where([name in useless for name in reading.columns], np.nan, reading.values)
 
     def _have_same_rows(self) -> bool:
         first, second = (reading.given_index for reading in self.readings)
@@ -205,7 +227,7 @@ def _confused(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
 def _relative_change(values: Array) -> tuple[float, bool]:
     """Distance of the quartiles over the median of a typical column, and whether all columns are positive."""
     some = values[spread_evenly(np.arange(len(values)), MOST_COMPARED)]
-    known = some[:, ~np.isnan(some).all(axis=0)]
+    known = some[:, np.fmax.reduce(some) > np.fmin.reduce(some)]
     if not known.size:
         return np.nan, False
     low, middle, high = np.nanquantile(known, [0.25, 0.5, 0.75], axis=0)
@@ -255,11 +277,12 @@ class Column:
         self.reading.found(what, self.name, rows, f"{self.name!r} {detail} in {self.reading.share(rows)}")
 
     def put_aside(self, what: str, levels: Array, unit: str = "") -> None:
-        """Add a finding in the rows that have one of these levels, and make the values NaN."""
+        """Add a finding in the rows that have one of these levels; they, and single rows among them, become NaN."""
         if len(levels):
             named = _texts(levels) if len(levels) <= FEW_LEVELS else f"{levels[0]:.6g} to {levels[-1]:.6g}"
             self.found(what, levels, f"is {named}{unit}")
-            self.reading.values[self._rows(levels), self.place] = np.nan
+            wrong = np.isin(np.arange(len(self.reading.values)), self._rows(levels))
+            self.reading.values[wrong | binary_closing(wrong, AMONG), self.place] = np.nan
             self._sort()
 
     def _rows(self, levels: Array) -> NDArray[np.intp]:
@@ -376,15 +399,19 @@ def _compare_sensors(columns: list[Column]) -> None:
     if not columns or len(mirrored) == 1 == len(columns):
         return
     middles, warmest = (np.array([column.quantile(share) for column in columns]) for share in (0.5, 0.99))
-    is_warm = (middles > FREEZING).all() and np.median(middles) > WARM
-    is_warm |= (middles > FREEZING - NEAR).all() and np.median(warmest) > WARMEST
-    if is_warm and max(column.levels[-1] for column in columns) < BOILING:
+    is_warm = WARM[0] < np.median(middles) < WARM[1] or np.median(middles) < WARM[0] < WARMEST < np.median(warmest)
+    if is_warm and middles.min() > FREEZING / 2 and max(column.levels[-1] for column in columns) < HOT:
         for column in columns:
             column.found("fahrenheit", column.levels, column.span)
         return
-    for column in columns:
-        others = [other for other in columns if other is not column]
-        if not (others and _is_in_another_unit(column, others)) and not _is_scaled(column):
+    fine = [column for column in columns if not _is_scaled(column)]
+    if 2 * len(fine) <= len(columns):
+        for column in fine:
+            column.found("scaled temperatures", column.levels, f"{column.span}, beside others in such a unit,")
+        return
+    for column in fine:
+        others = [other for other in fine if other is not column]
+        if not (others and _is_in_another_unit(column, others)):
             beyond = (column.levels < COLDEST) | (column.levels > HOTTEST)
             column.put_aside("implausible values", column.levels[beyond])
 
@@ -392,13 +419,18 @@ def _compare_sensors(columns: list[Column]) -> None:
 def _is_scaled(column: Column) -> bool:
     """Whether a column, which spans more than the open does, is in tenths of a degree or less; and say so."""
     ends = column.levels[0], column.levels[-1]
-    if ends[1] - ends[0] < WIDEST:
+    is_hot = column.quantile(0.95) > HOTTEST or column.quantile(0.05) < COLDEST
+    if not is_hot and ends[1] - ends[0] < WIDEST:
         return False
-    bulk = np.array([column.quantile(0.05), column.quantile(0.95)])
+    series = column.reading.values[:, column.place]
+    series = series[~np.isnan(series)]
+    steps = np.abs(np.diff(series))[(series[1:] > HOTTEST) | (series[1:] < COLDEST)]
     for scale in SCALES:
-        if ends[0] / scale > COLDEST and ends[1] / scale < HOTTEST and np.ptp(bulk) / scale > 1:
-            column.found("scaled temperatures", column.levels, f"{column.span}, as in degrees times {scale:g},")
-            return True
+        if ends[0] / scale > COLDEST and ends[1] / scale < HOTTEST:
+            is_smooth = column.quantile(0.95) - column.quantile(0.05) > SMOOTH * np.median(steps)
+            if is_smooth:
+                column.found("scaled temperatures", column.levels, f"{column.span}, as in degrees times {scale:g},")
+            return bool(is_smooth)
     return False
 
 
@@ -408,14 +440,15 @@ def _is_in_another_unit(column: Column, others: list[Column]) -> bool:
     spreads = [other.quantile(0.95) - other.quantile(0.05) for other in (column, *others)]
     ratio = spreads[0] / max(float(np.median(spreads[1:])), 1e-300)
     beside = f"{column.span} with a median of {middle:.4g}, that of the others is {centre:.4g},"
-    in_celsius = (middle - FREEZING) / DEGREES
-    if middle - centre > APART and abs(in_celsius - centre) < NEAR and ALIKE[0] < ratio / DEGREES < ALIKE[1]:
+    off = abs((middle - FREEZING) / DEGREES - centre)
+    if middle - centre > max(APART, 2 * off) and off < NEAR and ALIKE[0] < ratio / DEGREES < ALIKE[1]:
         column.found("fahrenheit", column.levels, beside)
-    elif spreads[0] > WIDE and abs(middle / SCALES[0] - centre) < NEAR and ALIKE[0] < ratio / SCALES[0] < ALIKE[1]:
+        return True
+    is_wide = spreads[0] > WIDE or column.levels[-1] > HOTTEST or column.levels[0] < COLDEST
+    if is_wide and abs(middle / SCALES[0] - centre) < NEAR / 2 and ALIKE[0] < ratio / SCALES[0] < ALIKE[1]:
         column.found("scaled temperatures", column.levels, beside)
-    else:
-        return False
-    return True
+        return True
+    return False
 
 
 def _opposite_signs(columns: list[Column]) -> list[Column]:

@@ -12,7 +12,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from skthermo._tables.arrays import Array, as_columns, range_sums, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, as_columns, means_of_known, range_sums, robust_deviation, spread_evenly
 from skthermo._tables.frames import YEAR, column_names, correlation_time, has_stamps, row_times
 from skthermo.preprocessing._weather_regression import out_of_fold
 
@@ -224,9 +224,7 @@ def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int
 
 def _changes_of_means(table: Array, length: int) -> Array:
     """Change from the mean over some rows to that over the next ones, which shows fronts beside days and seasons."""
-    sums = np.vstack(
-        [np.zeros((1, table.shape[1])), np.cumsum(np.nan_to_num(table - np.nanmean(table, axis=0)), axis=0)]
-    )
+    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(np.nan_to_num(table - means_of_known(table)), axis=0)])
     return sums[2 * length :] - 2 * sums[length:-length] + sums[: -2 * length]
 
 

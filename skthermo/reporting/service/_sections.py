@@ -89,6 +89,7 @@ def introduction(monitor: Monitor) -> list[str]:
 def today(standing: Standing) -> Section:
     """State, and what an owner should know, in a few sentences."""
     sentences = [*_newest(standing), *_open_events(standing), *sensor_sentences(standing), *drift_sentences(standing)]
+    sentences.append(_smallest_change(standing))
     words = (
         "A record is one measurement of temperatures and responses, such as natural frequencies. Its damage index says "
         "how far the responses are from those of the healthy structure in the same weather. An event begins when the "
@@ -131,6 +132,12 @@ def _newest(standing: Standing) -> list[str]:
         text += f" Its damage index is {significant(newest['index'], 3)}; an event begins above "
         text += f"{significant(newest['threshold'], 3)}."
     return [text, standing.recent()]
+
+
+def _smallest_change(standing: Standing) -> str:
+    """Which changes the monitor would still see, and which not."""
+    seen = f"{standing.monitor.smallest_changes_}"
+    return f"{seen[:1].upper()}{seen[1:]}, in weather like that of the baseline. Smaller changes count as healthy."
 
 
 def _open_events(standing: Standing) -> list[str]:
@@ -454,7 +461,26 @@ def false_alarms(standing: Standing) -> Section:
         ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
     ]
     rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
-    return section("false_alarms", "False alarms", paragraphs(*sentences), rule)
+    return section("false_alarms", "False alarms", paragraphs(*sentences), rule, _smallest_changes(standing))
+
+
+def _smallest_changes(standing: Standing) -> Html:
+    """By how much each response has to fall, alone or with all others, until there is an alarm."""
+    smallest, units = standing.monitor.smallest_changes_, standing.monitor.units_
+
+    def amount(fall: float, unit: str) -> str:
+        if not np.isfinite(fall):
+            return "none is seen"
+        return percent(fall, ".2g") if smallest.is_relative else f"{significant(fall)}{SPACE}{unit}"
+
+    falls = {"all responses by one share": smallest.common} if smallest.is_relative else {}
+    falls |= {f"{name} alone": fall for name, fall in smallest.single.items()}
+    rows = [[name, amount(fall, str(units.get(name.removesuffix(" alone")) or ""))] for name, fall in falls.items()]
+    caption = (
+        f"Smallest fall that raises an alarm within {duration_text(smallest.within)}, in weather like that of the "
+        "baseline: half of the records are then above the threshold."
+    )
+    return table(caption, ["Response", "Smallest fall"], rows)
 
 
 def _settings(monitor: Monitor) -> Section:

@@ -24,6 +24,7 @@ from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     SIMULATED,
+    YEARS,
     EvaluatedRecords,
     Evaluation,
     Key,
@@ -227,7 +228,8 @@ def _rates(
     simulation: Simulation, chain: FittedChain, T: Table, seeds: Array, first: int
 ) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms, (n_draws,), and the mean number of evaluated records, by detector and scenario."""
-    clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first)
+    n_years = YEARS if chain.model is simulation.fem.model else 1
+    clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first, n_years)
     drawn = replace(simulation, fem=chain, T=T, clean=clean)
     repeats: list[Evaluation] = []
     for number, pair in enumerate(seeds):

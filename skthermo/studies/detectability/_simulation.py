@@ -160,6 +160,7 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
 
 
 LARGEST_SEED = np.iinfo(np.int32).max
+YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,10 +354,13 @@ def transitions_of(decisions: Array, n_window: int) -> Array:
 
 
 def clean_frequencies(
-    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
+    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0, n_years: int = YEARS
 ) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
-    structure, clean = fem.thermal_.in_weather(fem.weather(T)), {}
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on.
+
+    The same chain, or others with its FE model, will simulate so many years like T in all.
+    """
+    structure, clean = fem.thermal_.in_weather(fem.weather(T), n_years * len(T)), {}
     for scenario in scenarios:
         draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
         changes = [scenario.changes(T, int(draw)) for draw in draws]

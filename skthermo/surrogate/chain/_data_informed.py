@@ -140,7 +140,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. An
         `InverseSurrogate` whose own ``reduce`` is "auto" gets this value, and predictions use its reduced model if that
         covers the parameters of the training weather, plus a quarter of their range on either side. Rows outside the
-        box of a reduced model are solved by the model itself, with a warning that counts them.
+        box of a reduced model are solved by the model itself, with a warning that counts them. Frequencies of many rows
+        come from a `~skthermo.fem.FrequencySurface` where that saves time.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
         and the parameters of these records, so that searches make them once. See ``memory`` of `InverseSurrogate`.

@@ -432,9 +432,9 @@ class ThermalModel(SavesFrames):
         """Frequencies of the structure as `StructureInWeather` simulates it in this weather."""
         return self.in_weather(weather).simulated(modes, **changes)
 
-    def in_weather(self, weather: Weather) -> StructureInWeather:
-        """The structure in this weather, in which several changes can be simulated."""
-        return StructureInWeather(self, weather)
+    def in_weather(self, weather: Weather, n_rows: int | None = None) -> StructureInWeather:
+        """The structure in this weather, in which several changes can be simulated, each in so many rows in all."""
+        return StructureInWeather(self, weather, n_rows)
 
     def propagated(self, theta: Array, covariances: Array) -> Array:
         """Covariances of ln f in the measured domain, G C G' with G = d ln f / d theta, (n, n_modes, n_modes)."""
@@ -472,10 +472,14 @@ class ThermalModel(SavesFrames):
 
 @dataclass(frozen=True, eq=False)
 class StructureInWeather:
-    """A thermal model in one weather, whose parameters and discrepancy are computed once for whatever changes."""
+    """A thermal model in one weather, whose parameters and discrepancy are computed once for whatever changes.
+
+    Frequencies of each change will be asked for in ``n_rows`` rows in all, by default in those of this weather.
+    """
 
     model: ThermalModel
     weather: Weather
+    n_rows: int | None = None
 
     @cached_property
     def theta(self) -> Array:
@@ -512,7 +516,7 @@ class StructureInWeather:
             severities = np.column_stack(list(growing.values()))
             simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
             theta = np.hstack([theta, 1 - severities])
-        frequencies = simulator.frequencies(theta, model.n_jobs)
+        frequencies = simulator.frequencies(theta, model.n_jobs, n_rows=self.n_rows)
         return frequencies if modes is not None else self.measured(frequencies)
 
     def with_each(self, draws: Sequence[Mapping[str, float]]) -> list[Array]:

@@ -1,0 +1,266 @@
+"""Polynomials for the frequencies of one structure near the parameters that its weather gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skthermo._tables.arrays import Array, Bounds, check_theta, spread_evenly
+
+FIRST_DEGREE = 3
+MOST_TERMS = 500
+POINTS_PER_TERM = 2
+CHECK_POINTS = 100
+ENOUGH, LEAST_SERVED = 0.9, 0.5  # shares of the check points near rows: with less, the degree is raised; is refused
+MARGIN, LEAST_MARGIN = 0.25, 0.02  # around the rows: shares of their half-width, and of ln theta
+ANYWHERE = 4  # one of so many points is anywhere in the box, the others are near rows
+MOST_ROWS = 1000  # rows, spread evenly, that the box is made of
+CLOSE = (
+    0.01  # relative distance of two modes in which they may cross or repel each other; a third of it where one is fit
+)
+SAFETY = 0.5  # share of the smallest estimate at a check point of too large an error
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalBox:
+    """Box around rows of ln theta along their principal directions, with a margin; its own coordinates are -1 to 1.
+
+    ``jitter`` is the share of the margin in each half-width, and ``rows`` hold some rows in its coordinates. The box
+    ends at ``bounds`` of the parameters, (n_parameters, 2).
+    """
+
+    centre: Array
+    directions: Array
+    half_widths: Array
+    jitter: Array
+    rows: Array
+    bounds: Array
+
+    @classmethod
+    def around(cls, theta: Array, bounds: Array | None = None) -> PrincipalBox:
+        """The box around rows of theta, of which those with NaN do not count."""
+        logs = np.log(theta[spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), MOST_ROWS)])
+        middle = logs.mean(axis=0)
+        directions = np.linalg.svd(logs - middle, full_matrices=True)[2]
+        places = (logs - middle) @ directions.T
+        lowest, highest = places.min(axis=0), places.max(axis=0)
+        own = (highest - lowest) / 2
+        half_widths = own + np.maximum(MARGIN * own, LEAST_MARGIN)
+        centre = middle + (lowest + highest) / 2 @ directions
+        everywhere = np.tile([0.0, np.inf], (theta.shape[1], 1))
+        rows = (logs - centre) @ directions.T / half_widths
+        return cls(
+            centre, directions, half_widths, 1 - own / half_widths, rows, everywhere if bounds is None else bounds
+        )
+
+    def places(self, theta: Array) -> Array:
+        """Coordinates of rows of theta."""
+        return (np.log(theta) - self.centre) @ self.directions.T / self.half_widths
+
+    def holds(self, theta: Array, places: Array) -> NDArray[np.bool_]:
+        """Which rows, given in both ways, are inside."""
+        lowest, highest = self.bounds.T
+        return (np.abs(places) <= 1).all(axis=1) & ((lowest <= theta) & (theta <= highest)).all(axis=1)
+
+    def drawn(self, number: int, random: np.random.RandomState) -> Array:
+        """Random points near rows, and some anywhere in the box, as rows of theta."""
+        places = random.uniform(-1, 1, size=(number, len(self.centre)))
+        near = np.arange(number) % ANYWHERE > 0
+        around = self.rows[random.randint(len(self.rows), size=number)]
+        places[near] = (around + places * self.jitter)[near]
+        theta = np.exp(self.centre + np.clip(places, -1, 1) * self.half_widths @ self.directions)
+        return np.clip(theta, *self.bounds.T)
+
+
+class FrequencySurface:
+    """Frequencies of one structure as polynomials in ln theta, near the parameters that its weather gives.
+
+    In the box of all parameters that a model may have, frequencies are no polynomials; along the rows of theta that the
+    weather gives they nearly are. Polynomials of ln f are fitted by least squares to a few hundred solves near such
+    rows, and checked at others. A damaged structure needs a surface of its own.
+
+    Parameters
+    ----------
+    solve : callable
+        Gives frequencies in Hz, (n_samples, n_modes), of rows of theta.
+    theta : array-like of shape (n_samples, n_parameters)
+        Rows that the weather gives; those with NaN do not count.
+    tol : float, default=4e-6
+        Largest relative error of a frequency at the check points.
+    highest_degree : int, default=5
+        Of the polynomials; the degree is raised from 3 on until the error is small enough.
+    bounds : array-like of shape (n_parameters, 2), optional
+        Beyond them nothing is solved, and no row is served.
+
+    Attributes
+    ----------
+    degree_ : int
+        Of the polynomials.
+    error_ : float
+        Largest relative error at the check points that are served.
+    share_ : float
+        Share of the check points near rows of theta that are served.
+    n_solves_ : int
+        How many rows were solved.
+
+    Raises
+    ------
+    RuntimeError
+        If polynomials serve less than half of the check points near rows of theta with this error.
+
+    Notes
+    -----
+    The box is that of the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %.
+    The difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the
+    box; where that estimate is more than half of the least one at a check point of too large an error, or more than at
+    all check points; and where two modes are within 1 %, where they may cross or repel each other.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skthermo.datasets import make_truss
+    >>> from skthermo.fem import FrequencySurface
+    >>> truss, air = make_truss(), np.random.default_rng(0).normal(10, 8, size=(365, 1))
+    >>> theta = np.exp([-0.002, -0.003, -0.001, -0.002] * (air - 10))
+    >>> surface = FrequencySurface(truss.frequencies, theta)
+    >>> frequencies, served = surface.frequencies(theta)
+    >>> bool(served.all()), bool(np.abs(frequencies / truss.frequencies(theta) - 1).max() < 4e-6)
+    (True, True)
+    """
+
+    def __init__(
+        self,
+        solve: Callable[[Array], Array],
+        theta: ArrayLike,
+        *,
+        tol: float = 4e-6,
+        highest_degree: int = 5,
+        bounds: Bounds | None = None,
+    ):
+        rows = np.asarray(theta, dtype=float)
+        self._box = PrincipalBox.around(rows, None if bounds is None else np.asarray(bounds, dtype=float))
+        random = np.random.RandomState(0)
+        checks = self._box.drawn(CHECK_POINTS, random)
+        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
+        points, values = checks[:0], exact[:0]
+        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
+        self.share_ = 0.0
+        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
+            n_more = POINTS_PER_TERM * n_terms(rows.shape[1], degree) - len(points)
+            more = self._box.drawn(n_more, random)
+            points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
+            self._fit(points, values, degree)
+            self._check(checks, exact, near, tol)
+            if self.share_ >= ENOUGH:
+                break
+        self.n_solves_ = len(points) + len(checks)
+        if self.share_ < LEAST_SERVED:
+            raise RuntimeError(
+                f"polynomials of degree {highest_degree} give frequencies to {tol:g} at {self.share_:.0%} of the check "
+                "points near rows of theta; expected rows in a narrower region, in which no modes cross, a larger tol "
+                "or a higher degree"
+            )
+
+    @staticmethod
+    def degree_within(n_solves: int, n_parameters: int) -> int:
+        """The highest degree for which so many solves suffice; 2 where they suffice for none.
+
+        Parameters
+        ----------
+        n_solves : int
+            Number of rows that may be solved.
+        n_parameters : int
+            Number of parameters.
+
+        Returns
+        -------
+        int
+            Of polynomials with at most 500 terms.
+        """
+        degree = FIRST_DEGREE - 1
+        while (terms := n_terms(n_parameters, degree + 1)) <= MOST_TERMS:
+            if POINTS_PER_TERM * terms + CHECK_POINTS > n_solves:
+                break
+            degree += 1
+        return degree
+
+    @property
+    def size(self) -> int:
+        """Number of numbers that it holds."""
+        return self._coefficients.size
+
+    def frequencies(self, theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+        """Frequencies of rows, and which of them are served.
+
+        Parameters
+        ----------
+        theta : array-like of shape (n_samples, n_parameters)
+            Multipliers of the nominal parameters; a row with NaN is not served.
+
+        Returns
+        -------
+        frequencies : ndarray of shape (n_samples, n_modes)
+            In Hz; NaN in rows that are not served.
+        served : ndarray of bool, shape (n_samples,)
+            Which rows have frequencies.
+        """
+        rows = check_theta(theta, [f"{i}" for i in range(len(self._box.centre))], allow_nan=True)
+        frequencies, estimates = self._estimated(rows)
+        served = estimates <= self._limit
+        frequencies[~served] = np.nan
+        return frequencies, served
+
+    def _fit(self, points: Array, values: Array, degree: int) -> None:
+        from sklearn.preprocessing import PolynomialFeatures  # importing fem does not load scikit-learn
+
+        self.degree_, self._features = degree, PolynomialFeatures(degree)
+        features = self._features.fit_transform(self._box.places(points))
+        fit = smallest_gap(values) > CLOSE / 3
+        n_lower = n_terms(points.shape[1], degree - 1)
+        logs = np.log(values[fit])
+        whole, lower = (np.linalg.lstsq(part, logs)[0] for part in (features[fit], features[fit, :n_lower]))
+        difference = whole.copy()
+        difference[:n_lower] -= lower
+        self._coefficients = np.hstack([whole, difference])
+
+    def _check(self, checks: Array, exact: Array, near: NDArray[np.bool_], tol: float) -> None:
+        frequencies, estimates = self._estimated(checks)
+        errors = np.nan_to_num(np.abs(frequencies / exact - 1), nan=np.inf).max(axis=1)
+        known = np.isfinite(estimates)
+        wrong = estimates[known & (errors > tol)]
+        self._limit = SAFETY * wrong.min() if len(wrong) else estimates[known].max(initial=0.0)
+        served = estimates <= self._limit
+        self.error_, self.share_ = float(errors[served].max(initial=0.0)), float(served[near].mean())
+
+    def _estimated(self, theta: Array) -> tuple[Array, Array]:
+        """Frequencies and estimates of the largest relative error of each row, infinite where none is served."""
+        frequencies = np.full((len(theta), self._coefficients.shape[1] // 2), np.nan)
+        estimates = np.full(len(theta), np.inf)
+        known = np.flatnonzero(~np.isnan(theta).any(axis=1))
+        places = self._box.places(theta[known])
+        is_inside = self._box.holds(theta[known], places)
+        inside = known[is_inside]
+        if len(inside):
+            logs, differences = np.split(self._features.transform(places[is_inside]) @ self._coefficients, 2, axis=1)
+            frequencies[inside] = np.exp(logs)
+            is_apart = smallest_gap(frequencies[inside]) > CLOSE
+            estimates[inside] = np.where(is_apart, np.abs(differences).max(axis=1), np.inf)
+        return frequencies, estimates
+
+
+def n_terms(n_parameters: int, degree: int) -> int:
+    """Number of monomials up to a degree."""
+    return comb(n_parameters + degree, degree)
+
+
+def smallest_gap(frequencies: Array) -> Array:
+    """Smallest relative distance of two modes in each row; infinite of one mode, 0 with NaN."""
+    in_order = np.sort(frequencies, axis=1)
+    gaps = np.diff(in_order, axis=1) / in_order[:, 1:]
+    smallest: Any = gaps.min(axis=1, initial=np.inf)
+    return np.nan_to_num(smallest, nan=0.0, posinf=np.inf)
