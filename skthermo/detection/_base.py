@@ -14,7 +14,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._estimators.warnings import explain_rows, explained_rows, warn_each, warn_user
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import frame_like, row_times
+from skthermo._tables.frames import Table, frame_like, row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
@@ -73,6 +73,12 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
 
     def __init__(self, contamination: float = 0.02):
         self.contamination = contamination
+
+    def _check_baseline(self, F: Table) -> None:
+        """Hook: refuse gross errors of a baseline, and warn of what is doubtful."""
+        findings = gross_errors(frequencies=F, unit="")
+        findings.refuse_meaningless()
+        warn_each(findings.warnings(but=OF_ORDER))
 
     def _records(self, X: Any, F: Array) -> Any:
         """Hook: preprocess validated rows."""
@@ -141,9 +147,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             the indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
         F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
-        findings = gross_errors(frequencies=frame_like(X, F), unit="")
-        findings.refuse_meaningless()
-        warn_each(findings.warnings(but=OF_ORDER))
+        self._check_baseline(frame_like(X, F))
         records = self._records(X, F)
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
