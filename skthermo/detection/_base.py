@@ -19,7 +19,7 @@ from skthermo._validation import Estimator, Interval, _fit_context, check_is_fit
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import gross_errors
 
 OF_ORDER = {"repeated stamps", "unsorted stamps"}  # which only what looks at earlier records depends on
 

@@ -46,8 +46,7 @@ from skthermo._validation import (
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.preprocessing import RecordFindings, check_records
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import RecordFindings, check_records, gross_errors
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time

@@ -50,8 +50,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import HingeFeatures
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import HingeFeatures, gross_errors
 
 Result = TypeVar("Result")
 

@@ -24,7 +24,7 @@ from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import gross_errors
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.surrogate import DataInformedFEM
 

@@ -27,7 +27,7 @@ from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import gross_errors
 from skthermo.residuals.weather import TrainingRange, parts
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet

@@ -20,7 +20,7 @@ from skthermo._tables.frames import (
     row_times,
 )
 from skthermo._validation import check_array, check_is_fitted
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import gross_errors
 
 MOST_ROWS = 20_000
 TYPICAL = 0.02  # standard deviation of the logarithm of a frequency, as which those of linear quantities count

@@ -2,14 +2,12 @@
 
 from skthermo.preprocessing.checks._findings import check_records
 from skthermo.preprocessing.checks._gross import gross_errors
-from skthermo.preprocessing.checks._kinds import OF_TRAINING, WARNINGS, Finding
+from skthermo.preprocessing.checks._kinds import Finding
 from skthermo.preprocessing.checks._plausible import Plausible
 from skthermo.preprocessing.checks._record_findings import RecordFindings
 from skthermo.preprocessing.checks._signs import equal_runs, residual_trend
 
 __all__ = [
-    "OF_TRAINING",
-    "WARNINGS",
     "Finding",
     "Plausible",
     "RecordFindings",

@@ -97,10 +97,6 @@ ARE_MEANINGLESS = frozenset(
 """Kinds with which no result of a fit means anything."""
 
 
-OF_TRAINING = frozenset({"no rows", "missing column", "constant"})
-"""Those of them that matter only where something is learned: a few new records may lack a mode or be alike."""
-
-
 class Finding(NamedTuple):
     """What was found in a column, in how many rows, from which row to which, and a sentence that says more."""
 

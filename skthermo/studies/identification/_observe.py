@@ -22,7 +22,7 @@ from skthermo.exceptions import (
     SkthermoWarning,
     UnevaluatedRowsWarning,
 )
-from skthermo.preprocessing.checks import OF_TRAINING, gross_errors
+from skthermo.preprocessing import gross_errors
 from skthermo.residuals.weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import FrequencyShift, measured_shift, outlying, record_shifts, scatter_of
 
@@ -210,7 +210,7 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but=OF_TRAINING)
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
     return frequencies
 
 
