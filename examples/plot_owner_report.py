@@ -76,6 +76,7 @@ print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 # It begins like this:
 #
 # .. image:: /images/owner_report.png
-#    :alt: Begin of the report: what is found reliably and what was found, in plain sentences
+#    :alt: Beginning of the page: what is damaged, the smallest damage that would be detected reliably, false alarms and
+#          times to detection, in plain sentences
 
 save_figures(options.figures)

@@ -252,7 +252,7 @@ class MonitorDisplay(Display):
             if len(known) and np.isfinite(error):
                 first, last = self._ends()
                 beside = last + (number + 0.5) * DODGE * (last - first)
-                label = None if number else f"at the end, ± {N_ERRORS} standard errors"
+                label = None if number else f"± {N_ERRORS} standard errors"
                 bar = {"color": style["color"], "marker": "o", "capsize": 3, "label": label}
                 ax.errorbar([beside], values[known[-1:], 0], error, **bar)
         ax.axhline(0, color=BLACK, linewidth=0.8)

@@ -65,10 +65,18 @@ class Choice:
         return section(
             "choice",
             "Which alarm system is recommended",
-            bullets([self.sentence(), *self.study.summary(self.limit).splitlines()]),
-            table(caption, columns, [self._cells(name, row) for name, row in self.ranking.iterrows()]),
+            bullets([self.sentence(), *self._comparison()]),
+            table(caption, columns, [self._cells(name, row) for name, row in self.ranking.iterrows()], is_cards=True),
             link="Which alarm system",
         )
+
+    def _comparison(self) -> list[str]:
+        """What the study's summary says of the ranking; times and bands are in other sections."""
+        waits = self.study.time_to_detection(detector=self.best.name, smallest=True)
+        elsewhere = {f"{row['scenario']!r} {row['text']}." for _, row in waits.iterrows()}
+        if self.study.uncertainty_ is not None:
+            elsewhere |= set(self.study.uncertainty_summary(self.best.name).splitlines())
+        return [line for line in self.study.summary(self.limit).splitlines() if line not in elsewhere]
 
     def _cells(self, name: str, row: pd.Series) -> list[str]:
         if row["error"]:

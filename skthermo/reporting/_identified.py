@@ -34,10 +34,11 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
         paragraphs(*identified.records.sentences()),
         table(
             "Every group: the probability that it has changed, and by how much on average over all explanations, with "
-            "bounds that hold this with a probability of 90 %. The last column is what a group, if it has changed, "
-            "does not exceed with a probability of 95 %.",
+            "a credible interval of 90 %. The last column is what a group, if it has changed, does not exceed with a "
+            "probability of 95 %.",
             ["Group", "Probability", "What changes", "On average", "Bounds", "If changed, up to"],
             [_row(str(cause), row, cause in identified.unobservable) for cause, row in identified.table.iterrows()],
+            is_cards=True,
         ),
         _shifts(identified),
         figure(
@@ -60,8 +61,8 @@ def _explanations(identified: IdentifiedDamage) -> Html:
         [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
     ]
     return table(
-        "Explanations with their probabilities. The bounds hold the severity with a probability of 90 % if the "
-        "explanation is right.",
+        "Explanations with their probabilities, and credible intervals of 90 % of the severities if the explanation is "
+        "right.",
         ["Explanation", "Probability"],
         explanations,
     )
@@ -78,8 +79,9 @@ def _shifts(identified: IdentifiedDamage) -> Html:
         for mode, row in identified.shifts.iterrows()
     ]
     return table(
-        "Mean shift of each natural frequency: measured, and explained on average over all explanations.",
-        ["Mode", "Measured", "Explained", "Uncertainty of the measured shift (two standard errors)"],
+        "Mean shift of each natural frequency: measured, with two standard errors, and explained on average over all "
+        "explanations.",
+        ["Mode", "Measured", "Explained", "Error of the measured"],
         shifts,
     )
 

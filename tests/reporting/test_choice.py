@@ -44,7 +44,7 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
     best = ranking.index[0]
     assert best in (HOSTILE, QUOTED)
     assert f"Recommended is \N{LEFT DOUBLE QUOTATION MARK}{best}\N{RIGHT DOUBLE QUOTATION MARK}, with" in page.text
-    assert all(line in page.text for line in study.summary(0.1).splitlines())
+    assert all(line in page.text for line in study.summary(0.1).splitlines()[:2])
     assert "as was asked for" not in page.text
     assert "4\N{NO-BREAK SPACE}alarm systems were tested" in page.text
     assert [tag["id"] for tag in page.all("section")][:2] == ["answer", "choice"]
