@@ -11,7 +11,7 @@ import pandas as pd
 from skthermo._tables.text import counted, duration_text, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
-from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, Standing, moment
+from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, WATCH, Standing, moment
 
 FAILED, UNWATCHED = "not fitted", "no monitor"
 UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
@@ -29,10 +29,10 @@ FAILURES = {
 """What failed, in an owner's words, by the stage of the error."""
 MONTH = 31  # days of which the table says how many were evaluated
 
-SIGNIFICANT, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
+SIGNIFICANT, OPEN, UNEXPLAINED, RAISED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(10)
 """Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
-that would be significant, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a
-monitor; a drift beyond its error; healthy."""
+that would be significant, has ended and was not explained; a raised index; much stiffness lost; not evaluated; not
+fitted; without a monitor; a drift beyond its error; healthy."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,8 @@ class Bridge:
             note = "" if is_significant else NOT_SIGNIFICANT
         elif unexplained:
             place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
+        elif standing.state == WATCH:
+            place, size = RAISED, float(standing.opened(WATCH)["peak"].max()) / threshold
         elif standing.state == ATTENTION:
             place = WORN
         elif standing.state == NOT_EVALUATED:
@@ -110,6 +112,8 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
     if len(opened):
         return opened["start"].min()
+    if standing.state == WATCH:
+        return standing.opened(WATCH)["start"].min()
     if standing.state == NOT_EVALUATED:
         return standing.doubt.since
     ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
@@ -124,6 +128,8 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
         texts.append(f"Modes that drive it: {modes}." if modes else "")
         if standing.is_silent:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
+    elif standing.state == WATCH:
+        texts.append("The damage index is raised, below the level of an alarm.")
     elif standing.state == NOT_EVALUATED:
         texts.append(f"{standing.doubt.explanation}.")
     elif standing.state == ATTENTION:
