@@ -97,6 +97,7 @@ FORMS = {
     "Harwell-Boeing": rb"[^\n]*\n(?:[ \t]*\d+){4,5}[ \t]*\n(?i:[A-Z]{3})(?:[ \t]+\d+){4}[^\n]*\n[^\n]*\(",
     "Nastran's DMIG": rb"(?i:(?:.*\n)?DMIG[ *,])",
     "Nastran's OUTPUT4": rb"[ \d-]{32}[A-Z][\w ]{7} *(?:1P,)?\d+[ED]\d+",
+    "Nastran's binary OUTPUT4": rb"\x18\0{3}|\0{3}\x18",
     "labels of rows": rb"\s*Matrix Eqn|(?:\s*\d+\.\d\s)+\s*(?:\d+(?:\.\d?)?)?\Z",
     "lines of entries": rb"(?:[ \t]*(?![ \t\d+\-.])[^\n]*\n)*[ \t]*" + ENTRIES + rb"[ \t]*(?:\n|\Z)",
 }
@@ -119,11 +120,8 @@ FORMATS = (
     "Nastran (DMIG, OUTPUT4), or a folder of such files"
 )
 BINARY = {
-    "a binary file of ANSYS": (rb"\x64\0{3}.{4}[\x02\x04]\0{3}", "HBMAT writes it as text"),
-    "a binary file of Nastran": (
-        rb"\x18\0{3}|\0{3}\x18|\x04\0{3}.{4}\x04\0{3}",
-        "FORM=FORMATTED and DMIGPCH write text",
-    ),
+    "a binary file of ANSYS": (rb"\x64\0{3}.{4}[\x02\x04]\0{3}", "HBMAT writes its matrices as text"),
+    "an OUTPUT2 file of Nastran": (rb"\x04\0{3}.{4}\x04\0{3}", "DMIGPCH and OUTPUT4 write what can be read"),
 }
 """How files begin that other packages read, and what writes the same matrices as text."""
 
@@ -176,8 +174,8 @@ def _as_binary(files: Sequence[Path]) -> str | None:
         for what, (pattern, instead) in BINARY.items():
             if re.match(pattern, beginning, re.DOTALL):
                 return (
-                    f"{file} is {what}; expected text ({instead}), or matrices that you read with another package, as "
-                    'the guide shows in "From your FE program"'
+                    f"{file} is {what}; expected another file ({instead}), or matrices that you read with another "
+                    'package, as the guide shows in "From your FE program"'
                 )
     return None
 

@@ -159,7 +159,6 @@ def test_element_matrices_of_ansys(tower, model, tmp_path, monkeypatch):
 
 
 def test_output4_that_pynastran_writes(model, tmp_path, monkeypatch):
-    """Its own reader, and ours, which needs no other package."""
     op4 = pytest.importorskip("pyNastran.op4.op4", reason="pyNastran is not installed")
     from pyNastran.op2.result_objects.matrix import Matrix
 
@@ -169,9 +168,7 @@ def test_output4_that_pynastran_writes(model, tmp_path, monkeypatch):
         matrices = {"KGG": Matrix("KGG", 6), "MGG": Matrix("MGG", 6)}
         matrices["KGG"].data = whole(model, job).toarray()
         matrices["MGG"].data = model.matrices([1, 1])[1].toarray()
-        for folder in (".", "bridge"):
-            op4.OP4().write_op4(f"{folder}/{job}.op4", matrices, is_binary=False)
-    assert_same(run_recipe(PAGE, "recipe-nastran-op4")["model"], model)
+        op4.OP4().write_op4(f"bridge/{job}.op4", matrices, is_binary=False)
     assert_same(run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"]), model)
 
 

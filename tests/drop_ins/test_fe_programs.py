@@ -200,6 +200,67 @@ def test_calculix_by_hand(job):
     assert by_hand.dofs == ()  # rows of beams have labels that occur more than once
 
 
+NASTRAN = """
+SOL 103
+OUTPUT4 KLL,MLL,,,//-1/21 $
+CEND
+SPC = 1
+METHOD = 1
+BEGIN BULK
+GRID,1,,0.,0.,0.
+GRID,2,,0.,2.,0.
+GRID,3,,0.,4.,0.
+GRID,4,,3.,4.,0.
+GRID,5,,6.,4.,0.
+GRID,6,,6.,2.,0.
+GRID,7,,6.,0.,0.
+CBAR,1,1,1,2,0.,0.,1.
+CBAR,2,1,2,3,0.,0.,1.
+CBAR,3,2,3,4,0.,0.,1.
+CBAR,4,2,4,5,0.,0.,1.
+CBAR,5,1,5,6,0.,0.,1.
+CBAR,6,1,6,7,0.,0.,1.
+PBAR,1,1,0.12,9.-4,1.6-3,2.-3
+PBAR,2,2,0.12,9.-4,1.6-3,2.-3
+{materials}
+SPC1,1,123456,1,7
+EIGRL,1,,,4
+ENDDATA
+"""
+
+
+@pytest.fixture
+def mystran(tmp_path, monkeypatch):
+    """A call of MYSTRAN for a job, with moduli of two materials; it returns the frequencies that are printed."""
+    command = shutil.which("mystran")
+    if command is None:
+        pytest.skip("MYSTRAN is not installed")
+    monkeypatch.chdir(tmp_path)
+
+    def run(job, multipliers):
+        cards = (
+            f"MAT1*   {i:16d}{30e9 * t:16.9E}{12.5e9 * t:16.9E}{'':16s}\n*       {2500.0:16.1f}"
+            for i, t in enumerate(multipliers, start=1)
+        )
+        (tmp_path / f"{job}.bdf").write_text(NASTRAN.strip().format(materials="\n".join(cards)) + "\n")
+        subprocess.run([command, f"{job}.bdf"], cwd=tmp_path, check=True, capture_output=True)
+        rows = re.findall(r"^ +\d+ +\d+((?: +-?\d\.\d{6}E[+-]\d\d){5})", (tmp_path / f"{job}.F06").read_text(), re.M)
+        return np.array([float(row.split()[2]) for row in rows])
+
+    return run
+
+
+def test_mystran(mystran, tmp_path):
+    """A solver of Nastran's input: its OUTPUT4, which is binary, and its own frequencies, of seven digits."""
+    (tmp_path / "bridge").mkdir()
+    for job, multipliers in {"nominal": (1, 1), "E_deck": (2, 1), "E_arch": (1, 2)}.items():
+        mystran(job, multipliers)
+        shutil.move(tmp_path / f"{job}.OU1", tmp_path / "bridge" / f"{job}.op4")
+    model = run_recipe(PAGE, "recipe-folder")["model"].with_parameters(["E_deck", "E_arch"])
+    for row, ours in zip(THETA, model.frequencies(THETA), strict=True):
+        np.testing.assert_allclose(ours, mystran("other", row), rtol=5e-7)
+
+
 def test_scikit_fem():
     pytest.importorskip("skfem", reason="scikit-fem is not installed")
     recipe = run_recipe(PAGE, "recipe-scikit-fem")

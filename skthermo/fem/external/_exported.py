@@ -164,7 +164,7 @@ def load_affine(
     ANSYS                  Harwell-Boeing, as ``HBMAT`` writes it in ASCII, real, symmetric (RSA) or not (RUA), and its
                            mapping file, which labels the rows; Rutherford-Boeing
     Nastran, OptiStruct    DMIG in a punch file (small, large and free field; form 6 or 1), whose grid points and
-                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big
+                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big, or binary and dense
     CalculiX, SAP2000      lines of row, column and value (``.sti``, ``.mas``; ``.TXK``, ``.TXM``), and CalculiX's
                            ``.dof``, which labels the rows
     MATLAB, Python         MATLAB v5 (``save -v7``), ``.npz`` of named arrays or of `scipy.sparse.save_npz`, Matrix

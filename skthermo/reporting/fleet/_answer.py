@@ -16,7 +16,7 @@ MOST_NAMED = 5  # largest number of bridges in a sentence
 
 COUNTED = {
     ALARM: "in alarm",
-    WATCH: "on watch, with a raised damage index",
+    WATCH: "to be watched, with a raised damage index but no alarm",
     ATTENTION: "without an alarm, but with much stiffness lost slowly",
     NOT_EVALUATED: "not evaluated by the monitor",
     FAILED: "that could not be fitted",
@@ -28,8 +28,8 @@ COUNTED = {
 STEPS = {
     ALARM: "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, "
     "the records first.",
+    WATCH: "Look at the records of the bridges that are to be watched.",
     UNEXPLAINED: "Find out what the events were that have ended, and acknowledge them.",
-    WATCH: "Look at the records of the bridges on watch, and wait for the next days.",
     ATTENTION: "Ask an engineer whether the bridges that lost stiffness slowly can bear it.",
     NOT_EVALUATED: "Check loggers and sensors of the bridges that are not evaluated.",
     FAILED: "Ask an engineer to look at the records and the models of the bridges that could not be fitted.",
@@ -77,7 +77,7 @@ def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) ->
     if ATTENTION in numbers:
         return f"No alarm, but {numbers[ATTENTION]:,} of {all_of} bridges lost much stiffness slowly"
     if WATCH in numbers:
-        return f"No alarm, but {numbers[WATCH]:,} of {all_of} bridges {_is(numbers[WATCH])} on watch"
+        return f"No alarm, but {numbers[WATCH]:,} of {all_of} bridges {_is(numbers[WATCH])} to be watched"
     if unknown:
         return f"No alarm, but nothing is known of {unknown:,} of {all_of} bridges"
     return f"No alarm: {'the bridge is' if total == 1 else f'all {all_of} bridges are'} healthy"

@@ -58,7 +58,7 @@ FAULTS = {
     "swapped": "is swapped with another",
 }
 KINDS = {
-    WATCH: "in which the damage index was raised (watch), which is no alarm",
+    WATCH: "in which the damage index was raised, below an alarm",
     "stiffening": "in which the structure was stiffer, which is reported but no damage",
     "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
 }
@@ -459,7 +459,7 @@ def false_alarms(standing: Standing) -> Section:
         seen += f", {harmless:,} of them said to be harmless" if number else ""
         by_chance = significant(expected * years, 2)
         sentences.append(f"{seen}. About {by_chance} false alarms were to be expected in this time.")
-    if standing.watch_threshold is not None:
+    if monitor.watch_threshold_ is not None:
         often = counted_number(monitor.watch_per_year, "time")
         sentences.append(f"A structure that stays healthy reaches the lower level of a watch {often} a year by chance.")
     if unseen := getattr(estimate, "unseen", ""):
@@ -467,17 +467,14 @@ def false_alarms(standing: Standing) -> Section:
     sentences.append("This says nothing of damage that is missed: a study of detectability answers that.")
     rows = [
         ["Threshold, above which an event begins", significant(monitor.threshold_, 4)],
-        *(
-            [["Level above which a watch begins", significant(standing.watch_threshold, 4)]]
-            if standing.watch_threshold is not None
-            else []
-        ),
         ["Level at or below which the index stays before it ends", significant(monitor.clear_threshold_, 4)],
         ["Time for which it stays there", duration_text(pd.Timedelta(estimate.rule.hold))],
         ["Years of baseline behind it", significant(estimate.n_years, 2)],
         ["How the threshold was found", element("span", estimate.method, class_="text")],
         ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
     ]
+    if monitor.watch_threshold_ is not None:
+        rows.insert(1, ["Level above which a watch begins", significant(monitor.watch_threshold_, 4)])
     rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
     return section("false_alarms", "False alarms", paragraphs(*sentences), rule, _smallest_changes(standing))
 

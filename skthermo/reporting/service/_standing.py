@@ -59,11 +59,6 @@ class Standing:
         return self.monitor.status(self.now)
 
     @property
-    def watch_threshold(self) -> float | None:
-        """Level of a watch; None where there is none."""
-        return getattr(self.monitor, "watch_threshold_", None)
-
-    @property
     def step(self) -> pd.Timedelta:
         """Usual time between records."""
         return self.status.step
@@ -135,10 +130,9 @@ class Standing:
                 "raises no alarm. An engineer should evaluate whether the structure can bear it."
             )
         if self.state == WATCH:
-            per_year = counted_number(self.monitor.watch_per_year, "time")
             return (
-                "The damage index is above the level of a watch and has not reached that of an alarm. A structure that "
-                f"stays healthy comes that far {per_year} a year. Look at it before others, and at the next records."
+                "The damage index is above the level from which on the structure is to be watched, and below that of "
+                f"an alarm. A healthy structure has {counted_number(self.monitor.watch_per_year, 'such event')} a year."
             )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
