@@ -46,7 +46,7 @@ N_ERRORS = 2  # standard errors on either side of a change
 DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
-    "watch event": {"facecolor": (AMBER, 0.15), "edgecolor": (AMBER, 0.6)},
+    "watch event": {"facecolor": (AMBER, 0.15), "edgecolor": (AMBER, 0.6), "hatch": "\\\\"},
     "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
     "measurement or structure event": {"facecolor": (GREY, 0.25), "edgecolor": (GREY, 0.7), "hatch": "xx"},
     "event marked as harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
@@ -174,7 +174,7 @@ class MonitorDisplay(Display):
         if absent or not asked:
             raise ValueError(f"parts are {asked}; expected some of {[part for part in PARTS if shown[part]]}")
         events = _overlapping(monitor.events_, "start", "end", index.index)
-        watch = getattr(monitor, "watch_threshold_", None)
+        watch = getattr(monitor, "watch_threshold_", None)  # of monitors with a second level
         index = index.assign(watch=np.nan if watch is None else watch)
         index = index.assign(threshold=_thresholds(monitor, index.index, pd.Timedelta("1D" if by == "day" else "1ns")))
         return cls(index, events, drift, errors, faults, asked).plot(**options)
