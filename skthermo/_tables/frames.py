@@ -291,6 +291,21 @@ def as_moment(now: Any, zone: tzinfo | None) -> pd.Timestamp:
     return time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
 
 
+def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp | None:
+    """A moment in the time zone of records; None for none."""
+    if moment is None:
+        return None
+    try:
+        stamp = pd.Timestamp(moment)
+        stamp = stamp.tz_localize(index.tz) if stamp.tz is None and index.tz is not None else stamp
+        if not pd.isna(stamp) and (stamp.tz is None) == (index.tz is None):
+            return stamp
+    except (TypeError, ValueError, OverflowError):
+        pass
+    zone = " without a time zone" if index.tz is None else f" in the time zone {index.tz}"
+    raise ValueError(f"{name} is {moment!r:.100}; expected a time{zone}, such as {index[-1]}")
+
+
 def check_duration(value: Any, name: str) -> pd.Timedelta:
     """A duration of zero or more."""
     try:

@@ -30,7 +30,7 @@ from skthermo.commands._settings import Settings, read_settings
 from skthermo.monitoring import Monitor, MonitorStatus, load_monitor
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
@@ -327,7 +327,8 @@ def _described_update(
     states = {state: int((new["state"] == state).sum()) if len(new) else 0 for state in CODES}
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts().to_dict() if len(new) else {}
     n_revised, n_ahead = len(evaluated) - len(new), after["n_ahead"]
-    shown = f" ({', '.join(f'{number} {state}' for state, number in states.items())})" if len(evaluated) else ""
+    counted = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
+    shown = f" ({', '.join(counted)})" if len(evaluated) else ""
     done.lines.append(f"new: {len(new)}{shown}; {others}")
     done.lines += [f"evaluated anew, as records came late: {n_revised}"] if n_revised else []
     done.lines += [f"set aside, stamped too far ahead: {n_ahead}"] if n_ahead else []

@@ -15,7 +15,7 @@ import pandas as pd
 
 from skthermo._io import write_when_complete
 
-STATES = ("healthy", "alarm", "not evaluated")
+STATES = ("healthy", "watch", "alarm", "not evaluated")
 GAUGES = {
     "up": "1 if the last command could do its work on this bridge, else 0",
     "state": "1 for the state that the bridge is in, 0 for the others",
@@ -31,7 +31,7 @@ GAUGES = {
 }
 """Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
 
-KINDS = ("damage", "stiffening", "measurement or structure")
+KINDS = ("damage", "watch", "stiffening", "measurement or structure")
 
 
 def plain(value: Any) -> Any:

@@ -65,6 +65,8 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
         )
         if (state == "alarm").any():
             yield f"In alarm: {named(watched.index[state == 'alarm'])}."
+        if (state == "watch").any():
+            yield f"To be watched, with a raised index but no alarm: {named(watched.index[state == 'watch'])}."
         if (state == "not evaluated").any():
             yield f"Not evaluated, and so not known to be healthy: {named(watched.index[state == 'not evaluated'])}."
         silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
@@ -128,14 +130,14 @@ class Fleet:
 
     Notes
     -----
-    Columns of ``table``: ``is_fitted``; ``error``, "" where there is none; ``n_records`` of the fit; ``gaps``, the
-    share of their values that are missing; ``mape``, mean absolute error of the training frequencies in percent,
-    in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor ("healthy",
-    "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days from it to the
-    newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``; ``alarm_rate``, the share of
-    evaluated records in an event; ``n_events`` of damage, and those that are open, ``n_open``; ``drift``, the largest
-    change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit; ``megabytes`` of the fitted
-    objects.
+    Columns of ``table``: ``is_fitted``; ``error``, "" where there is none; ``n_records`` of the fit;
+    ``gaps``, the share of their values that are missing; ``mape``, mean absolute error of the training frequencies in
+    percent, in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor
+    ("healthy", "watch", "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days
+    from it to the newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``;
+    ``alarm_rate``, the share of evaluated records in an event; ``n_events`` of damage, and those that are open,
+    ``n_open``; ``drift``, the largest change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit;
+    ``megabytes`` of the fitted objects.
 
     A bridge whose new records could not be evaluated is "not evaluated", or "alarm" while an event is open.
 
@@ -209,7 +211,7 @@ class Fleet:
     def __repr__(self) -> str:
         states = self._states()
         watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
-        words = {"alarm": "in alarm", "not evaluated": "not evaluated"}
+        words = {"alarm": "in alarm", "watch": "to be watched", "not evaluated": "not evaluated"}
         watched += [f"{states[state]} {text}" for state, text in words.items() if states.get(state)]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -21,7 +21,7 @@ from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompen
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
@@ -127,9 +127,14 @@ class ActiveDetector(SavesFrames):
         *,
         by_direction: bool,
         per_year: float,
+        watch_per_year: float | None = None,
         persistence: int = 1,
     ) -> ActiveDetector:
-        """Learned from what the detector was fitted on; ``by_direction`` distinguishes stiffening."""
+        """Learned from what the detector was fitted on; ``by_direction`` distinguishes stiffening.
+
+        ``per_year`` damage events are expected of a healthy structure, and ``watch_per_year`` in which its index is
+        raised, if they are asked for.
+        """
         temperatures = [name for name in trained.columns if name not in targets]
         frequencies = as_floats(trained[targets])
         deviation = np.nanstd(frequencies, axis=0)
@@ -151,6 +156,11 @@ class ActiveDetector(SavesFrames):
             )
             for kind, one in by_kind.items()
         }
+        if watch_per_year is not None:
+            with without_warnings():  # those of the higher threshold have been given
+                watch = estimate_false_alarms(by_kind[DAMAGE], watch_per_year, **options, name="watch_per_year")
+            lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)
+            estimates[WATCH] = replace(watch, rule=replace(watch.rule, threshold=lower))
         parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)
         return cls(detector, trained, *parts)
 
@@ -164,6 +174,11 @@ class ActiveDetector(SavesFrames):
     def threshold(self) -> float:
         """A damage event opens with an index above it."""
         return self.estimates[DAMAGE].rule.threshold
+
+    @property
+    def watch_threshold(self) -> float | None:
+        """An event of a raised index opens above it; None if these are not asked for."""
+        return self.estimates[WATCH].rule.threshold if WATCH in self.estimates else None
 
     @property
     def smallest(self) -> SmallestChanges:
@@ -188,8 +203,9 @@ class ActiveDetector(SavesFrames):
 
         It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
         """
+        watch = [WATCH] if WATCH in self.estimates else []
         if self.direction is None:
-            return {DAMAGE: index}
+            return dict.fromkeys([DAMAGE, *watch], index)
         with np.errstate(invalid="ignore"):
             wanted = np.append(np.zeros(first, dtype=bool), index > self.estimates[DAMAGE].rule.release)
         stiffer = np.zeros(len(index), dtype=bool)
@@ -198,7 +214,8 @@ class ActiveDetector(SavesFrames):
             signs = self.direction.of_rows(records.iloc[begin:][self.columns], wanted[begin:])
             stiffer = signs[first - begin :] < 0
         softer = wanted[first:] & ~stiffer
-        return {DAMAGE: np.where(stiffer, np.nan, index), STIFFENING: np.where(softer, np.nan, index)}
+        by_kind = dict.fromkeys([DAMAGE, *watch], np.where(stiffer, np.nan, index))
+        return by_kind | {STIFFENING: np.where(softer, np.nan, index)}
 
     def index(self, records: pd.DataFrame, first: int) -> Array:
         """Damage index of the records from a position on, in order of time, rounded; those before are their memory.

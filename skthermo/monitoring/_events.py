@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._false_alarms import EventRule, EventState
 
-DAMAGE, STIFFENING, MEASUREMENT = "damage", "stiffening", "measurement or structure"
-"""Kinds of events; the last one is that of responses set aside as implausible or stuck."""
+DAMAGE, STIFFENING, MEASUREMENT, WATCH = "damage", "stiffening", "measurement or structure", "watch"
+"""Kinds of events; the third is that of responses set aside as implausible or stuck, the last of a raised index."""
 
 
 @dataclass(frozen=True)

@@ -272,6 +272,7 @@ def estimate_false_alarms(
     persistence: int = 1,
     release: float | None = None,
     smallest_at: Callable[[float], SmallestChanges] | None = None,
+    name: str = "false_alarms_per_year",
 ) -> FalseAlarmEstimate:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
@@ -279,14 +280,15 @@ def estimate_false_alarms(
     it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
     it, and the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only
     departures of one kind count, ``release`` should be the `release_level` of all. ``smallest_at`` gives the smallest
-    changes that a threshold sees, for warnings.
+    changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     n_years = _years(known.index, hold)
-    if len(known) < 2 or np.isinf(known).any():
+    infinite = known.index[np.isinf(known)]
+    if len(known) < 2 or len(infinite):
         raise ValueError(
-            f"{len(known)} baseline records have a damage index, {np.isinf(known).sum()} of them an infinite one; "
-            "expected at least 2, all of them finite"
+            f"{len(known)} baseline records have a damage index, {len(infinite)} of them an infinite one"
+            f"{f' (the first at {infinite[0]})' if len(infinite) else ''}; expected at least 2, all of them finite"
         )
     scale = seasonal_scale(known)
     standard = known / np.sqrt(scale)
@@ -298,7 +300,7 @@ def estimate_false_alarms(
     years = counted_number(n_years, "year", 2)
     if len(squares) < FEWEST_PEAKS or asked > len(squares):
         raise ValueError(
-            f"false_alarms_per_year is {per_year:g}, but the baseline of {years} has only "
+            f"{name} is {per_year:g}, but the baseline of {years} has only "
             f"{counted_number(len(squares), 'excursion')} followed by {counted_number(hold / DAY, 'day')} of quiet; "
             f"expected at least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )

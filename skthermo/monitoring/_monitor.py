@@ -14,8 +14,8 @@ import pandas as pd
 from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_flag
-from skthermo._tables.frames import DAY, YEAR, check_duration, positions_of
+from skthermo._tables.arrays import check_flag, robust_deviation
+from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
 from skthermo._validation import (
@@ -32,7 +32,7 @@ from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, Acknowledgement, event_table
+from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement, event_table
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._memory import Memory
@@ -42,7 +42,9 @@ from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring._status import MonitorStatus, facts_of
 from skthermo.monitoring._transitions import Transition
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
+from skthermo.preprocessing.checks import gross_errors
 
+TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
 MOST_CAUSES = 3  # in a warning
 MOST_EVENTS = 5  # in a summary, the latest ones
 
@@ -66,6 +68,9 @@ class Monitor(SavesFrames, Estimator):
         A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
     false_alarms_per_year : float, default=1.0
         Damage events that a healthy structure has in a year, on average.
+    watch_per_year : float, optional
+        A second, lower level: events of kind "watch" that a healthy structure has in a year, more than damage events.
+        While one is open, and no damage event is, the state is "watch". By default there is no such level.
     persistence : int, default=3
         Number of records above the threshold by which an event opens, among the last ``2 persistence - 1`` that were
         evaluated: three of five. Single outliers raise no alarm, and a change that lasts is found by its third record.
@@ -109,14 +114,16 @@ class Monitor(SavesFrames, Estimator):
         baseline: ``common`` (all by one share), ``single`` (each alone, by name), and ``within`` which time an alarm
         follows. Shares of the mean, or, where not all responses are positive, in their units without a ``common``
         change; NaN where none is seen.
+    watch_threshold_ : float or None
+        An event of kind "watch" opens with an index above it, in the same way; None without ``watch_per_year``.
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
-        A row for each event, counted from 1: ``kind`` ("damage", "stiffening", or "measurement or structure": responses
-        that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it is open),
-        ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the largest number
-        of responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open), ``acknowledged``,
-        ``harmless`` and ``note``.
+        A row for each event, counted from 1: ``kind`` ("damage", "watch", "stiffening", or "measurement or structure":
+        responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
+        is open), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
+        largest number of responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open),
+        ``acknowledged``, ``harmless`` and ``note``.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
@@ -195,6 +202,7 @@ class Monitor(SavesFrames, Estimator):
         "targets": ["array-like", None],
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
+        "watch_per_year": [Interval(Real, 0, None, closed="neither"), None],
         "persistence": [Interval(Integral, 1, None, closed="left")],
         "direction": [StrOptions({"both", "softening"})],
         "reference": ["array-like", None],
@@ -215,6 +223,7 @@ class Monitor(SavesFrames, Estimator):
         reference: Sequence[Hashable] | None = None,
         fem: Any = None,
         false_alarms_per_year: float = 1.0,
+        watch_per_year: float | None = None,
         persistence: int = 3,
         direction: Literal["both", "softening"] = "both",
         max_delay: str | timedelta = "7D",
@@ -230,6 +239,7 @@ class Monitor(SavesFrames, Estimator):
         self.reference = reference
         self.fem = fem
         self.false_alarms_per_year = false_alarms_per_year
+        self.watch_per_year = watch_per_year
         self.persistence = persistence
         self.direction = direction
         self.max_delay = max_delay
@@ -264,7 +274,8 @@ class Monitor(SavesFrames, Estimator):
         ------
         ValueError
             If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the responses are not known, or
-            not those of the compensator; if the detector looks at later records, farther back than its parts tell, or
+            not those of the compensator; if values make the baseline useless, such as kelvin or a frequency of 1e6, all
+            of which the error lists; if the detector looks at later records, farther back than its parts tell, or
             drops large changes.
 
         Warns
@@ -279,6 +290,11 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
                 "least two days longer than they may be late"
+            )
+        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
+            raise ValueError(
+                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
+                "expected more watches than alarms a year, such as 12 and 1"
             )
         baseline = read_records(X)
         if not len(baseline):
@@ -309,6 +325,7 @@ class Monitor(SavesFrames, Estimator):
                 RecordsWarning,
                 "markers",
             )
+        _refuse_meaningless(trained, self.targets_, self.units_)
         trained, columns = trained[inputs], inputs if compensators else self.targets_
         active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
         active.check()
@@ -331,9 +348,9 @@ class Monitor(SavesFrames, Estimator):
         -------
         DataFrame
             On the stamps of new records, and of known ones that are evaluated anew because others came late: ``state``
-            ("healthy", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names of the
-            modes that drive an alarm, the worst first), ``reason`` (why a record is not evaluated, or what else is
-            worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was evaluated
+            ("healthy", "watch", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names
+            of the modes that drive an alarm, the worst first), ``reason`` (why a record is not evaluated, or what else
+            is worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was evaluated
             before).
 
         Raises
@@ -355,17 +372,20 @@ class Monitor(SavesFrames, Estimator):
         self.status_ = state
         return answers
 
-    def state(self) -> Literal["healthy", "alarm", "not evaluated"]:
+    def state(self) -> Literal["healthy", "watch", "alarm", "not evaluated"]:
         """How the structure is, by the newest record.
 
         Returns
         -------
         str
-            "alarm" while a damage event is open, else "healthy" or "not evaluated", as the newest record was.
+            "alarm" while a damage event is open, else "watch" while an event of that kind is, else "healthy" or "not
+            evaluated", as the newest record was.
         """
         check_is_fitted(self)
         if self.status_.log.is_open(DAMAGE):
             return "alarm"
+        if self.status_.log.is_open(WATCH):
+            return "watch"
         evaluations = self.status_.evaluations
         return evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
 
@@ -406,8 +426,8 @@ class Monitor(SavesFrames, Estimator):
         -------
         list of dict
             Plain values of each later entry, the oldest first. ``id``: its number, from 1, which it keeps. ``what``:
-            "opened", "closed" or "withdrawn" (late records have shown that there was no event), "acknowledged",
-            "fault" or "put back" (a sensor), "refit" or "rebaseline". ``time``: when it happened, by the stamps of
+            "opened", "closed" or "withdrawn" (late records have shown that there was no event), "acknowledged", "fault"
+            or "put back" (a sensor), "refit", "rebaseline" or "discarded". ``time``: when it happened, by the stamps of
             the records. ``newest``: the newest record when it was reported. ``event``: the number of the event, 0 for
             none. ``kind``: that of the event or fault. ``column``: the sensor, else "". ``detail``: text.
 
@@ -444,7 +464,7 @@ class Monitor(SavesFrames, Estimator):
         days = self.days_
         evaluated = days.index[days["n_evaluated"] > 0]
         if since is not None:
-            evaluated = evaluated[evaluated >= pd.Timestamp(since).floor("D")]
+            evaluated = evaluated[evaluated >= check_stamp(since, self.baseline_.index, "since").floor("D")]
         if not len(evaluated):
             return 0.0
         steps = np.diff(evaluated.as_unit("ns").asi8) / DAY.value
@@ -480,7 +500,7 @@ class Monitor(SavesFrames, Estimator):
         check_is_fitted(self)
         events = self.events_[self.events_["kind"] == DAMAGE]
         if since is not None:
-            begin = pd.Timestamp(since)
+            begin = check_stamp(since, self.baseline_.index, "since")
             events = events[events["end"].isna() | (events["end"] >= begin)]
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
@@ -525,6 +545,40 @@ class Monitor(SavesFrames, Estimator):
             acknowledgements=(*self.status_.acknowledgements, one),
             transitions=(*self.status_.transitions, said),
         )
+
+    def discard(self, start: Any, end: Any = None) -> int:
+        """Take back records that should not have been taken in, such as those stamped by a wrong clock.
+
+        Parameters
+        ----------
+        start : str or Timestamp
+            The first stamp of them.
+        end : str or Timestamp, optional
+            The last stamp of them; by default all from ``start`` on.
+
+        Returns
+        -------
+        int
+            Number of records that were taken back.
+
+        Raises
+        ------
+        ValueError
+            If there is no such record since the baseline, or the monitor no longer knows how things stood before them.
+
+        Notes
+        -----
+        The monitor is then as if these records had never come: those that stay are evaluated anew from there on by the
+        detector in charge, and the newest record is the newest of them. Records that were refused as too late because
+        of wrong stamps can come again. What was acknowledged stays, and `transitions` lists what changes.
+
+        How things stood before is known for the last days (``max_delay``), before the latest jump by more than
+        ``max_jump``, and, while all records since the baseline are kept, for any time.
+        """
+        check_is_fitted(self)
+        first, last = (check_stamp(one, self.baseline_.index, name) for one, name in ((start, "start"), (end, "end")))
+        self.status_, number = self.status_.without(self.active_, first, last)
+        return number
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
@@ -624,6 +678,7 @@ class Monitor(SavesFrames, Estimator):
             Memory.of(detector) if self.lookback is None else Memory.of_time(check_duration(self.lookback, "lookback")),
             by_direction=self.direction == "softening",
             per_year=self.false_alarms_per_year,
+            watch_per_year=self.watch_per_year,
             persistence=self.persistence,
         )
 
@@ -692,8 +747,9 @@ class Monitor(SavesFrames, Estimator):
             f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
             f"damage events: open with {self.persistence} of {2 * self.persistence - 1} records above "
             f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            *_watch_in_words(self.watch_threshold_, self.watch_per_year, self.events_),
             f"smallest change: {self.smallest_changes_}, in weather of the baseline",
-            *_events_in_words(self.events_),
+            *_events_in_words(self.events_[self.events_["kind"] != WATCH]),
         ]
         faults = self.faults_
         for _, fault in faults[faults["until"].isna()].iterrows():
@@ -739,6 +795,11 @@ class Monitor(SavesFrames, Estimator):
     def clear_threshold_(self) -> float:
         """An event closes when the index has stayed at or below it."""
         return self.false_alarm_estimate_.rule.release
+
+    @property
+    def watch_threshold_(self) -> float | None:
+        """An event of kind "watch" opens with an index above it."""
+        return self.active_.watch_threshold
 
     @property
     def smallest_changes_(self) -> SmallestChanges:
@@ -837,12 +898,48 @@ class Monitor(SavesFrames, Estimator):
         return {name: of_targets if name in self.targets_ else "°C" for name in columns} | given
 
 
+def _refuse_meaningless(baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str]) -> None:
+    """Raise an error that lists all that makes a baseline useless: gross errors, and responses of another size."""
+    F, T = baseline[targets], baseline.drop(columns=targets)
+    unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
+    wrong = []
+    try:
+        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless()
+    except ValueError as error:
+        wrong.append(str(error))
+    values = F.to_numpy()
+    level, deviation = np.nanmedian(values, axis=0), robust_deviation(values)
+    limit = np.where(deviation > 0, np.maximum(TIMES_DEVIATION * deviation, TIMES_LEVEL * np.abs(level)), np.inf)
+    far = np.abs(values - level) > limit
+    for column in np.flatnonzero(far.any(axis=0)):
+        rows = np.flatnonzero(far[:, column])
+        wrong.append(
+            f"{targets[column]!r} is {values[rows[0], column]:.4g} at {F.index[rows[0]]}"
+            + (f", and as far off in {len(rows) - 1} other records" if len(rows) > 1 else "")
+            + f"; expected values near its median {level[column]:.4g}, and NaN where a value is wrong"
+        )
+    if wrong:
+        raise ValueError("; ".join(wrong))
+
+
 def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     """Different names of columns."""
     wanted = [names] if isinstance(names, str) else list(names)
     if any(name not in columns for name in wanted) or len(set(wanted)) < len(wanted):
         raise ValueError(f"{what} is {wanted}; expected different names among the columns {columns}")
     return wanted
+
+
+def _watch_in_words(threshold: float | None, per_year: float | None, events: pd.DataFrame) -> list[str]:
+    """A line for the lower level, if there is one."""
+    if threshold is None:
+        return []
+    events = events[events["kind"] == WATCH]
+    opened = [
+        f"event {number} is open since {event['start']}" for number, event in events.iterrows() if pd.isna(event["end"])
+    ]
+    said = [f"opens above {threshold:.4g}", f"{per_year:g} false ones a year", f"{len(events)} so far", *opened]
+    return [f"watch: {'; '.join(said)}"]
 
 
 def _events_in_words(events: pd.DataFrame) -> list[str]:

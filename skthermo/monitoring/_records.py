@@ -135,6 +135,11 @@ class RecordStore(SavesFrames):
         store = replace(self._with_records(fresh), ahead=ahead)
         return Intake(store, fresh, too_late, set_aside, reasons, n_given - len(batch), n_late)
 
+    def jumps(self, stamps: pd.DatetimeIndex) -> bool:
+        """Whether new records, in order of time, are farther apart than a clock that works would have them."""
+        times = np.append(self.last.as_unit("ns").value, stamps.asi8)
+        return bool((np.diff(times) > self.max_jump.value).any())
+
     def trimmed(self) -> RecordStore:
         """The store without records that are too old to be kept."""
         first = self.kept.index.searchsorted(self.last - self.retention)

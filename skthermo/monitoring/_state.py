@@ -15,7 +15,7 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, Acknowledgement, EventLog
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
 from skthermo.monitoring._transitions import Transition, event_changes
@@ -52,6 +52,7 @@ class MonitorState(SavesFrames):
     n_late: int = 0
     n_too_late: int = 0
     transitions: tuple[Transition, ...] = ()
+    before: MonitorState | None = None  # the latest jump of the stamps
 
     @classmethod
     def of(cls, active: ActiveDetector, store: RecordStore) -> MonitorState:
@@ -103,6 +104,8 @@ class MonitorState(SavesFrames):
         )
         answers = not_evaluated(intake.too_late.index[:0]).assign(revised=False)
         if len(intake.fresh):
+            if self.store.jumps(intake.fresh.index):
+                state = replace(state, before=replace(self, before=None, transitions=()))
             state, answers = state.advanced(active, intake.fresh.index)
         outside = pd.concat([intake.too_late, intake.ahead])
         if len(outside):
@@ -186,6 +189,60 @@ class MonitorState(SavesFrames):
             days=self._with_days(active.corrections, days, states, _days_of(answers, seen.n_left_out)),
         )
         return state, self._news(answers.iloc[len(known) :], fresh)
+
+    def without(
+        self, active: ActiveDetector, start: pd.Timestamp, end: pd.Timestamp | None = None
+    ) -> tuple[MonitorState, int]:
+        """The state as if records from one stamp to another had never come, and the number of these.
+
+        It is an error if how things stood before them is not known.
+        """
+        tables = {"kept": self.store.kept, "ahead": self.store.ahead}
+        end = max((table.index[-1] for table in tables.values() if len(table)), default=start) if end is None else end
+        rest = {name: table[(table.index < start) | (table.index > end)] for name, table in tables.items()}
+        store, n_discarded = replace(self.store, **rest), sum(len(tables[name]) - len(rest[name]) for name in tables)
+        if not n_discarded:
+            raise ValueError(f"no record since the baseline is stamped {start} to {end}; expected some to be discarded")
+        base, fresh = self._as_before(active, store, start)
+        state = replace(
+            base,
+            estimates=self.estimates,
+            acknowledgements=self.acknowledgements,
+            n_repeated=self.n_repeated,
+            n_late=self.n_late,
+            n_too_late=self.n_too_late,
+        )
+        if len(fresh):
+            state = state.advanced(active, fresh)[0]
+        state = replace(state, store=state.store.trimmed())
+        times = (one.as_unit("ns").value for one in (start, self.store.last))
+        said = Transition("discarded", *times, "", detail=f"records: {n_discarded}")
+        return state.changed_from(self, active, said), n_discarded
+
+    def _as_before(
+        self, active: ActiveDetector, store: RecordStore, start: pd.Timestamp
+    ) -> tuple[MonitorState, pd.DatetimeIndex]:
+        """A state that is not later than a stamp, with a store, and the stamps of records that follow it."""
+        kept = store.kept.index
+        places = [n for n, one in enumerate(self.checkpoints) if one.day <= start]
+        if places:
+            begin = self.checkpoints[places[-1]]
+            tables = {name: getattr(self, name) for name in ("corrected", "evaluations", "days")}
+            earlier = {name: table[table.index < begin.day] for name, table in tables.items()}
+            state = replace(self, store=store, checkpoints=self.checkpoints[: places[-1] + 1], log=begin.log, **earlier)
+            return state, kept[kept >= begin.day]
+        if self.before is not None and self.before.store.last < start:
+            known = self.before.store.kept
+            new = store.kept[~kept.isin(known.index)]
+            together = pd.concat([known, new]).sort_index()
+            return replace(self.before, store=replace(store, kept=together)), new.index
+        if len(self.days) and self.days.index[0] >= self.store.kept.index[0].normalize():
+            nothing = replace(store, kept=store.kept.iloc[:0])
+            return replace(MonitorState.of(active, nothing), store=store), kept
+        raise ValueError(
+            f"records from {start} on cannot be discarded: how things stood then is known from "
+            f"{self.checkpoints[0].day} on; expected a later start, or a monitor that was saved before"
+        )
 
     def handed_over(self, active: ActiveDetector, end: int | None = None) -> MonitorState:
         """The state with another detector, which evaluates the records of the newest day anew.
@@ -315,14 +372,16 @@ def _answers(
     """A row for each record."""
     has_index, number = ~np.isnan(index), numbers[DAMAGE]
     is_alarm = has_index & (number > 0)
-    for kind in (STIFFENING, MEASUREMENT):
+    is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
+    for kind in (STIFFENING, MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))
-    state = np.where(is_alarm, "alarm", np.where(has_index & ~is_held, "healthy", "not evaluated"))
+    quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")
+    state = np.where(is_alarm, "alarm", np.where(is_watch, "watch", quiet))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(np.where(is_alarm, drivers, "").tolist(), stamps, dtype=object),
+        "modes": pd.Series(np.where(is_alarm | is_watch, drivers, "").tolist(), stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
         "event": np.where(has_index | is_held, number, 0),
     }

@@ -26,9 +26,9 @@ class MonitorStatus:
 
     Parameters
     ----------
-    state : {"healthy", "alarm", "not evaluated"}
-        "alarm" while a damage event is open. Nothing is healthy if the newest record is too old, of a time to come, or
-        was not evaluated.
+    state : {"healthy", "watch", "alarm", "not evaluated"}
+        "alarm" while a damage event is open, "watch" while the index is raised and none is open. Nothing is healthy if
+        the newest record is too old, of a time to come, or was not evaluated.
     reason : str
         Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
     now : Timestamp or None
@@ -49,8 +49,10 @@ class MonitorStatus:
         Damage index of the newest record that was evaluated.
     threshold, clear_threshold : float or None
         A damage event opens with indices above the first, and closes at or below the second.
-    false_alarms_per_year : float or None
-        Number of false alarms a year for which the threshold was set.
+    watch_threshold : float or None
+        The index is raised above it; None where no such level was asked for.
+    false_alarms_per_year, watch_per_year : float or None
+        Number of events a year of a healthy structure, for which the thresholds were set.
     smallest_change : dict or None
         Falls of the responses that raise an alarm in the weather of the baseline: ``common`` (of all by one share),
         ``single`` (of each alone, by name), and ``within`` how many seconds. Shares of the mean, or in the unit of the
@@ -95,11 +97,13 @@ class MonitorStatus:
     index: float | None = None
     threshold: float | None = None
     clear_threshold: float | None = None
+    watch_threshold: float | None = None
     false_alarms_per_year: float | None = None
-    smallest_change: dict[str, Any] | None = None
-    events: tuple[dict[str, Any], ...] = ()
-    faults: tuple[dict[str, Any], ...] = ()
-    counts: Mapping[str, int] | None = None
+    watch_per_year: float | None = None
+    smallest_change: dict | None = None
+    events: tuple = ()
+    faults: tuple = ()
+    counts: dict | None = None
     transition: int = 0
 
     @property
@@ -126,8 +130,8 @@ class MonitorStatus:
         Returns
         -------
         MonitorStatus
-            An alarm stays one; "healthy" becomes "not evaluated" where the newest record is too old, or of a time to
-            come.
+            An alarm stays one; any other state becomes "not evaluated" where the newest record is too old, or of a time
+            to come.
 
         Raises
         ------
@@ -170,13 +174,19 @@ def facts_of(monitor: Any) -> MonitorStatus:
         index=float(known["index"].iloc[-1]) if len(known) else None,
         threshold=float(monitor.threshold_),
         clear_threshold=float(monitor.clear_threshold_),
+        watch_threshold=_number(monitor.watch_threshold_),
         false_alarms_per_year=float(monitor.false_alarms_per_year),
+        watch_per_year=_number(monitor.watch_per_year),
         smallest_change=monitor.smallest_changes_.as_dict(),
         events=tuple(_open_events(monitor.events_)),
         faults=tuple(_lasting_faults(monitor.faults_)),
         counts=dict(monitor.counts_),
         transition=len(monitor.transitions()),
     )
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else float(value)
 
 
 def _doubt(status: MonitorStatus, last: pd.Timestamp) -> str:

@@ -326,3 +326,25 @@ def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_mar
     faults = monitor.faults_.set_index("column")
     assert faults.loc[name, "kind"] == kind
     assert list(faults.index) == [name]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_a_baseline_with_values_that_are_no_measurements_is_one_error_that_names_them_all(scale):
+    wrong = truss()[:N_BASELINE].copy()
+    wrong[MODES] = scale * (wrong[MODES] - (0 if scale == 1 else wrong[MODES].mean()))  # also of responses about zero
+    places = {"T1": (100, 1e6), "f2": (200, 1e6), "f5": (300, -1e9)}
+    for name, (row, value) in places.items():
+        wrong.iloc[row, wrong.columns.get_loc(name)] = value
+    for last in (detector(MODES), MahalanobisDetector()):
+        with pytest.raises(ValueError, match="expected") as caught:
+            Monitor(last, targets=MODES).fit(wrong)
+        for name, (row, _) in places.items():
+            assert f"{name!r} is" in str(caught.value)
+            assert f"{wrong.index[row]:%Y-%m-%d}" in str(caught.value)
+
+
+def test_a_baseline_in_kelvin_is_refused():
+    kelvin = truss()[:N_BASELINE].copy()
+    kelvin[kelvin.columns[:2]] += 273.15
+    with pytest.raises(ValueError, match="subtract"):
+        Monitor(detector(MODES)).fit(kelvin)

@@ -76,6 +76,7 @@ class FakeMonitor:
         self.false_alarm_estimate_ = SimpleNamespace(
             rule=rule, expected=false_alarms_per_year, lowest=0, highest=3, n_years=2.0, method="by hand", unseen=""
         )
+        self.watch_threshold_ = self.watch_per_year = None
         self.smallest_changes_ = SmallestChanges(0.01, {"f1": 0.02, "f2": 0.03}, True, pd.Timedelta("3D"))
         self.detector_ = SimpleNamespace()
 

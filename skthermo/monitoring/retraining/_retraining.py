@@ -13,9 +13,10 @@ from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, correlation_time
+from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time
 from skthermo._tables.text import counted
 from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import WEEK, blocks_of
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
@@ -178,7 +179,7 @@ def retrained(
 
 def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
-    since = _stamp(since, monitor.trained_.index)
+    since = check_stamp(since, monitor.trained_.index, "since")
     old, targets, prior = monitor.active_, list(monitor.targets_), monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
@@ -231,13 +232,8 @@ def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
 
 
 def _until(records: pd.DataFrame, until: Any) -> pd.DataFrame:
-    return records if until is None else records[records.index <= _stamp(until, records.index)]
-
-
-def _stamp(moment: Any, index: pd.DatetimeIndex) -> pd.Timestamp:
-    """A moment in the time zone of the records."""
-    stamp = pd.Timestamp(moment)
-    return stamp.tz_localize(index.tz) if stamp.tz is None and index.tz is not None else stamp
+    last = check_stamp(until, records.index, "until")
+    return records if last is None else records[records.index <= last]
 
 
 def _too_few(records: pd.DataFrame) -> str:
@@ -276,7 +272,7 @@ def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
     margin = margin_of(monitor.lookback_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
         inside = records[(records.index >= event.start - margin) & (pd.isna(event.end) | (records.index <= event.end))]
-        if not event.harmless and len(inside):
+        if not event.harmless and event.kind != WATCH and len(inside):
             found[number] = inside
     return found
 
@@ -328,7 +324,7 @@ class Harvest:
 def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
     """Start, end and reason of each time that may not train."""
     for number, event in zip(events.index, events.itertuples(), strict=True):
-        if event.harmless:
+        if event.harmless or event.kind == WATCH:
             continue
         is_open = pd.isna(event.end)
         state = "acknowledged, but not as harmless" if event.acknowledged else "not acknowledged"

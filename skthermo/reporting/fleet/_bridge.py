@@ -11,7 +11,7 @@ import pandas as pd
 from skthermo._tables.text import counted, duration_text, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
-from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, Standing, moment
+from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, WATCH, Standing, moment
 
 FAILED, UNWATCHED = "not fitted", "no monitor"
 UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
@@ -29,7 +29,7 @@ FAILURES = {
 """What failed, in an owner's words, by the stage of the error."""
 MONTH = 31  # days of which the table says how many were evaluated
 
-SIGNIFICANT, OPEN, UNEXPLAINED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(9)
+SIGNIFICANT, OPEN, UNEXPLAINED, RAISED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(10)
 """Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
 that would be significant, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a
 monitor; a drift beyond its error; healthy."""
@@ -80,6 +80,8 @@ class Bridge:
             note = "" if is_significant else NOT_SIGNIFICANT
         elif unexplained:
             place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
+        elif standing.state == WATCH:
+            place, size = RAISED, float(standing.opened("watch")["peak"].max()) / threshold
         elif standing.state == ATTENTION:
             place = WORN
         elif standing.state == NOT_EVALUATED:

@@ -28,6 +28,7 @@ from skthermo.reporting.service._standing import (
     HEALTHY,
     NOT_EVALUATED,
     ONE_DAY,
+    WATCH,
     YEAR,
     Standing,
     moment,
@@ -39,7 +40,13 @@ MOST_NAMED = 5  # largest number of events in a sentence
 N_ERRORS = 2  # standard errors on either side of an estimate
 FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
 EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
-SYMBOLS = {HEALTHY: "M6 12.5l4 4 8-9", ALARM: EXCLAMATION, ATTENTION: EXCLAMATION, NOT_EVALUATED: "M6 12h12"}
+SYMBOLS = {
+    HEALTHY: "M6 12.5l4 4 8-9",
+    ALARM: EXCLAMATION,
+    WATCH: EXCLAMATION,
+    ATTENTION: EXCLAMATION,
+    NOT_EVALUATED: "M6 12h12",
+}
 """Lines within a circle: a tick, an exclamation mark, a dash."""
 FAULTS = {
     "dead": "gives no value",
@@ -51,6 +58,7 @@ FAULTS = {
     "swapped": "is swapped with another",
 }
 KINDS = {
+    "watch": "in which the damage index was raised, below an alarm",
     "stiffening": "in which the structure was stiffer, which is reported but no damage",
     "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
 }

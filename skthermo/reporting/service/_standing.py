@@ -10,12 +10,12 @@ from typing import NamedTuple, TypeAlias
 import pandas as pd
 
 from skthermo._tables.frames import as_moment
-from skthermo._tables.text import SPACE, counted, duration_text, listed, percent
+from skthermo._tables.text import SPACE, counted, counted_number, duration_text, listed, percent
 from skthermo.monitoring import Monitor, MonitorStatus
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
-ALARM, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "attention", "healthy", "not evaluated"
+ALARM, WATCH, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "watch", "attention", "healthy", "not evaluated"
 
 
 class Doubt(NamedTuple):
@@ -87,7 +87,7 @@ class Standing:
     def state(self) -> str:
         """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
         said = self.status.state
-        if said == HEALTHY and self.error:
+        if said in (HEALTHY, WATCH) and self.error:
             return NOT_EVALUATED
         return ATTENTION if said == HEALTHY and self.worn else said
 
@@ -105,6 +105,8 @@ class Standing:
             opened = self.opened("damage")
             since = opened["start"].min() if len(opened) else self.last
             return f"Alarm since {moment(since)}"
+        if self.state == WATCH:
+            return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
         if self.state == HEALTHY:
             return "Healthy: no alarm"
         if self.state == ATTENTION:
@@ -126,6 +128,11 @@ class Standing:
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
                 "the stiffness since the baseline. The monitor takes slow drift out before it evaluates, so that this "
                 "raises no alarm. An engineer should evaluate whether the structure can bear it."
+            )
+        if self.state == WATCH:
+            return (
+                "The damage index is above the level from which on the structure is to be watched, and below that of "
+                f"an alarm. A healthy structure has {counted_number(self.monitor.watch_per_year, 'such event')} a year."
             )
         if self.state == HEALTHY:
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."

@@ -1,0 +1,144 @@
+"""Two levels by their false alarms a year, and records that are taken back."""
+
+import copy
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from skthermo.monitoring import load_monitor
+from tests.monitoring.nightly import FIRST, fitted_monitor, truss_records
+from tests.monitoring.test_status import replayed
+
+LEVELS = {"healthy": 0, "not evaluated": 0, "watch": 1, "alarm": 2}
+ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
+pytestmark = pytest.mark.filterwarnings("ignore:.*not evaluated")
+
+
+@pytest.fixture(scope="module")
+def records():
+    return truss_records()
+
+
+@pytest.fixture(scope="module")
+def plain(records):
+    return fitted_monitor(records)
+
+
+@pytest.fixture(scope="module")
+def two_levels(records):
+    return fitted_monitor(records, watch_per_year=12)
+
+
+def served(monitor, new):
+    monitor = copy.deepcopy(monitor)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return monitor, monitor.update(new)
+
+
+def lowered(records, share, n_days=31):
+    """Healthy records of the first month in service, with all responses lower by a share."""
+    new = records[FIRST : FIRST + n_days].copy()
+    new[[name for name in new if name.startswith("f")]] *= 1 - share
+    return new
+
+
+def test_the_lower_level_changes_no_alarm(plain, two_levels, records):
+    assert two_levels.threshold_ == plain.threshold_
+    assert plain.watch_threshold_ is None
+    assert two_levels.clear_threshold_ <= two_levels.watch_threshold_ < two_levels.threshold_
+    (one, answers), (two, with_watch) = (served(monitor, records[FIRST:]) for monitor in (plain, two_levels))
+    assert (with_watch["state"] == "alarm").equals(answers["state"] == "alarm")
+    pd.testing.assert_series_equal(with_watch["index"], answers["index"])
+    events = two.events_[two.events_["kind"] != "watch"].reset_index(drop=True)
+    pd.testing.assert_frame_equal(events, one.events_.reset_index(drop=True))
+    assert set(with_watch["state"]) >= {"watch", "alarm"}
+    is_watch = with_watch["state"] == "watch"
+    assert with_watch.loc[is_watch, "event"].isin(two.events_.index[two.events_["kind"] == "watch"]).all()
+
+
+def test_an_alarm_is_also_a_watch(two_levels, records):
+    monitor, _ = served(two_levels, records[FIRST:])
+    events = monitor.events_
+    watch = events[events["kind"] == "watch"]
+    for _, alarm in events[events["kind"] == "damage"].iterrows():
+        holds = watch[(watch["start"] <= alarm["start"]) & (watch["end"].isna() | (watch["end"] >= alarm["end"]))]
+        assert len(holds) == 1
+    status = monitor.status(monitor.last_)
+    assert status.state == "alarm"
+    assert status.as_dict()["watch_threshold"] == monitor.watch_threshold_
+    assert {one["kind"] for one in status.events} == {"damage", "watch"}
+
+
+@settings(
+    max_examples=8, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+)
+@given(shares=st.lists(st.floats(0, 0.05), min_size=2, max_size=3, unique=True))
+def test_more_change_never_lowers_the_level(two_levels, records, shares):
+    ends = [served(two_levels, lowered(records, share))[0] for share in sorted([*shares, 0.01, 0.1])]
+    levels = [LEVELS[monitor.state()] for monitor in ends]
+    assert levels == sorted(levels)
+    assert levels[-1] == 2
+
+
+def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(two_levels, records):
+    share = next(
+        s for s in np.arange(0.002, 0.02, 0.001) if served(two_levels, lowered(records, s))[0].state() == "watch"
+    )
+    monitor, _ = served(two_levels, lowered(records, share))
+    assert monitor.status(monitor.last_).state == "watch"
+    assert monitor.status(monitor.last_ + pd.Timedelta("30D")).state == "not evaluated"
+    assert "watch: opens above" in monitor.summary()
+    with pytest.raises(ValueError, match="watch_per_year"):
+        fitted_monitor(records, watch_per_year=1)
+    with pytest.raises(ValueError, match="watch_per_year is 5000"):
+        fitted_monitor(records, watch_per_year=5000)
+
+
+def assert_as_if_never_come(monitor, other):
+    for name in ("evaluations_", "events_", "days_", "faults_", "records_", "corrected_"):
+        pd.testing.assert_frame_equal(getattr(monitor, name), getattr(other, name), check_exact=True, check_freq=False)
+    assert (monitor.state(), monitor.last_) == (other.state(), other.last_)
+    assert monitor.counts_["n_records"] == other.counts_["n_records"]
+
+
+@pytest.mark.parametrize("ahead", ["3653D", "5D"])
+def test_discarded_records_are_as_if_they_had_never_come(plain, records, ahead, tmp_path):
+    new = records[FIRST : FIRST + 60]
+    wrong = new[40:50].set_axis(new.index[40:50] + pd.Timedelta(ahead)) * [1, 1, 1, *[0.97] * (new.shape[1] - 3)]
+    monitor, _ = served(plain, new[:30])
+    monitor.update(wrong, confirm=True)
+    assert monitor.last_ == wrong.index[-1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        monitor.update(new[30:32])  # true stamps are too late, or other days of the same time
+    monitor.save(tmp_path / "monitor.joblib")
+    monitor = load_monitor(tmp_path / "monitor.joblib")
+    assert monitor.discard(wrong.index[0], wrong.index[-1]) == len(wrong)
+    n_known = len(monitor.transitions())
+    assert monitor.transitions()[-1]["what"] in ("discarded", "withdrawn")
+    for start, stop in ((30, 36), (36, 60)):
+        monitor.update(new[start:stop])
+    other, _ = served(plain, new)
+    monitor.status_ = replace(monitor.status_, n_too_late=0)  # true records that came meanwhile were refused
+    assert_as_if_never_come(monitor, other)
+    assert len(monitor.transitions()) >= n_known
+    events, _ = replayed(monitor.transitions())
+    assert events == set(monitor.events_.index[monitor.events_["end"].isna()])
+
+
+def test_all_records_since_the_baseline_may_be_discarded_and_those_of_the_baseline_not(plain, records):
+    monitor, _ = served(plain, records[FIRST : FIRST + 100])
+    assert monitor.discard(records.index[FIRST + 10]) == 90
+    assert_as_if_never_come(monitor, served(plain, records[FIRST : FIRST + 10])[0])
+    assert monitor.discard(records.index[FIRST]) == 10
+    assert monitor.state() == "not evaluated"
+    assert monitor.last_ == records.index[FIRST - 1]
+    for wrong in ({"start": records.index[5], "end": records.index[9]}, {"start": "2100-01-01"}, {"start": "soon"}):
+        with pytest.raises(ValueError, match="expected"):
+            monitor.discard(**wrong)
