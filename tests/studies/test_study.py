@@ -364,15 +364,17 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
     scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
     for tol in (0.2, 0.02, 0.012, 0.001):
-        study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol)
+        options = {"uncertainty": "weather", "n_replicates": 2}
+        study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
         results = study.run(WEATHER)
         (number,) = results["n_repeats"].unique()
         numbers.append(number)
         assert number == 20 or (results["ci_high"] - results["ci_low"]).max() / 2 < 1.15 * tol
-        fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number)).run(WEATHER)
+        fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER)
         pd.testing.assert_frame_equal(results, fixed)
     assert numbers == sorted(numbers)
     assert (numbers[0], numbers[-1]) == (3, 20)
+    assert study_of(fem, MahalanobisDetector(), [{}], n_repeats="auto").run(WEATHER)["n_repeats"].item() == 20
     with pytest.raises(ValueError, match="n_repeats"):
         study_of(fem, MahalanobisDetector(), scenarios, n_repeats="many").run(WEATHER)
     with pytest.raises(ValueError, match="tol"):

@@ -77,7 +77,8 @@ class DetectabilityStudy(BaseEstimator):
         severities is a `Scenario` with a name such as "soil 18 %, piers 5 %"; an empty one is "healthy".
     n_repeats : int or "auto", default="auto"
         How often the records are simulated, each time with other noise. "auto" takes 3 repeats, and as many more, up to
-        20 in all, as it takes until the bounds of each rate are within ``tol``.
+        20 in all, as it takes until the bounds of each rate are within ``tol``. With the noise alone, whose bands are
+        the range of the repeats, it takes 20.
     tol : float, default=0.02
         Half of the distance between ``ci_low`` and ``ci_high`` that is small enough, as a share of the records; for
         "auto" alone.
@@ -363,9 +364,10 @@ class DetectabilityStudy(BaseEstimator):
         progress = max(self.verbose - 1, 0)
         with stages.stage("other repeats"):
             left = simulation.without(first.errors)
-            n_repeats = min(LEAST_REPEATS, len(seeds)) if is_auto(self.n_repeats) else len(seeds)
+            grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
+            n_repeats = LEAST_REPEATS if grows else len(seeds)
             evaluation = first.with_repeats(left.repeats(range(1, n_repeats), seeds, self.n_jobs, progress))
-            if is_auto(self.n_repeats):
+            if grows:
                 wanted = min(evaluation.n_repeats_for(tol, confidence, scenarios), len(seeds))
                 more = range(n_repeats, max(wanted, n_repeats))
                 evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
