@@ -210,7 +210,8 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
         if isinstance(content, dict) and len(named) == 1:
             return _joined(content, folder)
         matrices |= _parts(name, content, named[name]) if isinstance(content, dict) else {name: content}
-    unsized = [m for name, m in matrices.items() if name in used and _is_unsized(forms[named[name]], m)]
+    of_entries = [matrices[name] for name in used if forms[named[name]] == "lines of entries"]
+    unsized = [matrix for matrix in of_entries if not isinstance(matrix, Labelled)]
     for matrix in unsized:  # the last rows of a mass may be zero
         matrix.resize([max(one.shape[0] for one in unsized)] * 2)
     for name, matrix in matrices.items():
@@ -242,10 +243,6 @@ def _parts(name: str, content: dict[str, Any], file: Path) -> dict[str, Any]:
 def _is_square(value: object) -> bool:
     matrix: Any = value.matrix if isinstance(value, Labelled) else value
     return _is_matrix(matrix) and matrix.shape[0] == matrix.shape[1]
-
-
-def _is_unsized(form: str, matrix: object) -> bool:
-    return form == "lines of entries" and not isinstance(matrix, Labelled)
 
 
 def _is_matrix(value: object) -> bool:

@@ -28,6 +28,7 @@ OP4_HEADING = re.compile(rb"^[ \d-]{32}[A-Z][\w ]{7} *(?:1P,)?(\d+)[ED](\d+)\.\d
 OP4_STRING = 65536  # a string's length and row in one number
 FREE_FIELD = re.compile(rb"^DMIG\*? *,", re.MULTILINE)
 WIDE = 32  # characters of a field of a text that was in free field
+MAPPING, NODE_DIRECTION = r"(\d+)\s+(\d+)\s+([A-Z]\w*)", r"()(\d+)\.(\d)"
 FULL = 0.5  # share of entries beside the diagonal with a mirror image, from which on all entries are meant to be given
 
 
@@ -68,21 +69,19 @@ class Text:
         places = np.flatnonzero(self.bytes == character)
         return np.searchsorted(places, self.ends) - np.searchsorted(places, self.starts)
 
-    def grid(self, lines: slice | Integers, width: int) -> Grid:
+    def grid(self, lines: Integers, width: int) -> Grid:
         """The first characters of some lines, (n_lines, width), with spaces after the end of a line."""
         starts, ends = self.starts[lines], self.ends[lines]
         n_lines, steps = len(starts), np.diff(starts)
+        grid = np.full((n_lines, width), SPACE, dtype=np.uint8)
         if n_lines > 1 and (steps == steps[0]).all() and ends[-1] - starts[-1] == steps[0] - 1 <= width:
-            even = self.bytes[starts[0] : ends[-1]]
-            grid = np.full((n_lines, width), SPACE, dtype=np.uint8)
-            whole = np.append(even, NEWLINE).astype(np.uint8).reshape(n_lines, steps[0])
-            grid[:, : steps[0] - 1] = whole[:, :-1]
-            return grid
-        places = starts[:, np.newaxis] + np.arange(width)
-        outside = places >= ends[:, np.newaxis]
-        places[outside] = 0
-        grid = self.bytes[places] if len(self.bytes) else np.empty((n_lines, width), dtype=np.uint8)
-        grid[outside] = SPACE
+            even = self.bytes[starts[0] : ends[-1]]  # a table of characters, but for the last line end
+            grid[:-1, : steps[0] - 1] = even[: -steps[0] + 1].reshape(n_lines - 1, steps[0])[:, :-1]
+            grid[-1, : steps[0] - 1] = even[-steps[0] + 1 :]
+        elif len(self.bytes):
+            places = starts[:, np.newaxis] + np.arange(width)
+            inside = places < ends[:, np.newaxis]
+            grid[inside] = self.bytes[places[inside]]
         return grid
 
     def parts(self, lines: Integers) -> Iterator[Integers]:
@@ -229,14 +228,19 @@ def _refuse_cut_value(text: Text, words: Integers) -> None:
 
 def read_dofs(content: bytes) -> list[tuple[int, int | str]]:
     """Labels of a matrix's rows: CalculiX's lines of ``node.direction``, or ANSYS' of equation, node and direction."""
-    lines = Text(content).content.split(b"\n")
-    if b"Eqn" in lines[0]:
-        rows = [line.split() for line in lines[1:] if line.strip()]
-        if any(len(row) != 3 for row in rows) or [int(row[0]) for row in rows] != list(range(1, len(rows) + 1)):
-            raise ValueError("lines that do not count equations from 1; expected equation, node and direction in each")
-        return [(int(node), direction.decode("ascii")) for _, node, direction in rows]
-    pairs = [line.split(b".") for line in lines if line.strip()]
-    return [(int(node), int(direction)) for node, direction in pairs]
+    lines = Text(content).content.decode("latin-1").split("\n")
+    is_mapping = "Eqn" in lines[0]
+    dofs: list[tuple[int, int | str]] = []
+    for number, line in enumerate(lines[is_mapping:], start=1 + is_mapping):
+        if found := re.fullmatch(MAPPING if is_mapping else NODE_DIRECTION, line.strip()):
+            equation, node, direction = found.groups()
+            if is_mapping and int(equation) != len(dofs) + 1:
+                raise ValueError(f"line {number} is of equation {equation}; expected {len(dofs) + 1}")
+            dofs.append((int(node), direction if is_mapping else int(direction)))
+        elif line.strip():
+            expected = "equation, node and direction" if is_mapping else "node.direction"
+            raise ValueError(f"line {number} is {line.strip()[:40]!r}; expected {expected}")
+    return dofs
 
 
 def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
@@ -252,13 +256,13 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
         kind, sizes = heads[2][:3].decode("ascii").upper(), [int(word) for word in heads[2][3:].split()]
         formats = [(int(n or 1), int(width)) for n, width in FORTRAN.findall(heads[3].upper().replace(b" ", b""))]
         n_rows, n_columns, n_entries = sizes[:3]
-        (_, *blocks), with_sides = counts[:4], counts[4:] > [0]
-        (pointers_in, rows_in, values_in), forms = blocks, formats[:3]
+        (_, pointers_in, rows_in, values_in), forms = counts[:4], formats[:3]
+        n_sides = counts[4] if len(counts) > 4 else 0
     except (ValueError, IndexError) as error:
         raise ValueError("the first four lines are not those of the format") from error
     if kind[0] not in "RI" or kind[1] not in "SU" or kind[2] != "A" or n_rows != n_columns or len(forms) < 3:
         raise ValueError(f"a matrix {kind} of {n_rows} x {n_columns}; expected a square one, RSA or RUA")
-    start, found, words = 5 if with_sides else 4, [], text.words()
+    start, found, words = 5 if n_sides else 4, [], text.words()
     for n_lines, n_numbers, (n, width), what in zip(
         (pointers_in, rows_in, values_in),
         (n_columns + 1, n_entries, n_entries),

@@ -210,6 +210,17 @@ class BaselineResiduals:
             sizes = [np.nanmean(np.nanmedian(np.abs(changes), axis=0)) for changes in (own, out_of_fold)]
         return self.values if sizes[0] < OVERFITTED * sizes[1] else (self.values + self.own) / 2
 
+    @cached_property
+    def level_errors(self) -> Array:
+        """Relative standard error of each mode's standard deviation, (n_modes,), from its fourth moment; without
+        outliers, and with as many records as are independent."""
+        with without_warnings():
+            centred = self.usual - np.nanmean(self.usual, axis=0)
+            squares = np.nanmean(centred**2, axis=0)
+            kurtosis = np.nanmean(centred**4, axis=0) / np.maximum(squares, np.finfo(float).tiny) ** 2
+        n_independent = (~np.isnan(self.usual)).sum(axis=0) / self.correlation_time
+        return np.nan_to_num(np.sqrt(np.maximum(kurtosis - 1, 0.0) / np.maximum(4 * n_independent, 1.0)))
+
     @property
     def outliers(self) -> Array:
         """Those of the residuals that are outliers, NaN elsewhere."""

@@ -198,7 +198,7 @@ class Simulator:
     def size(self) -> int:
         """Number of numbers in the bases of reduced models and in surfaces; 0 for a full model that has none."""
         bases = sum(model.basis_size_ * model.n_dof for model in (self.model, self.reduced) if hasattr(model, "full"))
-        own = 0 if self.usual is None else NUMBERS_PER_DOF * self.model.n_dof
+        own = 0 if self.usual is None else NUMBERS_PER_DOF * getattr(self.model, "n_dof", NUMBERS_PER_DOF)
         return bases + own + sum(one.size for one in self._known.surfaces.values() if one is not None)
 
     @property

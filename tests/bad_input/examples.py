@@ -663,13 +663,20 @@ use(
     parameter_names=(["E"], names(["E"])),
     groups=({"all": ["E"]}, AFFINE["groups"][1]),
 )
+FACTORS = {"one": 1.0, "zero": 0.0, "negative": -2.0, "text": "2", "infinite": np.inf, "unknown": {"x": 2.0}}
+np.savez(FOLDER / "exports.npz", K0=STIFF, E=2 * STIFF, M=EYE)
+use(
+    "fem.load_affine",
+    lambda **a: fem.load_affine(FOLDER / "exports.npz", **a).frequencies([[1.0]]),
+    factor=(2.0, FACTORS),
+)
 TWICE = {"k": STIFF * 2}
 use(
     "fem.difference_terms",
     lambda **a: fem.difference_terms(**a)["k",].toarray(),
     nominal=(STIFF, matrix(STIFF)),
     changed=(TWICE, {c: {"k": v} for c, v in matrix(STIFF * 2).items()} | bad(None, "K", {1: STIFF}, {}, True)),
-    factor=(2.0, {"one": 1.0, "zero": 0.0, "negative": -2.0, "text": "2", "infinite": np.inf, "unknown": {"x": 2.0}}),
+    factor=(2.0, FACTORS),
     check=(
         None,
         {

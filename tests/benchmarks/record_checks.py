@@ -4,7 +4,7 @@
 
 FOLDER, by default the one that the environment variable SKTHERMO_DATA names, holds ``z24/z24_monitoring.csv``,
 ``tower/tower.csv`` and ``kw51/kw51_mode6_daily.csv``; what is not there is left out. The exit code is 1 if a fault of a
-campaign is missed in more than a tenth of the seeds, gross errors in more than a hundredth, or healthy records have a
+campaign is missed in more than a tenth of the seeds, gross errors in more than a fiftieth, or healthy records have a
 finding. ``--gross`` tries only gross errors.
 """
 
@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from slow_soil import slow_soil
 
-from skthermo.datasets import load_z24, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
-from skthermo.preprocessing import HampelFilter, check_records
+from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
+from skthermo.preprocessing import HampelFilter, check_records, checks
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
@@ -56,6 +57,23 @@ def healthy_campaigns(seeds):
     for seed in range(min(seeds, 5)):
         campaign = make_kw51_campaign(retrofit=False, random_state=seed)
         yield "KW51's campaigns, hourly", (campaign.temperatures, campaign.frequencies)
+
+
+def more_healthy_records(seeds):
+    """Names and pairs of tables without a gross error; some have memory, a drift, gaps or outliers by design."""
+    for seed in range(seeds):
+        year = make_truss_campaign(samples_per_year=8760, samples_per_day=24, correlation=0.9, random_state=seed)
+        T, F = year.temperatures, year.frequencies
+        yield "truss, hourly, AR(1) .9", (T, F)
+        yield "truss, a winter by the hour", (T[-2000:], F[-2000:])
+        yield "truss, two-hourly, rounded to 1 degree", (T[::2].round(), F[::2].round(1))
+        bridge = slow_soil(seed)
+        yield "slow soil, two-hourly", (bridge.temperatures, bridge.frequencies)
+        hourly = make_kw51_campaign(random_state=seed)
+        yield "KW51's campaign with its retrofit", (hourly.temperatures, hourly.frequencies)
+    for bridge in make_fleet(3 * seeds, random_state=0).values():
+        records = bridge.records(365)
+        yield f"fleet, {bridge.kind}", (records.temperatures, records.frequencies)
 
 
 def real_records(folder):
@@ -285,11 +303,17 @@ def found(T, F):
     return set(check_records(T, F).table["what"])
 
 
-def print_false_findings(records):
+def gross_found(T, F):
+    """Kinds of gross errors that are found in two tables, or in either alone."""
+    tables = [(T, F), (T, None), (None, F)]
+    return {what for pair in tables for what in checks.gross_errors(*pair).table["what"]}
+
+
+def print_false_findings(records, find=found):
     """Share of healthy records with a finding, by kind of records; returns their number."""
     rows = {}
     for name, tables in records:
-        rows.setdefault(name, []).append(found(*tables))
+        rows.setdefault(name, []).append(find(*tables))
     for name, results in rows.items():
         kinds = sorted(set().union(*results))
         share = np.mean([bool(result) for result in results])
@@ -357,11 +381,14 @@ def main():
     options = parser.parse_args()
     folder = None if options.folder is None else Path(options.folder)
     named = print_all_gross_errors(folder, options.seeds)
-    print(f"worst share of gross errors named: {named:.3f}, target 0.99")
+    print(f"worst share of gross errors named: {named:.3f}, target 0.98")
+    print("Gross errors found in healthy records:")
+    n_false = print_false_findings(more_healthy_records(options.seeds), gross_found)
     if options.gross:
-        return 1 if named < 0.99 else 0
+        print(f"gross errors found in healthy records: {n_false}, target 0")
+        return 1 if n_false or named < 0.98 else 0
     print("Findings on healthy records:")
-    n_false = print_false_findings(healthy_campaigns(options.seeds))
+    n_false += print_false_findings(healthy_campaigns(options.seeds))
     campaigns = (make_truss_campaign(random_state=seed) for seed in range(options.seeds))
     worst = print_hits("Truss, a year of days:", ((year.temperatures, year.frequencies) for year in campaigns))
     if folder is not None:
@@ -373,7 +400,7 @@ def main():
             print_outliers(folder)
     print_seconds()
     print(f"findings on healthy records: {n_false}, target 0; worst share of faults named: {worst:.2f}, target 0.9")
-    return 1 if n_false or worst < 0.9 or named < 0.99 else 0
+    return 1 if n_false or worst < 0.9 or named < 0.98 else 0
 
 
 if __name__ == "__main__":

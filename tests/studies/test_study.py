@@ -17,14 +17,10 @@ from skthermo.detection import MahalanobisDetector, OutlierDetector, Temperature
 from skthermo.metrics import probability_of_detection, time_to_detection
 from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
 from skthermo.surrogate import DataInformedFEM
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
+from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, WITHIN, YEAR, compensated, study_of
 from tests.surrogate.chains import chain
 
 ONLY = "MahalanobisDetector"  # name of the only detector of a study
-
-
-WITHIN = {"rtol": 0, "atol": 2e-3}
-"""Of damage indices: surfaces err by 4e-6, a 2500th of the noise, in each of six modes."""
 
 
 def first_seed(random_state):

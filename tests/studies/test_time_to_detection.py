@@ -14,7 +14,7 @@ from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import ProgressiveDamage, Scenario
 from skthermo.studies.detectability._simulation import EvaluatedRecords
 from skthermo.studies.detectability._waits import Waits
-from tests.studies.studies import WEATHER, study_of
+from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper
 
 
@@ -157,7 +157,7 @@ def test_windows_after_an_onset_are_those_of_records_that_change_there(study, fe
     for number, onset in ((0, 7), (3, 49)):
         changed = pd.concat([healthy[:onset], damaged[onset:]])
         expected = study.detectors_["week"].decision_function(changed)[onset : onset + 7]
-        np.testing.assert_allclose(found[number], expected, rtol=1e-5)
+        np.testing.assert_allclose(found[number], expected, **WITHIN)
     assert not any(key[0] == "single" for key in study.transitions_)
 
 

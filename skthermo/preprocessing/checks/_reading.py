@@ -23,7 +23,7 @@ DATES = (19500101, 21001231)  # dates written as one integer
 class Reading:
     """A table of records as numbers in order of time, NaN where they cannot be used, and what was found on the way.
 
-    Rows are row ``order`` of the table that was given.
+    Rows are row ``order`` of the table that was given. Columns that are ``useless`` have one value, or very few.
     """
 
     what: str
@@ -34,6 +34,7 @@ class Reading:
     given_index: pd.Index = field(default_factory=lambda: pd.RangeIndex(0))
     were_known: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     is_frame: bool = False
+    useless: set[int] = field(default_factory=set)
     order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     @classmethod

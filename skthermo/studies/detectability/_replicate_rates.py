@@ -14,7 +14,7 @@ from scipy.special import expit, logit
 from scipy.stats import t
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import warn_user, without_warnings
+from skthermo._estimators.warnings import checked_once, warn_user, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import Table
@@ -208,13 +208,19 @@ class Spread:
 
 def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: int) -> Any:
     """Rates, (n_parts, n_draws), and numbers of evaluated records by detector and scenario; or the text of an error."""
-    with without_warnings(), single_blas_thread():
-        random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
-        seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
+    random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
+    seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
+    here, steps, drawn = simulation, [], []
+    with without_warnings(), checked_once(), single_blas_thread():
         try:
-            steps = [
-                _rates(simulation, chain, T, seeds, number * N_DRAWS) for _, chain, T in replicates.replicate(number)
-            ]
+            for part, chain, T in replicates.replicate(number):
+                if not drawn or here.T is not T:
+                    here = replace(simulation, T=T)
+                    drawn = [here.drawn(int(seed)) for seed, _ in seeds]
+                if part == "baseline":
+                    levels = replicates.noise_levels(number)
+                    drawn = [(noise * levels, gappy) for noise, gappy in drawn]
+                steps.append(_rates(here, chain, seeds, drawn, number * N_DRAWS))
         except Exception as error:
             return f"{type(error).__name__}: {error}"
     keys = [key for key in steps[0] if all(key in step for step in steps)]
@@ -225,17 +231,17 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
 
 
 def _rates(
-    simulation: Simulation, chain: FittedChain, T: Table, seeds: Array, first: int
+    simulation: Simulation, chain: FittedChain, seeds: Array, drawn: Sequence[tuple[Array, Table]], first: int
 ) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms, (n_draws,), and the mean number of evaluated records, by detector and scenario."""
     n_years = YEARS if chain.model is simulation.fem.model else 1
-    clean = clean_frequencies(chain, simulation.scenarios, T, len(seeds), first, n_years)
-    drawn = replace(simulation, fem=chain, T=T, clean=clean)
+    clean = clean_frequencies(chain, simulation.scenarios, simulation.T, len(seeds), first, n_years)
+    changed = replace(simulation, clean=clean)
     repeats: list[Evaluation] = []
-    for number, pair in enumerate(seeds):
-        records = (replace(one, healthy=None) for one in drawn.records(simulation.scenarios, number, pair))
-        repeats.append(drawn.evaluate(records, repeats[-1].errors if repeats else {}))
-    found = _counted(repeats[0].with_repeats(repeats[1:]), simulation.scenarios, T)
+    for number, (pair, measured) in enumerate(zip(seeds, drawn, strict=True)):
+        records = changed.records(simulation.scenarios, number, pair, measured)
+        repeats.append(changed.evaluate(records, repeats[-1].errors if repeats else {}))
+    found = _counted(repeats[0].with_repeats(repeats[1:]), simulation.scenarios, simulation.T)
     return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
 
 

@@ -218,14 +218,14 @@ class Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
-    def of(self, fem: FittedChain, T: Table, seed: int) -> tuple[Array, Table]:
-        """Relative noise, (n_records, n_modes), and the temperatures T with gaps, as frames if they are."""
-        weather = fem.weather(T)
+    def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
+        """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
         if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
-            return noise, T
+            return noise, weather.given
         missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
-        return noise, frame_like(T, np.where(missing, np.nan, as_floats(T)), column_names(T, "T"))
+        T = np.where(missing, np.nan, as_floats(weather.given))
+        return noise, frame_like(weather.given, T, column_names(weather.given, "T"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,12 +274,30 @@ class Simulation:
                 is_own = isinstance(values, pd.DataFrame) or _num_samples(values) != _num_samples(self.T)
                 yield Records(scenario, REFERENCE, values, self.T, values if is_own else self.T)
 
-    def records(self, scenarios: Sequence[BaseScenario], repeat: int, seeds: Sequence[int]) -> Iterator[Records]:
-        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers."""
-        noise, T = self.measurement.of(self.fem, self.T, int(seeds[0]))
+    def drawn(self, seed: int) -> tuple[Array, Table]:
+        """Relative noise, (n_records, n_modes), NaN where a mode is missing, and temperatures with gaps."""
+        return self.measurement.of(self.fem, self._weather, seed)
+
+    @cached_property
+    def _weather(self) -> Any:
+        return self.fem.weather(self.T)
+
+    def records(
+        self,
+        scenarios: Sequence[BaseScenario],
+        repeat: int,
+        seeds: Sequence[int],
+        drawn: tuple[Array, Table] | None = None,
+    ) -> Iterator[Records]:
+        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers.
+
+        These are drawn by the first seed, unless noise and temperatures are given: then, the records of the healthy
+        structure with the same noise are not kept.
+        """
+        noise, T = drawn or self.drawn(int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            values, healthy = draws[repeat % len(draws)] * (1 + noise), self._healthy * (1 + noise)
+            values, healthy = draws[repeat % len(draws)] * (1 + noise), None if drawn else self._healthy * (1 + noise)
             yield Records(scenario, SIMULATED, values, T, self.T, healthy)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:

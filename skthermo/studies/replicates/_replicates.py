@@ -194,6 +194,11 @@ class Replicates:
                 chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
+    def noise_levels(self, number: int) -> Array:
+        """Factors of the noise of each mode, (n_modes,), which the training records determine up to an error."""
+        errors = self.fem.residuals().level_errors
+        return np.exp(errors * np.random.RandomState([self.seeds[number], 1]).standard_normal(len(errors)))
+
 
 def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> list[FEModel]:
     """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""

@@ -435,7 +435,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -----
         A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
         weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
-        correlated. Nothing is inverted.
+        correlated. Nothing is inverted, and what the discrepancy learns counts as much as in this chain.
         """
         check_is_fitted(self)
         records = self.records_.resampled(self.residuals(), self.discrepancy_, as_random_state(random_state))
@@ -444,7 +444,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
         learned = possible(mapper.predict(filled))[0]
         records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
-        discrepancy = records.learns(self.discrepancy_.regressor, mapper, self.sensors_)
+        discrepancy = self.discrepancy_.again(records.inputs, records.ratios, records.weights, mapper)
         thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
         return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.recorder_.service))
 
@@ -462,7 +462,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             All that was learned is this chain's, and so are the records.
         """
         check_is_fitted(self)
-        simulator = replace(self.simulator_, model=model, reduced=None, box=None)
+        simulator = replace(self.simulator_, model=model, reduced=None, box=None, usual=None)
         twin = copy(self)
         twin.model = model
         return twin._hold(replace(self.thermal_, simulator=simulator), self.recorder_)

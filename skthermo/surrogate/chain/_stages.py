@@ -274,6 +274,15 @@ class Discrepancy:
         )
         return replace(self, learned=some)
 
+    def again(self, inputs: Array, ratios: Array, weights: Array | None, mapper: BaseEstimator) -> Discrepancy:
+        """What the regressor learns of other ratios beside another mapper; changes count by the same shares."""
+        found = self.relearned(inputs, ratios, weights, np.ones(len(inputs), dtype=bool))
+        levels = self.levels.copy()
+        for one in found.learned:
+            logs = np.log(ratios[np.ix_(one.rows, one.modes)])
+            levels[one.modes] = np.average(logs, axis=0, weights=None if weights is None else weights[one.rows])
+        return replace(found, levels=levels, mapper=mapper)
+
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
         T = frame_like(X, self.sensors.fill(as_floats(X))[0])

@@ -1,0 +1,272 @@
+"""Every gross error is named with its columns and rows, and whatever is given, nothing fails."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.preprocessing import LagFeatures, check_records
+from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing.checks._kinds import ARE_MEANINGLESS, WARNINGS
+
+YEAR = make_truss_campaign(random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+PLACE = ["what", "column", "n_rows", "from", "to"]
+ROWS = st.lists(st.integers(0, len(T) - 1), min_size=3, max_size=40, unique=True).map(sorted)
+SENSOR, MODE = st.integers(0, T.shape[1] - 1), st.integers(0, F.shape[1] - 1)
+often = settings(max_examples=25, deadline=None)
+
+
+def changed(table, rows, column, values):
+    table = table.copy()
+    table.iloc[rows, column] = values
+    return table
+
+
+def only(found):
+    """Kind, column, number of rows, first and last of the only finding."""
+    assert len(found.table) == 1, found
+    return tuple(found.table.iloc[0][PLACE])
+
+
+def kinds(found):
+    return set(found.table["what"])
+
+
+class TestValues:
+    @given(rows=ROWS, column=SENSOR, value=st.sampled_from([-999.0, 9999.0, 484.667, -127.0, 1e6, 1e30]))
+    @often
+    def test_markers_of_thermometers_are_named_with_their_rows(self, rows, column, value):
+        found = gross_errors(changed(T, rows, column, value), F)
+        assert only(found) == ("markers", T.columns[column], len(rows), T.index[rows[0]], T.index[rows[-1]])
+
+    @given(rows=ROWS, column=MODE, value=st.sampled_from([-999.0, 9999.0, 0.0, -1.0, np.inf, 1e308]))
+    @often
+    def test_values_that_are_no_frequencies_are_named_with_their_rows(self, rows, column, value):
+        kind = {0.0: "not positive", -1.0: "not positive", np.inf: "infinite values", 1e308: "infinite values"}
+        found = gross_errors(T, changed(F, rows, column, value))
+        expected = (kind.get(value, "markers"), F.columns[column], len(rows), F.index[rows[0]], F.index[rows[-1]])
+        assert only(found) == expected
+
+    @given(columns=st.sets(SENSOR, min_size=1), share=st.floats(0.3, 0.9))
+    @often
+    def test_every_broken_thermometer_is_named_not_the_first_alone(self, columns, share):
+        broken, rows = T.copy(), np.arange(int(share * len(T)))
+        for number, column in enumerate(columns):
+            broken.iloc[rows, column] = (484.667, -999.0, 1e6)[number]
+        table = gross_errors(broken, F).table
+        assert table["column"].tolist() == [T.columns[column] for column in sorted(columns)]
+        assert set(table["what"]) == {"markers"}
+
+    def test_a_broken_thermometer_is_no_shift_in_time(self):
+        for broken in (484.667, np.random.default_rng(0).uniform(-300, 900, 120)):
+            assert kinds(check_records(changed(T, slice(100, 220), 0, broken), F)) <= {"markers", "implausible values"}
+
+    def test_values_that_bridges_have_are_none(self):
+        fire = T.copy()
+        fire.iloc[200:212, 0] = np.linspace(30, 90, 12)
+        assert gross_errors(fire, F).table.empty
+        offsets = pd.DataFrame(np.random.default_rng(0).normal(-99, 3, (365, 2)), T.index, ["u1", "u2"])
+        assert gross_errors(T, offsets.round(0), unit="mm").table.empty
+
+    def test_a_level_that_repeats_far_from_all_others_is_doubtful(self):
+        found = gross_errors(changed(T, [3, 77, 200], 0, 85.0), changed(F, [5, 6, 200], 0, 25.0))
+        assert [tuple(row) for row in found.table[["what", "column", "severity"]].to_numpy()] == [
+            ("isolated level", "T1", "doubtful"),
+            ("isolated level", "f1", "doubtful"),
+        ]
+
+    @pytest.mark.parametrize(
+        ("tables", "expected"),
+        [
+            ((T.assign(T2=12.5), F), ("constant", "T2")),
+            ((T, F.assign(f2=5.0)), ("constant", "f2")),
+            ((T, F.assign(f2=(F["f2"] > 27) + 27.0)), ("few values", "f2")),
+            ((T.assign(T2=np.nan), F), ("missing column", "T2")),
+            ((T, F.assign(f2=np.nan)), ("missing column", "f2")),
+            ((T.assign(T3=T["T1"]), F), ("equal columns", "T3")),
+            ((T, F.assign(f4=F["f2"])), ("equal columns", "f4")),
+        ],
+    )
+    def test_columns_that_say_nothing(self, tables, expected):
+        assert only(gross_errors(*tables))[:2] == expected
+
+    def test_values_far_from_others_are_named_where_no_weather_is_given(self):
+        far = changed(F, [17], 2, 250.0)
+        assert only(gross_errors(None, far))[:3] == ("implausible values", "f3", 1)
+        assert kinds(check_records(T, far)) == {"outliers"}
+
+
+class TestUnits:
+    def test_kelvin_everywhere_in_a_sensor_and_in_some_rows(self):
+        assert gross_errors(T + 273.15).table["column"].tolist() == list(T)
+        assert only(gross_errors(T.assign(T2=T["T2"] + 273.15)))[:3] == ("kelvin", "T2", 365)
+        assert only(gross_errors(changed(T, slice(0, 100), 1, T.iloc[:100, 1] + 273.15)))[:3] == ("kelvin", "T2", 100)
+
+    @given(column=SENSOR)
+    @often
+    def test_one_sensor_in_another_unit_or_of_opposite_sign(self, column):
+        name = T.columns[column]
+        for kind, values in (
+            ("fahrenheit", 1.8 * T[name] + 32),
+            ("scaled temperatures", 10 * T[name]),
+            ("opposite signs", -T[name]),
+        ):
+            assert only(gross_errors(T.assign(**{name: values})))[:2] == (kind, name)
+
+    def test_tenths_of_a_degree(self):
+        assert kinds(gross_errors((10 * T).round())) == {"scaled temperatures"}
+
+    @pytest.mark.parametrize(
+        "spoil",
+        [
+            lambda t, f: (t, f),
+            lambda t, f: (changed(t, slice(330, None), 1, t.iloc[0, 1]), f),
+            lambda t, f: (changed(t, [4, 9, 200], 0, -999.0), f),
+            lambda t, f: (t, f.shift(60)),
+            lambda t, f: (t, changed(f, [40, 90], 3, 1.0)),
+            lambda t, f: (t.assign(T3=t["T1"]), f),
+            lambda t, f: (t.assign(T3=np.nan), f),
+        ],
+    )
+    def test_findings_are_the_same_in_fahrenheit_but_for_the_unit(self, spoil):
+        expected, found = (check_records(*spoil(unit, F)).table for unit in (T, 1.8 * T + 32))
+        assert set(found["what"]) - set(expected["what"]) == {"fahrenheit"}
+        same = found[found["what"] != "fahrenheit"].reset_index(drop=True)
+        pd.testing.assert_frame_equal(same[PLACE], expected[PLACE], check_dtype=False)
+
+    @pytest.mark.parametrize("factor", [2 * np.pi, 1e-3, 60.0])
+    def test_frequencies_in_another_unit_than_the_model(self, factor):
+        model = make_truss()
+        assert check_records(T, F, model=model).table.empty
+        assert kinds(gross_errors(None, factor * F, model=model)) == {"unit of frequencies"}
+        assert only(gross_errors(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("unit of a mode", "f2")
+        assert gross_errors(None, factor * F).table.empty
+
+    def test_periods_and_modes_too_few(self):
+        assert kinds(gross_errors(None, 1 / F, model=make_truss())) == {"unit of frequencies"}
+        assert kinds(gross_errors(None, F.iloc[:, 1:], model=make_truss())) == {"number of modes"}
+
+
+class TestTables:
+    def test_exchanged_or_the_same(self):
+        assert only(check_records(F, T))[0] == "exchanged tables"
+        assert check_records(F, F).table["column"].tolist() == list(F)
+        assert kinds(check_records(T.assign(f1=F["f1"]), F)) == {"temperatures are frequencies"}
+
+    @pytest.mark.parametrize(
+        ("stamps", "kind"),
+        [
+            (pd.DatetimeIndex([T.index[0]] * 365), "equal stamps"),
+            (T.index.where(np.arange(365) != 7), "missing stamps"),
+            (pd.to_datetime(T.index.strftime("%Y%m%d").astype(int)), "stamps from numbers"),
+            (pd.to_datetime(T.index.as_unit("s").asi8), "stamps from numbers"),
+            (T.index.strftime("%Y-%m-%d"), "stamps as text"),
+            (pd.Index(T.index.strftime("%Y%m%d").astype(int)), "stamps as text"),
+            (T.index - T.index[0], "stamps as text"),
+        ],
+    )
+    def test_wrong_times(self, stamps, kind):
+        assert kinds(check_records(T.set_axis(stamps), F.set_axis(stamps))) == {kind}
+
+    def test_repeated_times_and_disorder(self):
+        rows = [0, 0, *range(1, 365), 364]
+        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("repeated stamps", "", 2, T.index[0], T.index[-1])
+        assert kinds(check_records(T[::-1], F[::-1])) == {"unsorted stamps"}
+        assert gross_errors(T.to_period("D"), F.to_period("D")).table.empty
+
+    def test_rows_and_names(self):
+        late = T.set_axis(T.index + pd.Timedelta("1D"))
+        assert only(check_records(late, F))[:3] == ("different rows", "", 365)
+        assert only(check_records(T[:-5], F))[:3] == ("different rows", "", 5)
+        assert kinds(check_records(T[:0], F[:0])) == {"no rows"}
+        assert kinds(check_records(T[:1], F[:1])) == {"no rows"}
+        twice = T.set_axis(["T1", "T1", "T3"], axis=1)
+        assert only(check_records(twice, F))[:2] == ("column names", "T1")
+        tuples = pd.MultiIndex.from_product([["a"], list(T)])
+        assert kinds(check_records(T.set_axis(tuples, axis=1), F.set_axis([("f", n) for n in F], axis=1))) == {
+            "column names"
+        }
+
+    def test_an_array_beside_a_frame_has_its_times(self):
+        found = check_records(T[::-1], changed(F, [10], 0, 30.0).to_numpy()[::-1])
+        assert kinds(found) == {"unsorted stamps", "outliers"}
+        assert np.argwhere(found.outliers.to_numpy()).tolist() == [[354, 0]]
+        assert found.table.iloc[1]["from"] == T.index[10]
+
+    def test_lags_of_a_sensor_are_not_named_again(self):
+        lagged = LagFeatures([0, 2]).fit_transform(changed(T, [4, 9], 0, -999.0))
+        assert gross_errors(lagged, F).table["column"].tolist() == ["T1"]
+
+
+ANYTHING = st.one_of(
+    st.none(),
+    st.text(max_size=3),
+    st.binary(max_size=3),
+    st.floats(),
+    st.dictionaries(st.text(max_size=2), st.lists(st.floats(), max_size=3), max_size=2),
+    st.lists(st.lists(st.one_of(st.floats(), st.text(max_size=2), st.none()), max_size=3), max_size=3),
+    st.sampled_from([float, np.sin, {1, 2}, np.zeros((2, 3, 4)), np.array([1 + 1j]), T.astype(str), T > 0, T["T1"]]),
+    st.sampled_from(
+        [T.astype("category"), T.astype("Float64"), T.astype("float16"), T.astype(object), T[[]], 1e300 * T]
+    ),
+    st.sampled_from([T.assign(T1=T.index), T.assign(T1="a"), T.set_axis([1, "a", None], axis=1), T, F, T[:3], -T]),
+)
+
+
+@given(temperatures=ANYTHING, frequencies=ANYTHING)
+@settings(max_examples=150, deadline=None)
+@pytest.mark.filterwarnings("error")
+def test_nothing_fails_whatever_is_given(temperatures, frequencies):
+    found = check_records(temperatures, frequencies)
+    assert len(list(found.warnings())) <= len(kinds(found))
+    assert isinstance(str(found), str)
+    alone = gross_errors(temperatures), gross_errors(None, frequencies)
+    assert set().union(*map(kinds, alone)) - {"implausible values"} <= kinds(found) | {"fahrenheit", *KINDS_OF_PAIRS}
+
+
+KINDS_OF_PAIRS = {what for what in WARNINGS if what not in ("no table", "no numbers", "infinite values", "kelvin")}
+"""Kinds that tables which are exchanged or equal are not searched for."""
+
+
+def test_arguments_that_are_no_tables_are_refused():
+    with pytest.raises(ValueError, match="unit"):
+        check_records(T, F, unit=3)
+    with pytest.raises(ValueError, match="model"):
+        check_records(T, F, model="truss")
+
+
+class TestFindings:
+    def test_each_kind_says_what_follows_and_what_to_do(self):
+        assert set(WARNINGS) >= ARE_MEANINGLESS
+        for text in WARNINGS.values():
+            what, consequence, action = text.split("; ")
+            assert what.endswith(": {}")
+            assert min(map(len, (consequence, action))) > 10
+
+    @given(random=st.randoms(use_true_random=False))
+    @often
+    def test_order_of_rows_and_columns_does_not_matter(self, random):
+        wrong = changed(changed(T, [3, 5], 0, -999.0), slice(0, 40), 2, 300.0)
+        rows, sensors = random.sample(range(365), 365), random.sample(list(T), 3)
+        expected = gross_errors(wrong, F).table
+        found = gross_errors(wrong.iloc[rows][sensors], F.iloc[rows]).table
+        found = found[found["what"] != "unsorted stamps"]
+        pd.testing.assert_frame_equal(*(one.sort_values("column").reset_index(drop=True) for one in (found, expected)))
+
+    def test_one_error_lists_all_that_is_meaningless_and_nothing_that_is_doubtful(self):
+        wrong = changed(T.assign(T2=T["T2"] + 273.15), [3], 0, -999.0)
+        found = gross_errors(wrong, changed(F.assign(f3=F["f1"]), [8], 1, 0.0))
+        with pytest.raises(ValueError, match="kelvin") as error:
+            found.refuse_meaningless()
+        assert all(name in str(error.value) for name in ("'T1'", "'T2'", "'f2'", "2025-01-09"))
+        assert "'f3'" not in str(error.value)
+        gross_errors(T, F.assign(f3=F["f1"])).refuse_meaningless()
+
+    def test_values_that_were_put_aside_count_as_outliers_and_tables_stay_as_they_are(self):
+        wrong = changed(F, [8, 40], 1, 9999.0)
+        before = wrong.copy()
+        assert np.argwhere(check_records(T, wrong).outliers.to_numpy()).tolist() == [[8, 1], [40, 1]]
+        pd.testing.assert_frame_equal(wrong, before)
