@@ -13,7 +13,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-collect_ignore = ["tests/bad_input/examples.py"]  # test_bad_input.py imports it, without its warnings
+collect_ignore = [f"tests/bad_input/{name}.py" for name in ("examples", "in_service")]  # test_bad_input imports them
 FITTED = {}  # what chains of examples have learned, by all that tells them and their records from others
 gc.set_threshold(50_000)  # by default 700: a fifth of the time in which tests are collected
 

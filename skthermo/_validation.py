@@ -82,6 +82,9 @@ class Estimator(BaseEstimator):
                 f"The 'random_state' parameter of {type(self).__name__} is {self.random_state!r}; expected an integer, "
                 "a RandomState or None"
             )
+        for name, value in self.get_params(deep=False).items():
+            if isinstance(value, type):
+                raise InvalidParameterError(f"{name} is the class {value.__name__}; expected an instance of it")
         super()._validate_params()
 
     def __sklearn_clone__(self) -> Self:
@@ -157,7 +160,10 @@ class Interval(sklearn.utils._param_validation.Interval):
 
 
 def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN."""
+    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN.
+
+    With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
+    """
     return _as_numbers(partial(sklearn.utils.validation.validate_data, estimator), X, "X", options)
 
 
@@ -168,15 +174,21 @@ def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
 
 def _as_numbers(check: Callable[..., Any], values: Any, what: str, options: dict[str, Any]) -> Any:
     """An array that one of scikit-learn's checks makes; what is wrong with a table is said first, in one sentence."""
-    if options.get("ensure_2d", True):
-        least = {"least_rows": options.get("ensure_min_samples", 1)}
-        refuse_no_table(values, what, **least, least_columns=options.get("ensure_min_features", 1))
+    refuse_no_table(
+        values,
+        what,
+        least_rows=options.get("ensure_min_samples", 1),
+        least_columns=options.get("ensure_min_features", 1),
+        or_vector=not options.get("ensure_2d", True),
+    )
+    allow_infinite = options.pop("allow_infinite", False)
     try:
         array = check(with_nan(values), ensure_all_finite=False, **options)
     except TypeError as error:
         raise TypeError(f"{what} holds what is no number; expected numbers ({error})") from error
-    refuse_infinite(array, what, values)
-    refuse_huge(array, what)
+    if not allow_infinite:
+        refuse_infinite(array, what, values)
+        refuse_huge(array, what)
     return array
 
 

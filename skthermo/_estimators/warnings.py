@@ -22,7 +22,7 @@ from skthermo.exceptions import SkthermoWarning
 
 Records = TypeVar("Records")
 
-PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib"}  # packages whose lines are not the user's
+PASSED_OVER = {"skthermo", "sklearn", "joblib", "contextlib", "functools"}  # packages whose lines are not the user's
 REPORTED = (UserWarning, RuntimeWarning, FutureWarning)  # others are for developers
 ALL = "all"  # key of findings that stand for those of all records within
 

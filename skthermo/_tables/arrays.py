@@ -82,7 +82,11 @@ def as_floats(values: Any) -> Array:
     try:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
     except TypeError:  # pandas' NA in an object array is not a float
+        pass
+    try:
         return without_missing(np.asarray(array, dtype=object)).astype(float)
+    except TypeError as error:
+        raise ValueError(f"the input is {values!r:.100}; expected numbers ({error})") from error
 
 
 def without_mask(values: Any) -> Any:
@@ -237,9 +241,11 @@ def refuse_no_array(values: Any, what: str, expected: str = "expected an array o
         raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
 
 
-def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1) -> None:
+def refuse_no_table(
+    values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1, or_vector: bool = False
+) -> None:
     """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
-    whose names are not all text or all numbers."""
+    whose names are not all text or all numbers; a vector may stand for a table of one column."""
     expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
     refuse_no_array(values, what, expected)
     refuse_no_numbers(values, what)
@@ -247,6 +253,8 @@ def refuse_no_table(values: Any, what: str, *, least_rows: int = 1, least_column
     shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])
     if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
         raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    if len(shape) == 1 and or_vector:
+        shape = (*shape, 1)
     if len(shape) == 1 and hasattr(values, "iloc"):
         raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
     if len(shape) < 2:

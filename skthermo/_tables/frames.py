@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, is_real, median, real_array, refuse_no_array, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, is_real, real_array, refuse_no_array
 from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
@@ -109,17 +109,11 @@ def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None
     return np.array(positions, dtype=np.intp)
 
 
-def check_columns(X: ArrayLike, what: str, *, varying: bool = False) -> None:
-    """Raise an error for columns without a value or, with ``varying``, with two or more values that are all equal."""
+def check_columns(X: ArrayLike, what: str) -> None:
+    """Raise an error for columns without a value."""
     for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
-        present = column[~np.isnan(column)]
-        if not present.size:
+        if np.isnan(column).all():
             raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
-        if varying and len(column) > 1 and np.ptp(present) == 0:
-            raise ValueError(
-                f"{what} column {name!r} is constant ({present[0]:g} in all {present.size} rows with a value); "
-                "expected one that varies: leave it out"
-            )
 
 
 def check_temperatures(T: ArrayLike) -> None:
@@ -161,37 +155,6 @@ def warn_of_markers(X: ArrayLike) -> None:
             f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
             RecordsWarning,
             "markers",
-        )
-
-
-def warn_of_implausible(X: ArrayLike) -> None:
-    """Warn of values that are implausibly far from the median of their column."""
-    values = as_floats(X)
-    values = np.where(np.isin(values, MARKERS), np.nan, values)  # `warn_of_markers` tells of these
-    if np.isnan(values).all(axis=0).any():
-        return
-    deviations = robust_deviation(values)
-    far = (np.abs(values - median(values)) > IMPLAUSIBLE * deviations) & (deviations > 0)
-    if far.any():
-        row, column = np.argwhere(far)[0]
-        warn_user(
-            f"{far.sum()} of {far.size} baseline values are implausibly far from the others of their column, the first "
-            f"{values[row, column]:.4g} in row {row} of column {column_names(X, 'x')[column]!r}: such values hide "
-            f"damage; expected NaN where a value is wrong (more than {IMPLAUSIBLE} robust deviations away)",
-            RecordsWarning,
-            "implausible values",
-        )
-
-
-def warn_of_disorder(X: Any) -> None:
-    """Warn of a frame whose stamps are not in order."""
-    row = first_disorder(X)
-    if row:
-        warn_user(
-            f"row {row} ({X.index[row]}) is earlier than the row before it: folds are periods of time only for rows in "
-            "order; expected X.sort_index()",
-            RecordsWarning,
-            "rows in disorder",
         )
 
 

@@ -12,13 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._estimators.warnings import explain_rows, explained_rows, warn_user
+from skthermo._estimators.warnings import explain_rows, explained_rows, warn_each, warn_user
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import frame_like, row_times, warn_of_implausible, warn_of_markers
+from skthermo._tables.frames import Table, frame_like, row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.detection._likelihood import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
+from skthermo.preprocessing import gross_errors
+
+OF_ORDER = {"repeated stamps", "unsorted stamps"}  # which only what looks at earlier records depends on
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -70,6 +73,12 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
 
     def __init__(self, contamination: float = 0.02):
         self.contamination = contamination
+
+    def _check_baseline(self, F: Table) -> None:
+        """Hook: refuse gross errors of a baseline, and warn of what is doubtful."""
+        findings = gross_errors(frequencies=F, unit="")
+        findings.refuse_meaningless()
+        warn_each(findings.warnings(but=OF_ORDER))
 
     def _records(self, X: Any, F: Array) -> Any:
         """Hook: preprocess validated rows."""
@@ -126,21 +135,19 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Raises
         ------
         ValueError
-            If fewer than two rows have a value, or the detector cannot learn from them.
+            If the baseline has gross errors, all of which are listed, such as numbers that stand for a missing value,
+            infinite values, columns that are constant or missing, or fewer than two rows with a value; or the detector
+            cannot learn from it.
 
         Warns
         -----
         UserWarning
-            If there are numbers that stand for a missing value, such as -999, implausible values far from the others,
-            or too few records for the rate of false alarms that is asked for; if the threshold is far above the
-            indices that the fitted detector gives the baseline, with the shift that it still sees.
+            If there are implausible values far from the others, equal columns, or columns with few different values;
+            if there are too few records for the rate of false alarms that is asked for; if the threshold is far above
+            the indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
-        F = self._validated(X, reset=True, order="C", ensure_min_samples=2)
-        warn_of_markers(frame_like(X, F))
-        warn_of_implausible(frame_like(X, F))
-        n_rows = int((~np.isnan(F)).any(axis=1).sum())
-        if n_rows < 2:
-            raise ValueError(f"{n_rows} of {len(F)} rows have a value; expected at least 2")
+        F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
+        self._check_baseline(frame_like(X, F))
         records = self._records(X, F)
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)

@@ -23,14 +23,12 @@ from skthermo._estimators.warnings import (
 )
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
-    check_columns,
     check_positions_are_names,
     check_temperatures,
     column_names,
     frame_like,
     has_stamps,
     positions_of,
-    warn_of_disorder,
     warn_of_markers,
 )
 from skthermo._validation import (
@@ -48,7 +46,7 @@ from skthermo._validation import (
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.preprocessing import RecordFindings, check_records
+from skthermo.preprocessing import RecordFindings, check_records, gross_errors
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -363,7 +361,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             In units of the range of each column in the baseline; 0 inside it, NaN where the value is missing.
         """
         check_is_fitted(self)
-        temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        temperatures, _ = self._split(X)
         return frame_like(temperatures, self.training_range_.excess(temperatures))
 
     @overload
@@ -385,7 +383,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             may be damage, or a behaviour in such weather that nobody has seen yet.
         """
         check_is_fitted(self)
-        temperatures, _ = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        temperatures, _ = self._split(X)
         far = (np.nan_to_num(self.training_range_.excess(temperatures)) > BEYOND).any(axis=1)
         return pd.Series(far, X.index, name="extrapolated") if isinstance(X, pd.DataFrame) else far
 
@@ -408,7 +406,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _residuals(self, X: ArrayLike) -> tuple[Any, Array, Array, PredictionError, NDArray[np.bool_]]:
         """Frequencies and weather of new records, residuals in Hz, errors of predictions, rows without a prediction."""
         check_is_fitted(self)
-        temperatures, frequencies = split_columns(X, validate_data(self, X, **AS_FLOATS, reset=False), self.targets_)
+        temperatures, frequencies = self._split(X)
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
@@ -427,6 +425,19 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         errors = self.regression_.errors(filled).plus(fills, len(residuals))
         return frequencies, weather, residuals, errors, unknown
 
+    def _split(self, X: Any) -> tuple[Any, Any]:
+        """Temperatures and frequencies of new records, with a warning of values that are none."""
+        values = validate_data(self, X, **AS_FLOATS, reset=False)
+        temperatures, frequencies = split_columns(X, values, self.targets_)
+        names = _check_feature_names_in(self, None)
+        named = pd.DataFrame(values, columns=names, copy=False)
+        warn_of_markers(named[names[self.targets_]])
+        try:
+            check_temperatures(named.drop(columns=names[self.targets_]))
+        except ValueError as error:  # only a warning, as another column may be something else than a temperature
+            warn_user(str(error), RecordsWarning, "temperatures")
+        return temperatures, frequencies
+
     def _with_spread(self, residuals: Array) -> Array:
         """Residuals without those of targets that had none in the baseline."""
         return np.where(np.diag(self.spread_.overall.covariance) > 0, residuals, np.nan)
@@ -438,23 +449,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         return self.spread_.log_volumes(weather, known, errors) - certain
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
-        if isinstance(self.estimator, type):
-            raise ValueError(f"estimator is the class {self.estimator.__name__}; expected an instance of it")
-        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2)
+        values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2, allow_infinite=True)
         check_positions_are_names(self.targets, getattr(X, "columns", ()))
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
-        names = _check_feature_names_in(self, None)[self.targets_]
-        check_columns(pd.DataFrame(values[:, self.targets_], columns=names), "frequency")
-        temperatures, frequencies = split_columns(X, values, self.targets_)
-        warn_of_disorder(X)
-        named = pd.DataFrame(frequencies, copy=False).set_axis(names, axis=1)
-        others = np.delete(_check_feature_names_in(self, None), self.targets_)
-        warn_each(misplaced_columns(pd.DataFrame(temperatures, copy=False).set_axis(others, axis=1), named))
-        return (
-            temperatures,
-            frequencies,
-            findings_of(partial(check_records, unit=""), pd.DataFrame(temperatures), named),
-        )
+        names = _check_feature_names_in(self, None)
+        named = pd.DataFrame(values, getattr(X, "index", None), names, copy=False)
+        T, F = named.drop(columns=names[self.targets_]), named[names[self.targets_]]
+        refuse_gross_errors(named, list(T))
+        warn_each(misplaced_columns(T, F))
+        findings = findings_of(partial(check_records, unit=""), T, F)
+        return *split_columns(X, values, self.targets_), findings
 
     def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
         """Learn from all rows; residuals of each from a clone fitted on the other folds."""
@@ -555,9 +559,14 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
     others = np.delete(np.arange(len(columns)), targets)
     temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, targets))
-    warn_of_markers(pd.DataFrame(frequencies, copy=False).set_axis(columns[targets], axis=1))
-    try:
-        check_temperatures(pd.DataFrame(temperatures, copy=False).set_axis(columns[others], axis=1))
-    except ValueError as error:  # only a warning, as another column may be something else than a temperature
-        warn_user(str(error), RecordsWarning, "temperatures")
     return temperatures, frequencies
+
+
+def refuse_gross_errors(baseline: pd.DataFrame, inputs: list[Hashable]) -> None:
+    """Refuse a baseline with values that are no measurements of any quantity; an input that is constant does no harm.
+
+    Inputs need not be temperatures: those that look like kelvin, say, are only warned of.
+    """
+    found = gross_errors(frequencies=baseline, unit="")
+    harmless = (found.table["what"] == "constant") & found.table["column"].isin(inputs)
+    replace(found, table=found.table[~harmless]).refuse_meaningless()

@@ -80,6 +80,9 @@ class FusedDetector(DamageDetector, _BaseComposition):
     def set_params(self, **params: Any) -> FusedDetector:  # also of the detectors, by their names
         return self._set_params("detectors", **params)
 
+    def _check_baseline(self, F: Any) -> None:
+        """Its detectors check what they are given, which may hold temperatures, too."""
+
     def _records(self, X: ArrayLike, F: Array) -> ArrayLike:
         return X
 

@@ -11,6 +11,7 @@ import pandas as pd
 
 from skthermo._tables.arrays import Array
 from skthermo.plotting._display import (
+    AMBER,
     BLACK,
     BLUE,
     GREY,
@@ -45,6 +46,7 @@ N_ERRORS = 2  # standard errors on either side of a change
 DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
+    "watch event": {"facecolor": (AMBER, 0.15), "edgecolor": (AMBER, 0.6), "hatch": "\\\\"},
     "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
     "measurement or structure event": {"facecolor": (GREY, 0.25), "edgecolor": (GREY, 0.7), "hatch": "xx"},
     "event marked as harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
@@ -64,7 +66,7 @@ class MonitorDisplay(Display):
     ----------
     index : DataFrame
         On a ``DatetimeIndex``, a row for each record or day: ``index`` (NaN where none was evaluated), ``is_alarm``,
-        ``threshold`` (an event begins above it) and, of days, ``median``.
+        ``threshold`` (an event begins above it), perhaps ``watch`` (a lower level) and, of days, ``median``.
     events : DataFrame
         ``kind``, ``start``, ``end`` (NaT while it is open) and ``harmless``.
     drift : DataFrame
@@ -172,6 +174,8 @@ class MonitorDisplay(Display):
         if absent or not asked:
             raise ValueError(f"parts are {asked}; expected some of {[part for part in PARTS if shown[part]]}")
         events = _overlapping(monitor.events_, "start", "end", index.index)
+        watch = getattr(monitor, "watch_threshold_", None)  # of monitors with a second level
+        index = index.assign(watch=np.nan if watch is None else watch)
         index = index.assign(threshold=_thresholds(monitor, index.index, pd.Timedelta("1D" if by == "day" else "1ns")))
         return cls(index, events, drift, errors, faults, asked).plot(**options)
 
@@ -236,6 +240,9 @@ class MonitorDisplay(Display):
             self.threshold_line_ = ax.axhline(threshold[0], **style)
         else:
             self.threshold_line_ = ax.plot(x, threshold, drawstyle="steps-post", **style)[0]
+        watch = self.index["watch"].iloc[-1] if "watch" in self.index else np.nan
+        if np.isfinite(watch):
+            ax.axhline(watch, color=GREY, linestyle=":", linewidth=1, label="threshold of a watch")
         ax.set_ylim(bottom=0)
         if np.isfinite(index).any():
             hold_outliers(ax, keep=(0.0, threshold.max()))

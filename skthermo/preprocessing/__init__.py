@@ -7,7 +7,7 @@ from skthermo.preprocessing._lags import LagFeatures
 from skthermo.preprocessing._memory import ExponentialMeans, MemoryFindings, find_memory
 from skthermo.preprocessing._mode_tracker import ModeTracker
 from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.preprocessing.checks import RecordFindings, check_records, residual_trend
+from skthermo.preprocessing.checks import RecordFindings, check_records, gross_errors, residual_trend
 
 __all__ = [
     "BiasAligner",
@@ -23,5 +23,6 @@ __all__ = [
     "SensorMeans",
     "check_records",
     "find_memory",
+    "gross_errors",
     "residual_trend",
 ]

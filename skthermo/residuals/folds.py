@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.model_selection import KFold, check_cv
+from sklearn.model_selection import check_cv
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import correlation_times, row_times
@@ -32,9 +33,10 @@ class Folds:
         """The folds that a user asks for; by default blocks of a week, or of a 52nd of the rows without stamps."""
         if cv is None:
             return cls.of_blocks(BlockedKFold(N_FOLDS), X)
-        if isinstance(cv, str):
-            cv = KFold(N_FOLDS)
-        splits = list(check_cv(checked(cv, len(X))).split(X))
+        n_folds = N_FOLDS if isinstance(cv, str) else cv
+        if isinstance(n_folds, Integral) and n_folds > len(X):
+            raise ValueError(f"cv is {cv!r}, {n_folds} folds of {len(X)} rows; expected a row or more in each fold")
+        splits = list(check_cv(checked(n_folds, len(X))).split(X))
         tested = np.bincount(np.concatenate([[], *(test for _, test in splits)]).astype(int), minlength=len(X))
         untested = np.arange(tested.argmax())
         wrong = len(untested) + np.flatnonzero(tested[len(untested) :] != 1)

@@ -30,9 +30,7 @@ from skthermo._io import lock
 from skthermo._tables.arrays import Array, as_columns, check_flag, columns_by_name
 from skthermo._tables.frames import (
     Table,
-    check_columns,
     check_same_rows,
-    check_temperatures,
     column_names,
     frame_like,
     like_targets,
@@ -52,7 +50,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import HingeFeatures
+from skthermo.preprocessing import HingeFeatures, gross_errors
 
 Result = TypeVar("Result")
 
@@ -446,9 +444,7 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        named = frame_like(X, T)
-        check_temperatures(named)
-        check_columns(named, "temperature", varying=True)
+        gross_errors(frame_like(X, T)).refuse_meaningless(but={"no rows"})
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)

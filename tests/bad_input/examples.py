@@ -1,12 +1,7 @@
 """A valid call of every public function, class and method, with bad values of its arguments; and calls in which several
 arguments do not go together."""
 
-import importlib
-import inspect
-import tempfile
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,12 +13,12 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 
-import skthermo
-from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, reporting, studies, surrogate, updating
+from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
 from skthermo._tables.arrays import check_bounds, check_prior
 from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
+from tests.bad_input.registry import EXAMPLES, FOLDER, LEGAL, NOT_CALLED, UNTRIED, USUAL, Example, fitted, method, use
 from tests.bad_input.values import (
     HUGE,
     INF,
@@ -37,6 +32,7 @@ from tests.bad_input.values import (
     durations,
     estimators,
     flag,
+    frequencies,
     instead,
     integers,
     jobs,
@@ -55,52 +51,6 @@ from tests.bad_input.values import (
 
 mpl.use("Agg")
 np.seterr(all="ignore")
-ROOMS = (fem, preprocessing, surrogate, updating, detection, metrics, datasets, studies, plotting, reporting)
-FOLDER = Path(tempfile.mkdtemp())
-
-
-@dataclass
-class Example:
-    """A call by keywords with a good value of every argument, and the bad values of each."""
-
-    name: str
-    of: Any
-    call: Any
-    good: dict[str, Any] = field(default_factory=dict)
-    bad: dict[str, dict[str, Any]] = field(default_factory=dict)
-
-
-EXAMPLES: list[Example] = []
-
-
-def use(name, call=None, /, usual="", **arguments):
-    """Register an example: for every argument a good value and its bad ones, by default those of `USUAL`."""
-    arguments = {argument: USUAL[argument] for argument in usual.split()} | arguments
-    of = skthermo
-    for part in name.split("."):
-        of = importlib.import_module(f"skthermo.{part}") if of is skthermo else getattr(of, part)
-    good = {argument: pair[0] for argument, pair in arguments.items()}
-    bad = {argument: pair[1] for argument, pair in arguments.items()}
-    EXAMPLES.append(Example(name, of, of if call is None else call, good, bad))
-
-
-def method(name, owner, **arguments):
-    """Register a method of a fixed object."""
-    use(name, getattr(owner, name.rpartition(".")[2]), **arguments)
-
-
-def fitted(cls, X, y=None, after=None, usual="", **arguments):
-    """Register an estimator: its parameters, and X and y of ``fit``."""
-    if after is None:
-        after = lambda estimator, X: estimator.transform(X)  # noqa: E731
-
-    def call(**values):
-        given = [values.pop(part) for part in ("X", "y") if part in values]
-        return after(cls(**values).fit(*given), X[0])
-
-    data = {"X": X} | ({} if y is None else {"y": y})
-    use(f"{cls.__module__.split('.')[1]}.{cls.__name__}", call, usual=usual, **arguments, **data)
-
 
 TRUSS = datasets.make_truss()
 NAMES = list(TRUSS.parameter_names)
@@ -125,7 +75,7 @@ BOUNDED = by_name(0.2, NAMES, wrong=(20, 1.0, 0, -0.2), but=("too long",)) | {
 }
 PRIOR = by_name(0.2, NAMES, wrong=(20, 30))
 NOISE = by_name(0.01, MODES, wrong=(0.5, 1.0, 5), but=("zero inside",))
-USUAL = {
+USUAL |= {
     "random_state": (0, seed()),
     "model": (TRUSS, models()),
     "dofs": (DOFS, integers(23)),
@@ -145,7 +95,6 @@ USUAL = {
     "verbose": (False, flag("one", "zero")),
     "max_false_alarms": (0.02, number(-0.1, 2)),
 }
-"""A good value and the bad ones of arguments that many callables have."""
 DAMAGE = by_key({"top": 0.1}, wrong=(20, 1.0, -15))
 PARAMETERS = by_key({"top": 1.02}, wrong=(0, -1))
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
@@ -837,7 +786,7 @@ use(
 # surrogate
 PREDICTING = weather(T, rows=False)
 WEATHER = weather(T, rows=True, fixed=False, fitting=True)
-MEASURED = table(F, rows=True, positive=True, fitting=True, but=("unknown names", "columns in another order"))
+MEASURED = frequencies(F, rows=True, fitting=True, but=("unknown names", "columns in another order"))
 
 
 def chain_of(**values):
@@ -880,7 +829,7 @@ method(
 use(
     "surrogate.DataInformedFEM.estimate_parameters",
     CHAIN.estimate_parameters,
-    F=(F, table(F, rows=False, positive=True)),
+    F=(F, frequencies(F, rows=False)),
     shapes=(None, bad("x", 3, True, SHAPES)),
 )
 CHANGES = {
@@ -920,7 +869,7 @@ INVERTING = {
     "n_jobs": (1, jobs()),
     "random_state": (0, seed()),
 }
-INVERTED = table(F, rows=False, positive=True, but=("unknown names", "columns in another order"))
+INVERTED = frequencies(F, rows=False, but=("unknown names", "columns in another order"))
 use(
     "surrogate.InverseSurrogate",
     lambda **a: (
@@ -987,9 +936,7 @@ method(
 use("surrogate.paper_network", lambda **a: surrogate.paper_network(**a).hidden_layer_sizes, network=("truss", choice()))
 
 # updating
-UPDATED = table(
-    F, rows=False, positive=True, fitting=True, but=("constant", "unknown names", "columns in another order")
-)
+UPDATED = frequencies(F, rows=False, fitting=True, but=("constant", "unknown names", "columns in another order"))
 UPDATER = {
     "model": (TRUSS, models()),
     "bounds": (0.2, BOUNDED),
@@ -1033,7 +980,7 @@ use(
 )
 
 # detection
-WATCHED = table(F, fixed=False, rows=False, fitting=True)
+WATCHED = frequencies(F, in_hertz=False, fixed=False, rows=False, fitting=True)
 DAMAGE_INDEX = lambda detector, X: detector.damage_index(X)  # noqa: E731
 fitted(
     MahalanobisDetector,
@@ -1302,7 +1249,7 @@ use(
     ),
     n_repeats=(1, count()),
     T=(LATER.temperatures, weather(LATER.temperatures, rows=False)),
-    baseline=(F, table(F, rows=False, fitting=True)),
+    baseline=(F, frequencies(F, rows=False, fitting=True)),
     reference=(
         {"healthy": LATER.frequencies},
         bad("F", 3, True, {"no": F}, {"healthy": None})
@@ -1355,7 +1302,7 @@ use(
     usual="noise dofs random_state",
     **ARGUMENTS,
     T=(LATER.temperatures, weather(LATER.temperatures, rows=True)),
-    F=(LATER.frequencies, table(LATER.frequencies, rows=True, positive=True)),
+    F=(LATER.frequencies, frequencies(LATER.frequencies, rows=True)),
     groups=(["top"], names(["top"]) | bad({"a": ["no"]}, {"a": []})),
     prior=(None, instead({"severity": 0.2}, (0.5, 0.5), studies.DamagePrior)),
     stiffening=(["top"], names(["top"]) | bad(1)),
@@ -1429,7 +1376,8 @@ fitted(
     n_deviations=(6.0, number(-1.0, 0.0)),
     targets=(MODES, names(MODES)),
 )
-use("preprocessing.check_records", temperatures=(T, table(T, fixed=False)), frequencies=(F, table(F, fixed=False)))
+RECORDS = {"temperatures": (T, weather(T, fixed=False)), "frequencies": (F, frequencies(F, fixed=False))}
+use("preprocessing.check_records", **RECORDS)
 use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
 fitted(
     OutlierDetector,
@@ -1702,7 +1650,16 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("InverseSurrogate", "steps without a model", lambda: surrogate.InverseSurrogate(refine=5).fit(F, F), "refine"),
     ("InverseSurrogate", "inverted without steps", lambda: bare().invert(F), "refine is 0"),
     ("InverseSurrogate", "no deviations", lambda: bare().predict(F, return_std=True), "standard deviations"),
-    ("DataInformedFEM", "another index", lambda: chain().fit(T, LATE), "indices"),
+    ("DataInformedFEM", "another index", lambda: chain().fit(T, LATE), "different rows"),
+    ("DataInformedFEM", "rad/s", lambda: chain().fit(T, F * 2 * np.pi), "rad/s"),
+    ("DataInformedFEM", "kHz", lambda: chain().fit(T, F / 1000), "kHz"),
+    ("DataInformedFEM", "periods", lambda: chain().fit(T, 1 / F), "periods"),
+    ("DataInformedFEM", "all errors", lambda: chain().fit(T + 273.15, F.assign(f2=7.0)), "kelvin.*constant: 'f2'"),
+    ("MahalanobisDetector", "-999", lambda: MahalanobisDetector().fit(changed(F, 3, 1, -999.0)), "'f2' is -999"),
+    ("MahalanobisDetector", "all errors", lambda: MahalanobisDetector().fit(F.assign(f2=7.0, f3=NAN)), "'f2'.*'f3'"),
+    ("TemperatureCompensator", "-999", lambda: LINES.fit(changed(BOTH, 0, 0, -999.0)), "'T1' is -999"),
+    ("TemperatureCompensator", "infinite", lambda: LINES.fit(changed(BOTH, 0, 0, INF)), "'T1' is inf"),
+    ("identify_damage", "rad/s", lambda: studies.identify_damage(CHAIN, T, F * 2 * np.pi), "rad/s"),
     ("DataInformedFEM", "scored on another index", lambda: CHAIN.score(T, LATE), "indices"),
     (
         "DataInformedFEM",
@@ -1712,7 +1669,6 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ),
     ("datasets.load_z24", "not that file", lambda: datasets.load_z24(__file__), "header"),
     ("fem.read_triplets", "infinite values", lambda: fem.read_triplets(FOLDER / "infinite.sti"), "finite"),
-    ("preprocessing.check_records", "other rows", lambda: preprocessing.check_records(T, F[1:]), "119"),
     ("fem.AffineModel.frequencies", "1e308", lambda: TRUSS.frequencies([[1e308, 1, 1, 1]]), "theta"),
     ("fem.Structure", "1e308", lambda: truss_of(BARS | {"tie": Bar("left", "right", 1e308, 1.0)}), "E"),
 ]
@@ -1737,7 +1693,7 @@ WARNED_OF = [
     ),
     ("KNNGapImputer", "-999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "-999"),
     ("BiasAligner", "-999", lambda: BiasAligner().fit(changed(F, 3, 1, -999.0)), "'f2'"),
-    ("MahalanobisDetector", "-999", lambda: MahalanobisDetector().fit(changed(F, 3, 1, -999.0)), "-999"),
+    ("MahalanobisDetector", "1e6", lambda: MahalanobisDetector().fit(changed(F, 3, 1, 1e6)), "'f2' is 1e.06"),
     ("MahalanobisDetector", "few records", lambda: MahalanobisDetector().fit(F[:20]), "49"),
     ("MahalanobisDetector", "rows lost", lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)), "7 of 120"),
     ("MahalanobisDetector", "all lost", lambda: DETECTOR.predict(F * NAN), "120 of 120"),
@@ -1748,7 +1704,6 @@ WARNED_OF = [
         "1 of 120",
     ),
     ("WindowedAlarm", "few windows", lambda: WindowedAlarm(2).fit(F[:40]), "49"),
-    ("TemperatureCompensator", "-999", lambda: LINES.fit(changed(BOTH, 0, 0, -999.0)), "-999"),
     ("TemperatureCompensator", "kelvin", lambda: LINES.fit((T + 273.15).join(F)), "kelvin"),
     ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "above 150"),
     ("TemperatureCompensator", "hot", lambda: WHITENER.transform((T + 60).join(F)), "far outside"),
@@ -1765,7 +1720,6 @@ WARNED_OF = [
     ),
     ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
     ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "far outside"),
-    ("DataInformedFEM", "rad/s", lambda: chain().fit(T, F * 2 * np.pi), "rad/s"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
     ("DataInformedFEM", "modes swapped", lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]), "0, 1, 3, 2"),
     ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "20 complete rows"),
@@ -1820,7 +1774,7 @@ BY_NAME = {  # values with names, and a call that reads them by name
 }
 
 
-NOT_CALLED = {
+NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
     "fem.BatchModel": "a protocol",
     "fem.DamageableModel": "a protocol",
@@ -1845,9 +1799,7 @@ NOT_CALLED = {
         f"plotting.{name}": "draws results of others; tables are tried in from_predictions" for name in plotting.__all__
     },
 }
-"""Public names whose constructors are not tried, with reasons."""
-
-UNTRIED = {
+UNTRIED |= {
     "datasets.make_fleet": {"atypical", "kinds"},
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
@@ -1862,9 +1814,7 @@ UNTRIED = {
     "surrogate.DataInformedFEM": {"discrepancy", "memory"},
     "updating.ModelUpdater": {"reduce"},
 }
-"""Arguments that have no bad values in this table."""
-
-LEGAL: dict[str, dict[tuple[str, str], str]] = {
+LEGAL |= {
     "window": {("a duration", "preprocessing.HampelFilter"): "a window may be a duration"},
     "n_deviations": {("1e308", "preprocessing.HampelFilter"): "removes nothing"},
     "sample_weight": {(cause, "*"): "a mask says which rows count" for cause in ("true", "booleans", "true inside")},
@@ -1900,17 +1850,3 @@ LEGAL: dict[str, dict[tuple[str, str], str]] = {
     },
     "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
 }
-"""Bad values that are good for an argument: (cause, callable or *) and the reason."""
-
-
-def public_arguments():
-    """Name and argument of every public function and constructor, but for those that are not tried."""
-    for room in ROOMS:
-        for name in room.__all__:
-            full = f"{room.__name__.split('.')[-1]}.{name}"
-            if full in NOT_CALLED:
-                continue
-            for argument, parameter in inspect.signature(getattr(room, name)).parameters.items():
-                keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
-                if keyed and argument not in UNTRIED.get(full, ()):
-                    yield full, argument

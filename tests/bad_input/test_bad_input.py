@@ -4,7 +4,6 @@ Bad values of every argument are generated (``examples.py``); a part of them is 
 depends on several arguments is listed there, by callable and cause.
 """
 
-import collections
 import contextlib
 import importlib
 import inspect
@@ -13,19 +12,26 @@ import signal
 import traceback
 import warnings
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pytest
-import sklearn
+import sklearn.utils._param_validation
+import sklearn.utils.validation
 
 import skthermo
 from skthermo._tables.arrays import check_noise
 from skthermo.exceptions import SkthermoWarning
+from skthermo.preprocessing import RecordFindings
+from tests.bad_input import registry
 
-SHARE, MOST_WRONG = 9, 0.01  # every ninth bad value is tried each time; so many may be silent or unclear
+SHARE = 11  # every eleventh bad value is tried each time
+KINDS = ["legal", "refused", "warned", "silent", "unclear"]
+MOST = {"silent": 0.005, "unclear": 0.002}  # shares of the bad values
 ERRORS = (ValueError, TypeError, FileNotFoundError)
-CHECKED_BY = tuple(str(Path(package.__file__).parent) for package in (skthermo, sklearn))
+OURS = str(Path(skthermo.__file__).parent)
+CHECKED_BY = (OURS, str(Path(sklearn.utils._param_validation.__file__)), str(Path(sklearn.utils.validation.__file__)))
 SECONDS = 60
 HERE = str(Path(__file__).parent)
 
@@ -38,10 +44,10 @@ FROM_THE_DEPTHS = re.compile(
 """Messages of NumPy, SciPy, pandas and Python about what a wrong input led to."""
 
 SAYS_WHAT = re.compile(
-    "[Ee]xpected|must be|[Gg]ot |required|should match|not supported|contains (infinity|NaN)"
-    "|not finite|expecting|should provide|not fitted|is none of these|not readable as|; found"
+    "[Ee]xpected|must be|should match|is expecting|not fitted|is none of these|not readable as|; found|; .+; .+"
 )
-"""What says what was got and what was expected, also in scikit-learn's words."""
+"""What says what was got and what was expected, or what was found, what follows and what to do; of scikit-learn's words
+those on parameters and on other columns."""
 
 
 class TooLong(BaseException):
@@ -80,9 +86,10 @@ def is_clear(error, argument):
     text = str(error)
     if not isinstance(error, ERRORS) or FROM_THE_DEPTHS.search(text.partition("expected")[0]):
         return False
-    if not traceback.extract_tb(error.__traceback__)[-1].filename.startswith(CHECKED_BY):
+    where = traceback.extract_tb(error.__traceback__)[-1].filename
+    if not where.startswith(CHECKED_BY):
         return False
-    return bool(re.search(rf"\b{re.escape(argument)}\b", text) or SAYS_WHAT.search(text))
+    return bool(SAYS_WHAT.search(text) or (where.startswith(OURS) and re.search(rf"\b{re.escape(argument)}\b", text)))
 
 
 def arrays(result):
@@ -110,6 +117,11 @@ def same(result, good):
     )
 
 
+def findings(result):
+    """Kinds of what `check_records` has found."""
+    return set(result.table["what"]) if isinstance(result, RecordFindings) else set()
+
+
 def verdict(example, argument, cause, value, good_result, good_warnings):
     """One of "legal", "refused", "warned", "silent", "unclear", and what was said."""
     with np.errstate(all="ignore"):
@@ -120,46 +132,68 @@ def verdict(example, argument, cause, value, good_result, good_warnings):
         where = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {error}"
         return ("refused", said) if is_clear(error, argument) else ("unclear", f"{said} ({where.filename[-40:]})")
-    if "another order" in cause and same(result, good_result):
-        return "legal", "read by name"
+    if ("another order" in cause or "stamps" in cause) and same(result, good_result):
+        return "legal", "read by name, or row by row"
+    named = findings(result) - findings(good_result)
+    if named:
+        return "warned", f"findings: {sorted(named)}"
     new = {text for text in told if not any(re.sub(r"\d", "", text) == re.sub(r"\d", "", o) for o in good_warnings)}
     return ("warned", next(iter(new))) if new else ("silent", f"gave {result!r:.80}")
 
 
+def all_examples():
+    """The registered examples of all modules."""
+    for module in ("examples", "in_service"):
+        importlib.import_module(f"tests.bad_input.{module}")
+    return registry.EXAMPLES
+
+
 def bad_values():
     """Every example with an argument, the name of the fault and a bad value of it, but for values that are legal."""
-    from tests.bad_input.examples import EXAMPLES, LEGAL
-
-    for example in EXAMPLES:
+    for example in all_examples():
         for argument, bad in example.bad.items():
             default = inspect.Parameter.empty
             with contextlib.suppress(KeyError, TypeError, ValueError):
                 default = inspect.signature(example.of).parameters[argument].default
             for cause, value in bad.items():
-                if (cause, "*") in LEGAL.get(argument, {}) or (cause, example.name) in LEGAL.get(argument, {}):
+                if {(cause, "*"), (cause, example.name)} & registry.LEGAL.get(argument, {}).keys():
                     continue
                 if value is default or (isinstance(value, type(default)) and np.ndim(value) == 0 and value == default):
                     continue
                 yield example, argument, cause, value
 
 
-def assert_refused_or_warned_of(every):
-    """Try every so many bad values: hardly any is accepted as if it were good, or refused without a word on why."""
+class Tried(NamedTuple):
+    """A bad value that was tried: "legal", "refused", "warned", "silent" or "unclear", and what was said."""
+
+    callable: str
+    argument: str
+    cause: str
+    kind: str
+    said: str
+
+
+def tried(every=1, beginnings=()):
+    """Try every so many bad values, of callables whose names begin so."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        chosen = list(bad_values())[::every]
-    good, kinds, wrong = {}, collections.Counter(), []
+        chosen = [one for one in bad_values() if one[0].name.startswith(beginnings or ("",))][::every]
+    good = {}
     for example, argument, cause, value in chosen:
         if id(example) not in good:
             result, error, told = answer(example, example.good)
             assert error is None, f"the good example of {example.name} fails: {error!r}"
             good[id(example)] = result, told
-        kind, said = verdict(example, argument, cause, value, *good[id(example)])
-        kinds[kind] += 1
-        if kind in ("silent", "unclear"):
-            wrong.append(f"{kind}: {example.name}({argument}: {cause}) {said:.220}")
-    assert len(wrong) <= MOST_WRONG * len(chosen), "\n".join(wrong)
-    assert kinds["refused"] > 0.9 * len(chosen)
+        yield Tried(example.name, argument, cause, *verdict(example, argument, cause, value, *good[id(example)]))
+
+
+def assert_refused_or_warned_of(every):
+    """Hardly any bad value is accepted as if it were good, or refused without a word on why."""
+    results = list(tried(every))
+    for kind, most in MOST.items():
+        wrong = [f"{one.callable}({one.argument}: {one.cause}) {one.said:.220}" for one in results if one.kind == kind]
+        assert len(wrong) <= most * len(results), f"{kind}:\n" + "\n".join(wrong)
+    assert sum(one.kind == "refused" for one in results) > 0.9 * len(results)
 
 
 def test_a_bad_value_of_an_argument_is_refused_or_warned_of():
@@ -174,10 +208,8 @@ def test_every_bad_value_of_every_argument_is_refused_or_warned_of():
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore")
 def test_every_public_argument_has_bad_values():
-    from tests.bad_input.examples import EXAMPLES, public_arguments
-
-    tried = {(example.name, argument) for example in EXAMPLES for argument in example.bad}
-    assert not sorted(set(public_arguments()) - tried)
+    tried = {(example.name, argument) for example in all_examples() for argument in example.bad}
+    assert not sorted(set(registry.public_arguments()) - tried)
 
 
 def complaint(call, kind, message):

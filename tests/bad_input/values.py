@@ -187,11 +187,26 @@ def table(good, *, nan=True, positive=False, fixed=True, rows=True, fitting=Fals
         "infinite inside": first(INF),
         "1e308 inside": first(HUGE),
         "three axes": np.stack([array, array]),
+        "half precision": frame.astype(np.float16) if named else array.astype(np.float16),
         "a number": 0.5,
+        "a generator": (row for row in array),
         "sparse": scipy.sparse.csr_array(np.nan_to_num(array)),
         "no rows": frame[:0] if named else array[:0],
+        "no columns": frame.iloc[:, :0] if named else array[:, :0],
         "ragged": [[1.0, 2.0], [1.0]],
     }
+    if named:
+        levels = pd.MultiIndex.from_product([["a"], frame.columns])
+        values |= {
+            "a mapping": frame.to_dict("list"),
+            "levels of names": frame.set_axis(levels, axis=1),
+            "tuples as names": frame.set_axis(pd.Index(list(levels), tupleize_cols=False), axis=1),
+        }
+        if frame.shape[1] > 1:
+            values |= {
+                "a series": frame.iloc[:, 0],
+                "a number among names": frame.set_axis([0, *frame.columns[1:]], axis=1),
+            }
     if named:
         column = frame.columns[0]
         values |= {
@@ -225,12 +240,53 @@ def table(good, *, nan=True, positive=False, fixed=True, rows=True, fitting=Fals
 
 def weather(good, **options):
     """Temperatures in degrees Celsius."""
-    frame = pd.DataFrame(good)
-    values = {
+    if not isinstance(good, pd.DataFrame):
+        return table(good, **options) | {"kelvin": good + 273.15}
+    column = good.columns[0]
+    faults = {
         "kelvin": good + 273.15,
-        "-999": frame.where(np.tile(np.arange(len(frame)) != 3, (frame.shape[1], 1)).T, -999.0),
+        "Fahrenheit": good * 1.8 + 32,
+        "tenths of a degree": good * 10,
+        "one sensor in kelvin": good.assign(**{column: good[column] + 273.15}),
+        "-999": marked(good, -999.0),
+        "9999": marked(good, 9999.0),
+        "a slipped point": marked(good, 1e6, once=True),
     }
-    return table(good, **options) | (values if isinstance(good, pd.DataFrame) else {"kelvin": good + 273.15})
+    values = table(good, **options) | stamps(good) | faults
+    return {cause: value for cause, value in values.items() if cause not in options.get("but", ())}
+
+
+def frequencies(good, *, in_hertz=True, **options):
+    """Frequencies in Hz, of a structure whose model is known if a unit can be wrong."""
+    units = {"rad/s": good * 2 * np.pi, "kHz": good / 1000, "periods": 1 / good} if in_hertz else {}
+    column = good.columns[1] if good.shape[1] > 1 else good.columns[0]
+    faults = {
+        "-999": marked(good, -999.0),
+        "9999": marked(good, 9999.0),
+        "a slipped point": marked(good, 1e6, once=True),
+        **({"a mode twice": good.assign(**{column: good.iloc[:, 0]})} if good.shape[1] > 1 else {}),
+    }
+    values = table(good, positive=in_hertz, **options) | stamps(good) | units | faults
+    return {cause: value for cause, value in values.items() if cause not in options.get("but", ())}
+
+
+def marked(good, value, *, once=False):
+    """A frame with a value in each ninth row, or once in its first column."""
+    rows = np.arange(len(good))
+    chosen = (rows == 7) if once else rows % 9 == 3
+    changed = good.to_numpy(copy=True)
+    changed[np.ix_(chosen, np.arange(good.shape[1]) < (1 if once else good.shape[1]))] = value
+    return pd.DataFrame(changed, good.index, good.columns)
+
+
+def stamps(good):
+    """Frames whose times are wrong."""
+    return {
+        "stamps missing": good.set_axis([pd.NaT, *good.index[1:]]),
+        "stamps equal": good.set_axis(good.index[:1].repeat(len(good))),
+        "stamps from numbers": good.set_axis(pd.to_datetime(np.arange(len(good)))),
+        "stamps as text": good.set_axis(good.index.astype(str)),
+    }
 
 
 def matrix(good, but=()):

@@ -58,7 +58,7 @@ def test_lags_within_go_by_time():
     lagged = make_pipeline(LagFeatures(3), LinearRegression())
     order = np.random.default_rng(0).permutation(len(X))
     expected = compensator(lagged).fit(X).transform(X)
-    with pytest.warns(UserWarning, match=r"row [0-9]+ .* is earlier than the row before it: folds are periods of time"):
+    with pytest.warns(UserWarning, match="rows are not in order of time"):
         shuffled = compensator(lagged).fit(X.iloc[order]).transform(X.iloc[order])
     np.testing.assert_allclose(shuffled.loc[X.index], expected, rtol=0, atol=1e-9)
     assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
@@ -212,7 +212,7 @@ def test_kelvin_and_numbers_for_missing_values_are_warned_of_at_the_users_line(m
     kelvin, marked = X.copy(), X.copy()
     kelvin["T2"] += 273.15
     marked.iloc[5:8, 0] = -999
-    with pytest.warns(UserWarning, match="temperature column 'T2' lies between .* kelvin.*Celsius") as caught:
+    with pytest.warns(UserWarning, match="kelvin: 'T2' lies between .*Celsius") as caught:
         getattr(compensator(), method)(kelvin)
     assert [warning.filename for warning in caught] == [__file__]
     with pytest.warns(UserWarning, match="temperature column 'T1' is -999 in 3 of 200 rows; expected .* NaN where"):
@@ -225,7 +225,7 @@ def test_kelvin_and_numbers_for_missing_values_are_warned_of_at_the_users_line(m
         ([(np.arange(100), np.arange(40, 200, 2))], r"tests row 41 0 times \(80 of 200 rows not exactly once\); expec"),
         (ShuffleSplit(3, random_state=0), r"cv is ShuffleSplit\(.*expected a partition of the rows"),
         ([], "cv is .., which tests row 0 0 times"),
-        (201, "n_splits=201 greater than the number of samples: n_samples=200"),
+        (201, "201 folds of 200 rows"),
         (1, "'cv' parameter"),
         ([1, 2], r"cv holds 1 as its element 0; expected a number of folds, a splitter, or pairs of training and te"),
         ([(np.arange(100), np.arange(100, 300))], r"element 0; .* positions from 0 to 199"),
@@ -242,11 +242,10 @@ def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
 @pytest.mark.parametrize(
     ("estimator", "holed", "message"),
     [
-        (Ridge(), with_gaps(["T1"], slice(None)), "that target and every other column for Ridge"),
         (Ridge(), with_gaps(["f1"], slice(1, None)), "that target and every other column for Ridge"),
         (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "that target for RandomForestRegressor"),
     ],
-    ids=["temperatures", "targets of a fold", "targets"],
+    ids=["targets of a fold", "targets"],
 )
 def test_no_row_to_learn_from_is_said(estimator, holed, message):
     said = rf"'f1' has none of [0-9]+ rows to learn from, of all or in a fold; expected rows with {message}"

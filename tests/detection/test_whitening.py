@@ -304,7 +304,7 @@ def test_forward_in_time_only_rows_before_the_first_fold_are_nan(whiten):
 
 @pytest.mark.parametrize("whiten", ["global", "local"])
 def test_a_mode_without_scatter_is_refused(whiten):
-    with pytest.raises(ValueError, match="covariance of 1200 baseline rows and 2 modes is singular"):
+    with pytest.raises(ValueError, match="constant"):
         compensator(whiten).fit(X.assign(f1=4.0, f2=9.0))
 
 

@@ -55,6 +55,27 @@ def test_a_new_threshold_is_a_step_on_the_day_of_its_first_record():
     np.testing.assert_array_equal(steps, monitor.evaluations_["threshold"])
 
 
+def test_a_watch_has_its_own_threshold_and_shade():
+    events = [event_row("2025-02-01", "2025-02-08", kind="watch"), event_row("2025-06-20", None)]
+    display = MonitorDisplay.from_estimator(FakeMonitor(events=events, watch_per_year=12))
+    watch, damage = display.event_spans_
+    assert watch.get_label() == "watch event"
+    assert watch.get_hatch() != damage.get_hatch()
+    (lower,) = [line for line in display.ax_.lines if line.get_label() == "threshold of a watch"]
+    assert lower.get_ydata()[0] == 2.5 < display.threshold_line_.get_ydata()[0]
+
+
+def test_each_panel_has_a_legend_of_its_own():
+    drift = pd.DataFrame({"change": [-0.1, 0.0], "standard_error": 0.01}, index=["deck", "piers"])
+    display = MonitorDisplay.from_estimator(FakeMonitor(drift=drift, faults=FAULTS))
+    assert display.figure_.legends == []
+    index, changes = ([text.get_text() for text in ax.get_legend().get_texts()] for ax in display.axes_[:2])
+    assert changes == ["deck", "piers", "± 2 standard errors"]
+    assert not set(index) & set(changes)
+    assert display.axes_[2].get_legend() is None
+    assert "since baseline" in display.axes_[1].get_ylabel()
+
+
 def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis():
     rows = [
         event_row("2025-02-01", "2025-02-08"),

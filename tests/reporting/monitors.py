@@ -43,6 +43,7 @@ class FakeMonitor:
         sensors=True,
         zone=None,
         false_alarms_per_year=1.0,
+        watch_per_year=None,
     ):
         self.false_alarms_per_year, self.sensors, self.direction, self.fem = (
             false_alarms_per_year,
@@ -76,13 +77,14 @@ class FakeMonitor:
         self.false_alarm_estimate_ = SimpleNamespace(
             rule=rule, expected=false_alarms_per_year, lowest=0, highest=3, n_years=2.0, method="by hand", unseen=""
         )
-        self.watch_threshold_ = self.watch_per_year = None
+        self.watch_per_year, self.watch_threshold_ = watch_per_year, None if watch_per_year is None else 2.5
         self.smallest_changes_ = SmallestChanges(0.01, {"f1": 0.02, "f2": 0.03}, True, pd.Timedelta("3D"))
         self.detector_ = SimpleNamespace()
 
     def state(self):
-        is_open = self.events_["end"].isna() & (self.events_["kind"] == "damage")
-        return "alarm" if is_open.any() else str(self.evaluations_["state"].iloc[-1])
+        opened = set(self.events_.loc[self.events_["end"].isna(), "kind"])
+        newest = "watch" if "watch" in opened else str(self.evaluations_["state"].iloc[-1])
+        return "alarm" if "damage" in opened else newest
 
     def transitions(self, after=0):
         return []

@@ -134,6 +134,20 @@ def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert QUOTED in fitted.text
 
 
+def test_bridges_on_watch_come_after_alarms_and_before_healthy_ones(tmp_path):
+    raised = FakeMonitor(events=[event_row("2025-06-25", None, kind="watch")], watch_per_year=12)
+    fleet = FakeFleet(
+        {"well": FakeMonitor(), "raised": raised, "alarmed": FakeMonitor(events=[event_row("2025-06-20", None)])}
+    )
+    page = Page(owner_report(fleet, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8"))
+    assert page.link_texts[-3:] == ["alarmed", "raised", "well"]
+    assert "1 in alarm; 1 to be watched, with a raised damage index but no alarm; 1 healthy." in page.text
+    del fleet.monitors["alarmed"]
+    fleet.table = fleet.table.drop(index="alarmed")
+    page = Page(owner_report(fleet, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8"))
+    assert "No alarm, but 1 of 2 bridges is to be watched" in page.text
+
+
 def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
     well = FakeFleet({0: FakeMonitor(), 1: FakeMonitor()})
     text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text

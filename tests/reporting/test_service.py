@@ -190,6 +190,25 @@ def test_a_response_that_was_set_aside_is_named_and_what_to_do():
     assert "a response was set aside: its sensor, or the structure, has changed" in str(events(standing_of(monitor)))
 
 
+def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
+    ended, opened = (
+        event_row(start, end, kind="watch") for start, end in (("2025-03-01", "2025-03-03"), ("2025-06-25", None))
+    )
+    monitor = FakeMonitor(events=[ended, opened], watch_per_year=12)
+    page = today_of(monitor)
+    assert state_of(page) == "watch"
+    assert headline(page) == f"Watch since 25{SPACE}June{SPACE}2025: no alarm, but a raised damage index"
+    assert "12 such events a year" in page.text
+    assert "No damage event is open." in page.text
+    assert "nobody has said" not in page.text
+    assert "acknowledge" not in page.text
+    page = Page(false_alarms(standing_of(monitor)))
+    assert [page.heads[3], page.cells[1]] == ["Level above which a watch begins", "2.500"]
+    assert state_of(today_of(monitor, monitor.last_ + pd.Timedelta("9D"))) == "not-evaluated"
+    both = FakeMonitor(events=[opened, event_row("2025-06-26", None)], watch_per_year=12)
+    assert state_of(today_of(both)) == "alarm"
+
+
 def test_the_smallest_change_that_would_be_seen_is_said():
     monitor = FakeMonitor()
     text = "A fall of all responses by 1 %, or of one response alone by 2 % (f1) to 3 % (f2) raises an alarm"

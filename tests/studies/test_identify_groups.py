@@ -158,8 +158,8 @@ def test_a_mode_of_which_all_training_records_are_of_one_period():
         ({"prior": 0.5}, "prior is 0.5; expected a DamagePrior"),
         ({"shapes": (np.ones((2, 6)), np.ones((2, 6)))}, "shapes came without dofs"),
         ({"dofs": [0, 1]}, "dofs came without shapes"),
-        ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0, 99]}, "dofs reach from 0 to 99; expected 0 to 22"),
-        ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0.5, 1]}, "expected the degree of freedom of each sensor"),
+        ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0, 99]}, "dofs holds 99; expected 0 to 22"),
+        ({"shapes": (np.ones((2, 6)),) * 2, "dofs": [0.5, 1]}, "expected integers"),
     ],
 )
 def test_bad_options(fem, change, message):

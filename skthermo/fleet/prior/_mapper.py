@@ -14,7 +14,6 @@ from sklearn.base import RegressorMixin
 from skthermo._tables.arrays import Array, as_columns, check_flag
 from skthermo._tables.frames import (
     check_same_rows,
-    check_temperatures,
     column_names,
     frame_like,
     like_targets,
@@ -28,6 +27,7 @@ from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics import complete_r2
+from skthermo.preprocessing import gross_errors
 from skthermo.residuals.weather import TrainingRange, parts
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
@@ -308,7 +308,7 @@ class FleetMapper(RegressorMixin, Estimator):
         values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
-        check_temperatures(frame_like(X, inputs))
+        gross_errors(frame_like(X, inputs)).refuse_meaningless(but={"no rows", "constant"})
         self._check_inputs(X)
         self.y_is_vector_ = values.ndim == 1
         self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None

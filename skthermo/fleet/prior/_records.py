@@ -13,15 +13,14 @@ from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, as_columns, spread_evenly
 from skthermo._tables.frames import (
-    check_columns,
     check_same_rows,
-    check_temperatures,
     column_names,
     frame_like,
     has_stamps,
     row_times,
 )
 from skthermo._validation import check_array, check_is_fitted
+from skthermo.preprocessing import gross_errors
 
 MOST_ROWS = 20_000
 TYPICAL = 0.02  # standard deviation of the logarithm of a frequency, as which those of linear quantities count
@@ -199,9 +198,7 @@ def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     values = as_columns(check_array(Y, ensure_2d=False, **options))
     check_same_rows(T, Y, ("temperatures", "quantities"))
     inputs = as_columns(inputs)
-    named = frame_like(T, inputs)
-    check_temperatures(named)
-    check_columns(named, "temperature", varying=True)
+    gross_errors(frame_like(T, inputs)).refuse_meaningless(but={"no rows"})
     if isinstance(Y, pd.Series):
         names = ["f1" if Y.name is None else Y.name]
     else:

@@ -14,13 +14,13 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
 from skthermo._estimators.warnings import warnings_once, without_warnings
-from skthermo._tables.arrays import Array, as_floats, spread_evenly
-from skthermo._tables.frames import YEAR, check_same_rows, frame_like, has_stamps
+from skthermo._tables.arrays import Array, as_floats, refuse_no_table, spread_evenly
+from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
-from skthermo.preprocessing import ExponentialMeans
+from skthermo.preprocessing import ExponentialMeans, gross_errors
 from skthermo.residuals.weather import WeatherFunctions
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
@@ -197,14 +197,11 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
     for what, table in (("temperatures", T), ("frequencies", F)):
         if not has_stamps(table):
             raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
-    check_same_rows(T, F, ("temperatures", "frequencies"))
-    if not len(T):
-        raise ValueError("the records have no rows; expected temperatures and frequencies over years")
-    if (as_floats(F) <= 0).any():
-        row = np.flatnonzero((as_floats(F) <= 0).any(axis=1))[0]
-        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
+    refuse_no_table(T, "T")
+    refuse_no_table(F, "F")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
 
 
 def length_of(freq: str) -> float:

@@ -7,4 +7,12 @@ from skthermo.preprocessing.checks._plausible import Plausible
 from skthermo.preprocessing.checks._record_findings import RecordFindings
 from skthermo.preprocessing.checks._signs import equal_runs, residual_trend
 
-__all__ = ["Finding", "Plausible", "RecordFindings", "check_records", "equal_runs", "gross_errors", "residual_trend"]
+__all__ = [
+    "Finding",
+    "Plausible",
+    "RecordFindings",
+    "check_records",
+    "equal_runs",
+    "gross_errors",
+    "residual_trend",
+]

@@ -59,7 +59,7 @@ def gross_errors(
     Examples
     --------
     >>> import numpy as np
-    >>> from skthermo.preprocessing.checks import gross_errors
+    >>> from skthermo.preprocessing import gross_errors
     >>> print(gross_errors(np.linspace(260, 310, 365)[:, np.newaxis]))
     1 finding in 365 records.
     kelvin: 'T1' lies between 260 and 310 in 365 rows, row 0 to row 364

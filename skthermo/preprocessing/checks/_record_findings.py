@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 import pandas as pd
@@ -71,8 +71,13 @@ class RecordFindings(SavesFrames):
     def __repr__(self) -> str:
         return self.summary()
 
-    def warnings(self) -> Iterator[RecordsWarning]:
+    def warnings(self, *, but: Collection[str] = ()) -> Iterator[RecordsWarning]:
         """One warning for each kind of finding.
+
+        Parameters
+        ----------
+        but : collection of str, default=()
+            Kinds of findings of which there is no warning.
 
         Yields
         ------
@@ -80,18 +85,23 @@ class RecordFindings(SavesFrames):
             Its ``kind`` is what was found.
         """
         for kind, rows in self.table.groupby("what", sort=False):
-            if kind not in UNWARNED:
+            if kind not in UNWARNED.union(but):
                 yield RecordsWarning(WARNINGS[kind].format(_listed(rows["detail"])), kind)
 
-    def refuse_meaningless(self) -> None:
+    def refuse_meaningless(self, *, but: Collection[str] = ()) -> None:
         """Raise an error that lists everything with which results of a fit would be meaningless.
+
+        Parameters
+        ----------
+        but : collection of str, default=()
+            Kinds of findings that do no harm to what is done with the records.
 
         Raises
         ------
         ValueError
             If the severity of a finding is "meaningless".
         """
-        severe = self.table[self.table["severity"] == MEANINGLESS]
+        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(but))]
         if len(severe):
             kinds = severe.groupby("what", sort=False)
             texts = [WARNINGS[kind].format(_listed(rows["detail"])) for kind, rows in kinds]

@@ -31,8 +31,8 @@ MONTH = 31  # days of which the table says how many were evaluated
 
 SIGNIFICANT, OPEN, UNEXPLAINED, RAISED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(10)
 """Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
-that would be significant, has ended and was not explained; much stiffness lost; not evaluated; not fitted; without a
-monitor; a drift beyond its error; healthy."""
+that would be significant, has ended and was not explained; a raised index; much stiffness lost; not evaluated; not
+fitted; without a monitor; a drift beyond its error; healthy."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Bridge:
         elif unexplained:
             place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
         elif standing.state == WATCH:
-            place, size = RAISED, float(standing.opened("watch")["peak"].max()) / threshold
+            place, size = RAISED, float(standing.opened(WATCH)["peak"].max()) / threshold
         elif standing.state == ATTENTION:
             place = WORN
         elif standing.state == NOT_EVALUATED:
@@ -112,6 +112,8 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
     if len(opened):
         return opened["start"].min()
+    if standing.state == WATCH:
+        return standing.opened(WATCH)["start"].min()
     if standing.state == NOT_EVALUATED:
         return standing.doubt.since
     ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
@@ -126,6 +128,8 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
         texts.append(f"Modes that drive it: {modes}." if modes else "")
         if standing.is_silent:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
+    elif standing.state == WATCH:
+        texts.append("The damage index is raised, below the level of an alarm.")
     elif standing.state == NOT_EVALUATED:
         texts.append(f"{standing.doubt.explanation}.")
     elif standing.state == ATTENTION:

@@ -42,12 +42,12 @@ FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
 EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
 SYMBOLS = {
     HEALTHY: "M6 12.5l4 4 8-9",
+    WATCH: "M6 14l6-6 6 6",
     ALARM: EXCLAMATION,
-    WATCH: EXCLAMATION,
     ATTENTION: EXCLAMATION,
     NOT_EVALUATED: "M6 12h12",
 }
-"""Lines within a circle: a tick, an exclamation mark, a dash."""
+"""Lines within a circle: a tick, an angle that points upwards, an exclamation mark, a dash."""
 FAULTS = {
     "dead": "gives no value",
     "stuck": "repeats one value",
@@ -58,7 +58,7 @@ FAULTS = {
     "swapped": "is swapped with another",
 }
 KINDS = {
-    "watch": "in which the damage index was raised, below an alarm",
+    WATCH: "in which the damage index was raised, below an alarm",
     "stiffening": "in which the structure was stiffer, which is reported but no damage",
     "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
 }
@@ -164,13 +164,15 @@ def _open_events(standing: Standing) -> list[str]:
 
 
 def _waiting(standing: Standing) -> list[int]:
-    """Numbers of events that have ended and were not acknowledged."""
-    events = standing.events
+    """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch."""
+    events = standing.events[standing.events["kind"] != WATCH]
     return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
 
 
 def _what_to_do(standing: Standing) -> list[str]:
     steps = []
+    if standing.state == WATCH:
+        steps.append("Look at the raw records and at the weather, and wait for the next days.")
     if standing.state == ATTENTION:
         steps.append("Ask an engineer to look at the parts that have lost stiffness.")
     if standing.state == ALARM:
@@ -189,7 +191,7 @@ def _what_to_do(standing: Standing) -> list[str]:
         steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")
     if len(standing.failed):
         steps.append("Have the failed sensors repaired; the section on sensors lists them.")
-    if _waiting(standing) or len(standing.events[standing.events["end"].isna()]):
+    if _waiting(standing) or (standing.events["end"].isna() & (standing.events["kind"] != WATCH)).any():
         steps.append("When it is known what an event was, acknowledge it, so that the monitor can learn from it.")
     return steps
 
@@ -457,6 +459,9 @@ def false_alarms(standing: Standing) -> Section:
         seen += f", {harmless:,} of them said to be harmless" if number else ""
         by_chance = significant(expected * years, 2)
         sentences.append(f"{seen}. About {by_chance} false alarms were to be expected in this time.")
+    if monitor.watch_threshold_ is not None:
+        often = counted_number(monitor.watch_per_year, "time")
+        sentences.append(f"A structure that stays healthy reaches the lower level of a watch {often} a year by chance.")
     if unseen := getattr(estimate, "unseen", ""):
         sentences.append(f"Nothing is known of {unseen}: the baseline has no records of that time of year.")
     sentences.append("This says nothing of damage that is missed: a study of detectability answers that.")
@@ -468,6 +473,8 @@ def false_alarms(standing: Standing) -> Section:
         ["How the threshold was found", element("span", estimate.method, class_="text")],
         ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
     ]
+    if monitor.watch_threshold_ is not None:
+        rows.insert(1, ["Level above which a watch begins", significant(monitor.watch_threshold_, 4)])
     rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
     return section("false_alarms", "False alarms", paragraphs(*sentences), rule, _smallest_changes(standing))
 

@@ -106,7 +106,7 @@ class Standing:
             since = opened["start"].min() if len(opened) else self.last
             return f"Alarm since {moment(since)}"
         if self.state == WATCH:
-            return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
+            return f"Watch since {moment(self.opened(WATCH)['start'].min())}: no alarm, but a raised damage index"
         if self.state == HEALTHY:
             return "Healthy: no alarm"
         if self.state == ATTENTION:

@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import warn_user, warnings_once
-from skthermo._tables.arrays import Array, as_floats, seem_rad_per_s
-from skthermo._tables.frames import check_same_rows, has_stamps, row_times
+from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.frames import has_stamps, row_times
 from skthermo._tables.text import counted, listed, significant
 from skthermo._validation import check_array
 from skthermo.exceptions import (
@@ -22,6 +22,7 @@ from skthermo.exceptions import (
     SkthermoWarning,
     UnevaluatedRowsWarning,
 )
+from skthermo.preprocessing import gross_errors
 from skthermo.residuals.weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import FrequencyShift, measured_shift, outlying, record_shifts, scatter_of
 
@@ -29,7 +30,6 @@ IN_A_ROW = 3  # number of last records, all far from those before, that is no ch
 FEW, FEW_TRAINED = 3.0, 20.0
 """Numbers of independent records, new ones and those of the training, below which a warning is given."""
 
-NEAR_2_PI = 0.25  # relative distance from 2 pi up to which ratios of frequencies suggest rad/s
 POSSIBLE_RATIOS = 0.2, 3.0  # of measured to predicted frequencies; damage of 95 % everywhere gives 0.22
 FAR_FROM_OTHERS = "far from the other records"
 
@@ -186,10 +186,9 @@ def _check_ratios(ratios: Array, names: Sequence[Any]) -> None:
     lowest, highest = POSSIBLE_RATIOS
     wrong = np.flatnonzero((ratios < lowest) | (ratios > highest))
     if len(wrong):
-        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, NEAR_2_PI) else ""
         raise ValueError(
             f"{len(wrong)} of {len(ratios)} modes are less than {lowest} times or more than {highest:.0f} times those "
-            f"that are predicted, {names[wrong[0]]} {ratios[wrong[0]]:.3g} times{units}; expected Hz, and modes in the "
+            f"that are predicted, {names[wrong[0]]} {ratios[wrong[0]]:.3g} times; expected Hz, and modes in the "
             "order of fit"
         )
 
@@ -203,18 +202,15 @@ def latest(T: Any, rows: NDArray[np.bool_]) -> int:
 
 def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
     """The frequencies as an array, after checks."""
-    check_same_rows(T, F, ("temperatures", "frequencies"))
+    frequencies = as_floats(check_array(F, input_name="F", dtype=np.float64, allow_infinite=True))
     names = getattr(F, "columns", None)
     if names is not None and list(names) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
-    frequencies = as_floats(check_array(F, dtype=np.float64))
     if frequencies.shape[1] != len(fem.mode_names_):
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    if (frequencies <= 0).any():
-        row = np.flatnonzero((frequencies <= 0).any(axis=1))[0]
-        raise ValueError(f"row {row} of the frequencies has a value of 0 or less; expected Hz, and NaN where missing")
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
     return frequencies
 
 

@@ -32,9 +32,7 @@ from skthermo._tables.arrays import (
 )
 from skthermo._tables.frames import (
     Table,
-    check_columns,
     check_same_rows,
-    check_temperatures,
     column_names,
     frame_like,
     like_targets,
@@ -64,7 +62,7 @@ from skthermo._validation import (
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import complete_r2
-from skthermo.preprocessing import BiasAligner, RecordFindings, check_records
+from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, gross_errors
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
@@ -74,7 +72,6 @@ from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
     RecordSimulator,
     TrainingRecords,
-    check_frequencies,
     measurement_noise,
     without_outliers,
 )
@@ -292,8 +289,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Raises
         ------
         ValueError
-            If lengths or indices differ, the number of modes is not the model's, a temperature is constant, missing
-            throughout, in kelvin or holds a number that stands for a missing value, or a mode was never measured; if
+            If the records have gross errors, all of which are listed: tables of different rows, another number of modes
+            than the model's, columns that are constant or missing throughout, temperatures in kelvin, frequencies that
+            are not positive or not in Hz, infinite values, or numbers that stand for a missing value; if
             shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``; if weights are negative,
             NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose ``fit`` takes none.
 
@@ -877,16 +875,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_model(self.model)
         if y is None:
             raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-        options = {"dtype": np.float64, "copy": True}
+        options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         self.y_is_vector_ = np.ndim(y) == 1
         if self.y_is_vector_:
             y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
         F = frame_like(y, check_array(y, **options))
-        check_same_rows(X, y, ("temperatures", "frequencies"))
-        check_frequencies(F, self.model)
-        check_temperatures(T)
-        check_columns(T, "temperature", varying=True)
+        gross_errors(T, F, model=self.model).refuse_meaningless()
         return T, F
 
     def _findings(self, T: Table, F: Table) -> RecordFindings:

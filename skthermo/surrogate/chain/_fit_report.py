@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._tables.arrays import Array, as_floats, robust_deviation, seem_rad_per_s, spread_evenly
+from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
 from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, row_times
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import last_step, offers, reach_of
@@ -588,10 +588,9 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
             )
             return
     if len(far):
-        units = " (rad/s instead of Hz?)" if seem_rad_per_s(ratios, LARGE_OFFSET / 100) else ""
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
         yield RecordsWarning(
-            f"measured modes differ from the model's nominal frequencies: {listed}{units}; expected Hz, the modes of "
+            f"measured modes differ from the model's nominal frequencies: {listed}; expected Hz, the modes of "
             "the model in their order, and a model updated to the structure",
             "offset of modes",
         )

@@ -29,10 +29,9 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import Table, check_columns, check_same_rows, column_names, frame_like, row_times
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like, row_times
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import fit_weighted, last_step, offers, predicted_covariance, reach_of
-from skthermo.fem import FEModel
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
@@ -169,21 +168,6 @@ class TrainingRecords(SavesFrames):
         errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances)))
         reach = (reach_of(learner, inputs) or (None,))[0]
         return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
-
-
-def check_frequencies(F: Table, model: FEModel) -> None:
-    """Raise an error unless there is a column for each mode of a model, and all values are positive or NaN."""
-    if F.shape[1] != model.n_modes:
-        raise ValueError(f"frequencies have {F.shape[1]} columns; expected the {model.n_modes} modes of {model!r}")
-    values = as_floats(F)
-    wrong = ~np.isnan(values) & ~(values > 0)
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        raise ValueError(
-            f"frequency {column_names(F, 'f')[column]!r} in row {row} is {values[row, column]:g}; expected positive "
-            "numbers in Hz, and NaN where a mode is missing"
-        )
-    check_columns(F, "frequency")
 
 
 def without_outliers(findings: RecordFindings, F: Table) -> Table:

@@ -1,0 +1,99 @@
+"""Where the modules of examples register theirs: valid calls of public callables, with bad values of their arguments.
+
+``examples.py`` holds those of all rooms up to studies and reports, ``in_service.py`` those of monitoring and fleets.
+"""
+
+import importlib
+import inspect
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import skthermo
+
+ROOMS = (
+    "fem",
+    "preprocessing",
+    "surrogate",
+    "updating",
+    "detection",
+    "metrics",
+    "datasets",
+    "studies",
+    "monitoring",
+    "fleet",
+    "plotting",
+    "reporting",
+)
+
+FOLDER = Path(tempfile.mkdtemp())
+"""Holds the files that examples read and write."""
+
+NOT_CALLED: dict[str, str] = {}
+"""Public names whose constructors are not tried, with reasons."""
+
+UNTRIED: dict[str, set[str]] = {}
+"""Arguments that have no bad values, by callable."""
+
+LEGAL: dict[str, dict[tuple[str, str], str]] = {}
+"""Bad values that are good for an argument: (cause, callable or *) and the reason."""
+
+USUAL: dict[str, tuple[Any, dict[str, Any]]] = {}
+"""A good value and the bad ones of arguments that many callables have."""
+
+
+@dataclass
+class Example:
+    """A call by keywords with a good value of every argument, and the bad values of each."""
+
+    name: str
+    of: Any
+    call: Any
+    good: dict[str, Any] = field(default_factory=dict)
+    bad: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+EXAMPLES: list[Example] = []
+
+
+def use(name, call=None, /, usual="", **arguments):
+    """Register an example: for every argument a good value and its bad ones, by default those of `USUAL`."""
+    arguments = {argument: USUAL[argument] for argument in usual.split()} | arguments
+    of = skthermo
+    for part in name.split("."):
+        of = importlib.import_module(f"skthermo.{part}") if of is skthermo else getattr(of, part)
+    good = {argument: pair[0] for argument, pair in arguments.items()}
+    bad = {argument: pair[1] for argument, pair in arguments.items()}
+    EXAMPLES.append(Example(name, of, of if call is None else call, good, bad))
+
+
+def method(name, owner, **arguments):
+    """Register a method of a fixed object."""
+    use(name, getattr(owner, name.rpartition(".")[2]), **arguments)
+
+
+def fitted(cls, X, y=None, after=None, usual="", **arguments):
+    """Register an estimator: its parameters, and X and y of ``fit``."""
+    if after is None:
+        after = lambda estimator, X: estimator.transform(X)  # noqa: E731
+
+    def call(**values):
+        given = [values.pop(part) for part in ("X", "y") if part in values]
+        return after(cls(**values).fit(*given), X[0])
+
+    data = {"X": X} | ({} if y is None else {"y": y})
+    use(f"{cls.__module__.split('.')[1]}.{cls.__name__}", call, usual=usual, **arguments, **data)
+
+
+def public_arguments():
+    """Name and argument of every public function and constructor, but for those that are not tried."""
+    for room in (importlib.import_module(f"skthermo.{name}") for name in ROOMS):
+        for name in room.__all__:
+            full = f"{room.__name__.split('.')[-1]}.{name}"
+            if full in NOT_CALLED:
+                continue
+            for argument, parameter in inspect.signature(getattr(room, name)).parameters.items():
+                keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
+                if keyed and argument not in UNTRIED.get(full, ()):
+                    yield full, argument

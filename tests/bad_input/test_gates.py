@@ -1,0 +1,124 @@
+"""Each fit lists all gross errors of its records in one error, and refuses nothing that is legal for its input."""
+
+import itertools
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.ensemble import IsolationForest
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
+from skthermo.monitoring import track_parameters
+from skthermo.studies import identify_damage
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+
+YEAR = make_truss_campaign(samples_per_year=200, random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies
+MODES = list(F)
+
+
+def changed(table, column, value, rows=slice(None)):
+    copy = table.copy()
+    copy.iloc[rows, copy.columns.get_loc(column)] = value
+    return copy
+
+
+OF_FREQUENCIES = {  # what is done, and what the error names
+    "'f1' is NaN": lambda table: changed(table, "f1", np.nan),
+    "'f2' is 7": lambda table: changed(table, "f2", 7.0),
+    "'f3' is inf": lambda table: changed(table, "f3", np.inf, [5]),
+    "'f4' is -999": lambda table: changed(table, "f4", -999.0, [3, 8]),
+}
+OF_TEMPERATURES = {
+    "'T1' is -999": lambda table: changed(table, "T1", -999.0, [3]),
+    "'T2' lies": lambda table: changed(table, "T2", table["T2"] + 273.15),
+    "'T3' is NaN": lambda table: changed(table, "T3", np.nan),
+}
+
+
+def chain():
+    inverse = InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=50, noise=0.01)
+    return DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
+
+
+def compensator():
+    return TemperatureCompensator(Ridge(), targets=MODES)
+
+
+def told(fit, *tables):
+    """The text of the error of a fit."""
+    with pytest.raises(ValueError, match=r".") as refused:
+        fit(*tables)
+    return str(refused.value)
+
+
+def subsets(faults):
+    return [names for size in (1, 2, len(faults)) for names in itertools.combinations(faults, size)]
+
+
+@pytest.mark.parametrize("names", subsets({**OF_FREQUENCIES, **OF_TEMPERATURES}), ids="+".join)
+def test_a_chain_lists_all_errors(names):
+    temperatures, frequencies = T, F
+    for name in names:
+        temperatures = OF_TEMPERATURES.get(name, lambda table: table)(temperatures)
+        frequencies = OF_FREQUENCIES.get(name, lambda table: table)(frequencies)
+    text = told(chain().fit, temperatures, frequencies)
+    assert all(name in text for name in names)
+
+
+@pytest.mark.parametrize("names", subsets(OF_FREQUENCIES), ids="+".join)
+@pytest.mark.parametrize(
+    "estimator",
+    [MahalanobisDetector(), OutlierDetector(IsolationForest(n_estimators=10)), compensator()],
+    ids=lambda e: type(e).__name__,
+)
+def test_detectors_and_compensators_list_all_errors(estimator, names):
+    frequencies = F
+    for name in names:
+        frequencies = OF_FREQUENCIES[name](frequencies)
+    X = T.join(frequencies) if isinstance(estimator, TemperatureCompensator) else frequencies
+    text = told(estimator.fit, X)
+    assert all(name in text for name in names)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("rad/s", 2 * np.pi), ("kHz", 1e-3), ("periods", None)])
+def test_another_unit_is_refused_wherever_the_model_is_known(unit, factor):
+    frequencies = 1 / F if factor is None else F * factor
+    fitted = chain().fit(T, F)
+    for fit in (chain().fit, lambda *new: identify_damage(fitted, *new), lambda *new: track_parameters(fitted, *new)):
+        assert unit in told(fit, T, frequencies)
+
+
+def test_records_of_any_quantity_are_legal_where_no_model_is():
+    random = np.random.default_rng(0)
+    strains = F.assign(f1=-100 * F["f1"], f2=random.normal(0, 1e-6, len(F)))
+    humidity = pd.Series(random.uniform(30, 100, len(F)), F.index)
+    radiation = pd.Series(np.maximum(random.normal(0, 500, len(F)), 0), F.index)
+    kelvin = T.add(273.15).add_prefix("K")
+    inputs = T.assign(humidity=humidity, radiation=radiation, pressure=1013 + random.normal(0, 8, len(F)), still=1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkthermoWarning)
+        for table in (inputs, kelvin):
+            compensator().fit(table.join(strains))
+        MahalanobisDetector().fit(strains)
+        make_pipeline(compensator(), MahalanobisDetector()).fit(inputs.join(strains))
+
+
+@pytest.mark.parametrize("whiten", ["auto", "global", "local", None])
+def test_residuals_are_no_frequencies(whiten):
+    detector = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES, whiten=whiten), MahalanobisDetector())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RecordsWarning)
+        detector.fit(T.join(F))
+
+
+def test_few_new_records_may_lack_a_mode_or_be_alike():
+    fitted, few = chain().fit(T, F), slice(20, 24)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        identify_damage(fitted, T[few], F[few].assign(f2=F["f2"].iloc[20], f3=np.nan), ["top"])
