@@ -15,7 +15,7 @@ from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
 from skthermo.monitoring._records import OF_TRAINING
-from skthermo.preprocessing.checks import gross_errors
+from skthermo.preprocessing import gross_errors
 
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
