@@ -201,6 +201,8 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
     refuse_no_table(F, "F")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
+    if T.shape[1] != fem.n_features_in_:
+        raise ValueError(f"the temperatures have {T.shape[1]} columns; expected {fem.n_features_in_}, as in fit")
     gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
 
 
