@@ -25,6 +25,7 @@ TO_FLOATS = bytes.maketrans(b"Dd,", b"EE ")
 BARE_EXPONENT = re.compile(rb"(?<=[\d.])([+-])(?=\d)")
 FORTRAN = re.compile(rb"\((?:\d*P,?)?(\d*)[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\)")
 OP4_HEADING = re.compile(rb"^[ \d-]{32}[A-Z][\w ]{7} *(?:1P,)?(\d+)[ED](\d+)\.\d+[ \t]*$", re.MULTILINE)
+SYMMETRIC = 6  # the form of a matrix in Nastran of which one half may be given
 OP4_STRING = 65536  # a string's length and row in one number
 FREE_FIELD = re.compile(rb"^DMIG\*? *,", re.MULTILINE)
 WIDE = 32  # characters of a field of a text that was in free field
@@ -161,11 +162,13 @@ def _symmetric(
 ) -> scipy.sparse.csc_array:
     """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
     matrix = _square(rows, columns, values, size)
-    below, above = int((rows > columns).sum()), int((rows < columns).sum())
+    matrix.eliminate_zeros()  # of which a half or a block may hold some
+    kept = values != 0
+    below, above = int((kept & (rows > columns)).sum()), int((kept & (rows < columns)).sum())
     if below and above:
         ones = np.ones(matrix.nnz, dtype=np.int8)
         pattern = scipy.sparse.csc_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
-        paired = pattern.multiply(pattern.T).nnz - np.count_nonzero(rows == columns)
+        paired = pattern.multiply(pattern.T).nnz - np.count_nonzero(kept & (rows == columns))
         if paired >= FULL * (below + above):
             return matrix
         if paired or in_order:
@@ -176,14 +179,15 @@ def _symmetric(
     return scipy.sparse.csc_array(matrix + matrix.T - scipy.sparse.diags_array(matrix.diagonal(), format="csc"))
 
 
-def _labelled(rows: Integers, columns: Integers, values: Numbers) -> Labelled:
-    """A matrix from the labels (n, 2) of rows and columns."""
+def _labelled(rows: Integers, columns: Integers, values: Numbers, *, is_symmetric: bool = True) -> Labelled:
+    """A matrix from the labels (n, 2) of rows and columns; of a symmetric one, a half may be given."""
     both = np.vstack([rows, columns])
     if both[:, 1].max(initial=0) >= 2**15:
         raise ValueError(f"a direction is {both[:, 1].max()}; expected a number such as 1 to 6")
     codes, places = np.unique(both[:, 0] * 2**15 + both[:, 1], return_inverse=True)
     first, second = np.split(places, 2)
-    matrix = _symmetric(first, second, values, len(codes), in_order=False)
+    entries = first, second, values, len(codes)
+    matrix = _symmetric(*entries, in_order=False) if is_symmetric else _square(*entries)
     return Labelled(matrix, np.column_stack([codes >> 15, codes % 2**15]))
 
 
@@ -260,7 +264,14 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
         n_sides = counts[4] if len(counts) > 4 else 0
     except (ValueError, IndexError) as error:
         raise ValueError("the first four lines are not those of the format") from error
-    if kind[0] not in "RI" or kind[1] not in "SU" or kind[2] != "A" or n_rows != n_columns or len(forms) < 3:
+    if (
+        min(counts) < 0
+        or kind[0] not in "RI"
+        or kind[1] not in "SU"
+        or kind[2] != "A"
+        or n_rows != n_columns
+        or len(forms) < 3
+    ):
         raise ValueError(f"a matrix {kind} of {n_rows} x {n_columns}; expected a square one, RSA or RUA")
     start, found, words = 5 if n_sides else 4, [], text.words()
     for n_lines, n_numbers, (n, width), what in zip(
@@ -340,9 +351,8 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
         if without.any():
             raise ValueError(f"line {at[np.argmax(without)] + 1}: matrix {key!r} has an entry without a value")
         if form in (1, 6) and kind in (1, 2):
-            matrices[key] = _labelled(
-                _nodes(values[mine, :2], 1), _nodes(cards.fields[owner[mine]], 1), values[mine, 2]
-            )
+            rows, columns = _nodes(values[mine, :2], 1), _nodes(cards.fields[owner[mine]], 1)
+            matrices[key] = _labelled(rows, columns, values[mine, 2], is_symmetric=form == SYMMETRIC)
         else:
             matrices[key] = None
     if not matrices:
@@ -445,15 +455,16 @@ def read_op4(content: bytes) -> dict[str, scipy.sparse.csc_array | None]:
     first_lines = np.searchsorted(text.starts, [head.start() for head in heads])
     matrices: dict[str, scipy.sparse.csc_array | None] = {}
     for head, start, end in zip(heads, first_lines, [*first_lines[1:], len(text)], strict=True):
-        n_columns, n_rows, _, kind = (int(head.group()[i : i + 8]) for i in range(0, 32, 8))
+        n_columns, n_rows, form, kind = (int(head.group()[i : i + 8]) for i in range(0, 32, 8))
         name = head.group()[32:40].strip().decode("ascii")
         matrices[name] = None
         if n_columns == abs(n_rows) and kind in (1, 2):
             lines = np.arange(start + 1, end)
-            form = int(head.group(1)), int(head.group(2))
+            n, width = int(head.group(1)), int(head.group(2))
             try:
                 strings = _op4_strings(text, lines, words[lines], points[lines], n_columns, is_big=n_rows < 0)
-                matrices[name] = _op4_matrix(text, lines, points[lines], strings, n_columns, kind, form)
+                entries = *_op4_entries(text, lines, points[lines], strings, n_columns, kind, n, width), n_columns
+                matrices[name] = _symmetric(*entries, in_order=True) if form == SYMMETRIC else _square(*entries)
             except ValueError as error:
                 raise ValueError(f"matrix {name!r} of line {start + 1}: {error}") from error
     return matrices
@@ -488,17 +499,10 @@ def _op4_strings(
     return np.column_stack([on, column, row, size, is_column])
 
 
-def _op4_matrix(
-    text: Text,
-    lines: Integers,
-    points: Integers,
-    strings: Integers,
-    n_columns: int,
-    kind: int,
-    form: tuple[int, int],
-) -> scipy.sparse.csc_array:
-    """The matrix whose values stand, n in a line, below the line of each string."""
-    n, width = form
+def _op4_entries(
+    text: Text, lines: Integers, points: Integers, strings: Integers, n_columns: int, kind: int, n: int, width: int
+) -> tuple[Integers, Integers, Numbers]:
+    """Rows, columns and values, which stand, n in a line, below the line of each string."""
     on, counts = lines[points > 0], points[points > 0]
     if (counts > n).any():
         raise ValueError(f"line {on[np.argmax(counts > n)] + 1} holds more than {n} values")
@@ -521,4 +525,4 @@ def _op4_matrix(
     if len(rows) and (rows[inner].min(initial=0) < 0 or rows[inner].max(initial=0) >= n_columns):
         raise ValueError(f"row {rows[inner].max() + 1} of {n_columns}")
     everything = np.concatenate([np.empty(0), *values])
-    return _symmetric(rows[inner], columns[inner], everything[inner], n_columns, in_order=True)
+    return rows[inner], columns[inner], everything[inner]

@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+import skthermo
 from skthermo._estimators.warnings import told_around
 from skthermo._io import alone_with
 from skthermo.commands._new_records import (
@@ -31,6 +32,7 @@ from skthermo.monitoring import Monitor, MonitorStatus, load_monitor
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+NO_ALARM = ("healthy", "watch")
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
@@ -96,8 +98,8 @@ class Bridge:
 
     @property
     def taken_file(self) -> Path:
-        """What was taken in from which files."""
-        return self.monitor_file.with_suffix(".taken.json")
+        """What was taken in from which files; named after the monitor, whose lock it is under."""
+        return self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json")
 
     @property
     def metrics_file(self) -> Path | None:
@@ -113,12 +115,19 @@ class Bridge:
         return alone_with(self.monitor_file, self.options.wait)
 
     def load(self) -> Monitor:
-        """The monitor as it was saved."""
+        """The monitor as it was saved; one that another version of skthermo has fitted can be fitted anew."""
         if not self.monitor_file.exists() and self.settings is not None:
             raise FileNotFoundError(
                 f"there is no monitor {str(self.monitor_file)!r}; expected: skthermo fit {self.file}"
             )
-        return load_monitor(self.monitor_file)
+        monitor = load_monitor(self.monitor_file)
+        version = monitor.versions_["skthermo"]
+        if self.settings is not None and version != skthermo.__version__:
+            raise ValueError(
+                f"{self.monitor_file} was fitted with skthermo {version}, and this is {skthermo.__version__}; expected "
+                f"that version, or: skthermo fit {self.file} --replace, then update, which takes all records anew"
+            )
+        return monitor
 
     def status(self, monitor: Monitor) -> MonitorStatus:
         """The facts by the clock, or at the time that was asked for."""
@@ -340,9 +349,9 @@ def _described_update(
     state = bridge.status(monitor).state
     if has_alarm or state == "alarm":
         bridge.described(monitor, done, "alarm", "" if state == "alarm" else "an event has opened and closed again")
-    elif state == "healthy" and n_ahead > before["n_ahead"]:
+    elif state in NO_ALARM and n_ahead > before["n_ahead"]:
         bridge.described(monitor, done, "not evaluated", "records are stamped too far ahead")
-    elif state == "healthy" and not states["healthy"]:
+    elif state in NO_ALARM and not any(states[one] for one in NO_ALARM):
         bridge.described(monitor, done, "not evaluated", "no new record could be evaluated")
     else:
         bridge.described(monitor, done)

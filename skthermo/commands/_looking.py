@@ -97,6 +97,9 @@ def _look_at_csv(file: Path, zone: str | None) -> tuple[CsvFormat, dict[str, str
     names, records = rows[above[0]][1], [row for _, row in rows[first:] if len(row) == width]
     columns = dict(zip(names, zip(*records, strict=True), strict=True))
     stamp_columns, stamps, notes = _stamps_of(columns, file)
+    places = [names.index(name) for name in stamp_columns]
+    while first - 1 > above[0] and _are_stamps([" ".join(rows[first - 1][1][n] for n in places)], stamps):
+        first -= 1  # a record without a value
     units = {}
     for n in above[1:]:
         units |= {

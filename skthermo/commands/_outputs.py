@@ -21,6 +21,7 @@ GAUGES = {
     "state": "1 for the state that the bridge is in, 0 for the others",
     "damage_index": "Damage index of the newest record that was evaluated",
     "threshold": "Damage index above which a damage event opens",
+    "watch_threshold": "Damage index above which the level watch begins",
     "newest_record_timestamp_seconds": "Time of the newest record, in seconds since 1970",
     "record_age_seconds": "Age of the newest record when the metrics were written",
     "open_events": "Number of events that are open, by kind",
@@ -84,6 +85,7 @@ def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str
     values = {
         "damage_index": status["index"],
         "threshold": status["threshold"],
+        "watch_threshold": status["watch_threshold"],
         "newest_record_timestamp_seconds": newest,
         "record_age_seconds": status["age"],
         "records": counts.get("n_records"),

@@ -9,6 +9,7 @@ import shutil
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,32 @@ import pandas as pd
 import skthermo
 from skthermo._io import write_when_complete
 from skthermo._tables.text import duration_text
+from skthermo.commands._choice import Candidate, candidates
 from skthermo.commands._looking import Look, is_in_kelvin, look_at
 from skthermo.commands._new_records import in_celsius, joined
 from skthermo.commands._record_files import PARQUET, CsvFormat
-from skthermo.commands._settings import CLASSES, SECTIONS, Records, class_named, read_settings, settings_of
+from skthermo.commands._settings import (
+    CLASSES,
+    SECTIONS,
+    Files,
+    Records,
+    Settings,
+    class_named,
+    read_settings,
+    settings_of,
+)
+from skthermo.monitoring import Monitor
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"
 LIKE_TEMPERATURE = re.compile(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", re.IGNORECASE)
 LIKE_FREQUENCY = re.compile(r"f_?\d*$|freq|mode|hz", re.IGNORECASE)
-DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day are evaluated together
+REGRESSION = "sklearn.linear_model.Ridge"
+FEATURES = {
+    "ExponentialMeans": "Means of earlier temperatures that explain the responses.",
+    "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
+}
 WIDTH = 110  # of comments
 
 
@@ -113,6 +129,35 @@ class Proposal:
         yield f"temperatures: {', '.join(self.records.temperatures)}; responses: {', '.join(self.records.responses)}"
         yield self.memory.summary()
 
+    @cached_property
+    def detectors(self) -> list[Candidate]:
+        """Detectors that are possible, the best first."""
+        parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
+        parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
+        options = {"compensator": {}, "monitor": self.monitor_options}
+
+        def monitor(kind: str, chosen: Mapping[str, Any]) -> Monitor:
+            detector = class_named(kind, CLASSES["detector"])(**chosen)
+            return Settings(Path(), Files(), self.records, self.form, parts | {"detector": detector}, options).monitor()
+
+        return candidates(self.step, self.baseline, monitor)
+
+    @property
+    def features(self) -> list[tuple[str, dict[str, Any]]]:
+        """Classes and settings of what is made of temperatures: means that explain responses, and hinges."""
+        means = self.memory.features
+        if means is None:
+            return [("HingeFeatures", {})]
+        chosen = {"time_constants": list(means.time_constants), "sensors": list(means.sensors)}
+        return [("ExponentialMeans", chosen), ("HingeFeatures", {})]
+
+    @property
+    def monitor_options(self) -> dict[str, Any]:
+        """Settings of the monitor."""
+        several = len(set(self.units.values())) > 1
+        units = dict(self.units) if several else next(iter(self.units.values()))
+        return {"false_alarms_per_year": 1.0, "watch_per_year": 12.0, "units": units, "random_state": 0}
+
     def write(self, folder: Path, name: str | None) -> Path:
         """Write the settings into a folder, with copies of the files and a folder for new ones."""
         file = folder / "monitor.toml"
@@ -133,40 +178,17 @@ class Proposal:
     def text(self, name: str | None = None) -> str:
         """The settings as TOML, with what each means."""
         found = [*self.account(), *self.findings.summary().splitlines()]
-        per_unit: Any = next(iter(self.units.values())) if len(set(self.units.values())) == 1 else dict(self.units)
-        is_dense = self.step <= DENSE
-        means = self.memory.features
-        calls: list[tuple[str, str | None, dict[str, Any], str]] = [
+        found += [str(one) for one in self.detectors]
+        best = self.detectors[0]
+        calls: list[tuple[str, str | None, Mapping[str, Any], str]] = [
             ("files", None, {"name": name} if name else {}, "What is written."),
             ("records", None, asdict(self.records), "Which records there are."),
             ("csv", None, asdict(self.form), "How CSV files are written."),
-        ]
-        if means is not None:
-            chosen = {"time_constants": list(means.time_constants), "sensors": list(means.sensors)}
-            calls.append(
-                ("features", "ExponentialMeans", chosen, "Means of earlier temperatures that explain responses.")
-            )
-        calls += [
-            ("features", "HingeFeatures", {}, "Frequencies are piecewise-linear in temperature."),
-            (
-                "regression",
-                "sklearn.linear_model.Ridge",
-                {},
-                "Predicts the responses from the temperatures: any regressor of scikit-learn, with its own settings.",
-            ),
+            *(("features", kind, chosen, FEATURES[kind]) for kind, chosen in self.features),
+            ("regression", REGRESSION, {}, "Predicts the responses from the inputs: any of scikit-learn's regressors."),
             ("compensator", None, {}, "Takes out what the weather explains."),
-            (
-                "detector",
-                "WindowedAlarm" if is_dense else "MahalanobisDetector",
-                {"window": "1D"} if is_dense else {},
-                "Evaluates the records of a day together." if is_dense else "Evaluates each record for itself.",
-            ),
-            (
-                "monitor",
-                None,
-                {"false_alarms_per_year": 1.0, "units": per_unit, "random_state": 0},
-                "The detector in service.",
-            ),
+            ("detector", best.kind, best.chosen, f"Evaluates {best.text}."),
+            ("monitor", None, self.monitor_options, "The detector in service."),
         ]
         parts = [
             _comment(
@@ -255,6 +277,7 @@ def _fem() -> str:
         ),
         "# [fem]",
         '# model = "model.py:make_model"',
+        "# random_state = 0",
     ]
     return "\n".join(lines)
 
@@ -280,11 +303,9 @@ def toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, Mapping):
-        return (
-            "{" + ", ".join(f"{json.dumps(key, ensure_ascii=False)} = {toml(one)}" for key, one in value.items()) + "}"
-        )
+        return "{" + ", ".join(f"{toml(str(key))} = {toml(one)}" for key, one in value.items()) + "}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml, value))}]"
     if isinstance(value, int | float):
         return repr(value)
-    return json.dumps(str(value), ensure_ascii=False)
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

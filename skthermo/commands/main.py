@@ -327,6 +327,7 @@ def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     file = found.write(options.into, options.bridge)
     facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
     if not options.json:
-        print("\n".join([*found.account(), found.findings.summary(), f"written: {file}"]))
+        chosen = [f"chosen: {found.detectors[0]}", f"written: {file}"]
+        print("\n".join([*found.account(), found.findings.summary(), *chosen]))
         print(f"read it, then: skthermo fit {file}")
     return HEALTHY

@@ -47,9 +47,12 @@ def files(tmp_path_factory, browser):
     study = run_study(fem, T, sweep(fem, (0.05, 0.1, 0.2)))
     found = identified({HOSTILE: (0.9, {HOSTILE: (0.2, 0.012)}), "no damage": (0.1, {})})
     monitor = FakeMonitor(events=EVENTS, drift=DRIFT)
+    raised = FakeMonitor(events=[event_row("2025-06-25", None, kind="watch")], watch_per_year=12)
     silent = FakeMonitor(n_not_evaluated=9, reason="all of f1 are missing")
     fleet = FakeFleet(
-        {"North viaduct": monitor, "Mill": silent}, {"model": fem}, {"broken": "ValueError: " + 9 * "long "}
+        {"North viaduct": monitor, "Mill": silent, "Weir": raised},
+        {"model": fem},
+        {"broken": "ValueError: " + 9 * "long "},
     )
     subjects = {"study": (study, {"identified": found}), "monitor": (monitor, {}), "fleet": (fleet, {})}
     now = {"now": monitor.last_}

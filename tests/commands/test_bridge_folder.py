@@ -168,11 +168,26 @@ def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, rec
     assert len({one["fitted"] for one in lines}) in (1, 2)  # the second fit may be of the same second
 
 
+def test_a_monitor_of_another_version_is_refused_by_name_and_fitted_anew(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 9)
+    assert run("update", settings(bridge), "--now", now).code == HEALTHY
+    expected = load_monitor(bridge / "monitor.joblib")
+    old = load_monitor(bridge / "monitor.joblib")
+    old.versions_ = old.versions_ | {"skthermo": "0.0.1"}
+    old.save(bridge / "monitor.joblib")
+    refused = run("update", settings(bridge), "--now", now)
+    assert (refused.code, "0.0.1" in refused.err, "--replace" in refused.err) == (FAILED, True, True)
+    assert run("fit", settings(bridge), "--replace").code == 0
+    assert run("update", settings(bridge), "--now", now).code == HEALTHY
+    assert_same_course(load_monitor(bridge / "monitor.joblib"), expected)
+
+
 def test_commands_that_an_engineer_uses(bridge, records):
     now = write_day(records, bridge, FIRST, DAMAGED + 30)
     run("update", settings(bridge), "--now", now)
     status = run("status", settings(bridge), "--now", now, "--json")
-    (event,) = valid(status.json)["bridges"][0]["status"]["events"]
+    opened = valid(status.json)["bridges"][0]["status"]["events"]
+    (event,) = [one for one in opened if one["kind"] == "damage"]
     said = run("acknowledge", settings(bridge), event["event"], "--harmless", "--note", "a repair", "--json")
     assert [one["what"] for one in valid(said.json)["bridges"][0]["transitions"]] == ["acknowledged"]
     new = run("rebaseline", settings(bridge), "--since", str(records.index[DAMAGED]), "--now", now, "--json")
@@ -283,6 +298,21 @@ def test_check_and_init_say_what_they_found(records, tmp_path):
     assert run("check", *files).code == 0
     missing = run("check", tmp_path / "no.csv", "--json")
     assert (missing.code, len(valid(missing.json)["errors"])) == (FAILED, 1)
+
+
+@pytest.mark.nightly
+def test_an_fe_model_of_a_python_file_follows_drift(bridge, records):
+    (bridge / "model.py").write_text(
+        "from skthermo.datasets import make_truss\n\n\ndef make_model():\n    return make_truss()\n"
+    )
+    text = settings(bridge).read_text()
+    named = '[fem]\nmodel = "model.py:make_model"\nrandom_state = 0'
+    settings(bridge).write_text(text.replace('# [fem]\n# model = "model.py:make_model"\n# random_state = 0', named))
+    assert run("fit", settings(bridge), "--replace").code == 0
+    assert load_monitor(bridge / "monitor.joblib").drift_ is not None
+    edit(settings(bridge), "make_model", "make_modl")
+    failed = run("fit", settings(bridge), "--replace")
+    assert (failed.code, "make_modl" in failed.err) == (FAILED, True)
 
 
 def test_numbers_are_read_to_the_last_bit(bridge, records):

@@ -37,6 +37,7 @@ def mirrored(entries, dofs, in_order):
     """A dense matrix from a mapping of row and column to value, of which a half or all is given."""
     if not 0 < len(dofs) <= MOST_ROWS:
         raise ValueError(f"{len(dofs)} rows")
+    entries = {place: value for place, value in entries.items() if value != 0}
     below = sum(i > j for i, j in entries)
     above = sum(i < j for i, j in entries)
     paired = sum(i != j and (j, i) in entries for i, j in entries)
@@ -51,12 +52,21 @@ def mirrored(entries, dofs, in_order):
     return matrix
 
 
-def of_labels(triples):
+def dense(entries, size):
+    if not 0 < size <= MOST_ROWS:
+        raise ValueError(f"{size} rows")
+    matrix = np.zeros((size, size))
+    for (i, j), value in entries.items():
+        matrix[i, j] = value
+    return matrix
+
+
+def of_labels(triples, *, is_symmetric=True):
     dofs = sorted({dof for row, column, _ in triples for dof in (row, column)})
     entries = {(dofs.index(row), dofs.index(column)): value for row, column, value in triples}
     if len(entries) < len(triples):
         raise ValueError("given twice")
-    return mirrored(entries, dofs, in_order=False), tuple(dofs)
+    return (mirrored(entries, dofs, in_order=False) if is_symmetric else dense(entries, len(dofs))), tuple(dofs)
 
 
 def read_entries(content):
@@ -102,7 +112,7 @@ def read_harwell_boeing(content):
     forms = [(int(n or 1), int(width)) for n, width in re.findall(pattern, lines[3].upper().replace(" ", ""))]
     if kind not in ("RSA", "RUA", "ISA", "IUA") or size != n_columns:
         raise ValueError(kind)
-    at, blocks = 5 if counts[4:] > [0] else 4, []
+    at, blocks = 5 if counts[4:] > [0] or min(counts) < 0 else 4, []
     for n_lines, count, (n, width) in zip(counts[1:4], (size + 1, n_entries, n_entries), forms[:3], strict=True):
         if n_lines != -(-count // n) or at + n_lines > len(lines):
             raise ValueError("lines")
@@ -119,10 +129,7 @@ def read_harwell_boeing(content):
         raise ValueError("given twice")
     if kind[1] == "S":
         return mirrored(entries, range(size), in_order=True), ()
-    matrix = np.zeros((size, size))
-    for (i, j), value in entries.items():
-        matrix[i, j] = value
-    return matrix, ()
+    return dense(entries, size), ()
 
 
 def read_dmig(content):
@@ -169,13 +176,13 @@ def read_dmig(content):
         whole(repr(number(node, bare=True)), 1)
         whole(repr(number(direction or "0", bare=True)), 0)
         found.append((labels[1], labels[0], number(value, bare=True)))
-    return of_labels(found)
+    return of_labels(found, is_symmetric=form == 6)
 
 
 def read_op4(content):
     """The matrix of a file that holds one."""
     lines = lines_of(content)
-    n_columns, n_rows, _, kind = (int(lines[0][i : i + 8]) for i in range(0, 32, 8))
+    n_columns, n_rows, form, kind = (int(lines[0][i : i + 8]) for i in range(0, 32, 8))
     n, width = (int(word) for word in re.search(r"(\d+)[ED](\d+)\.\d+", lines[0][40:]).groups())
     if n_columns != abs(n_rows) or kind not in (1, 2):
         raise ValueError("form")
@@ -210,7 +217,7 @@ def read_op4(content):
         raise ValueError("end")
     if any(not (0 <= i < n_columns and 0 <= j < n_columns) for i, j in entries):
         raise ValueError("rows")
-    return mirrored(entries, range(n_columns), in_order=True), ()
+    return (mirrored(entries, range(n_columns), in_order=True) if form == 6 else dense(entries, n_columns)), ()
 
 
 def reader_of(kind):

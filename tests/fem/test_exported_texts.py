@@ -119,6 +119,32 @@ def test_rows_get_their_labels_from_a_file_beside_the_matrices(tmp_path, suffix,
     assert_same(model, EXPECTED)
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("bridge.dof", "3.1\n3.2\n12.x\n", "line 3 is '12.x'; expected node.direction"),
+        ("bridge.mapping", "  Matrix Eqn   Node  DOF\n  1  3  UX\n  3  3  UY\n", "line 3 is of equation 3; expected 2"),
+        ("bridge.mapping", "  Matrix Eqn   Node  DOF\n  1  3\n", "line 2 is '1  3'; expected equation, node and"),
+    ],
+)
+def test_damaged_labels_name_file_and_line(tmp_path, name, text, message):
+    write_texts("ANSYS")(tmp_path, MATRICES)
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=rf"{re.escape(name)}: not readable as labels of rows .*{message}"):
+        load_affine(tmp_path)
+
+
+def test_what_is_no_matrix_is_ignored_and_what_should_be_one_is_not(tmp_path):
+    write_texts("Abaqus matrix input, half")(tmp_path, MATRICES)
+    (tmp_path / "readme.txt").write_text("The bridge\n1. as built\n2. 100 mm more\n")
+    (tmp_path / "job.inp").write_text("*NODE\n1, 0., 0., 0.\n*ELEMENT, TYPE=B31\n1, 1, 2\n")
+    (tmp_path / "table.csv").write_text("1,2,3\n4,5,6\n")
+    assert_same(load_affine(tmp_path, n_modes=4), EXPECTED)
+    (tmp_path / "E_11.mtx").write_text("damaged\n")
+    with pytest.raises(ValueError, match=r"E_11\.mtx: not readable"):
+        load_affine(tmp_path)
+
+
 def test_one_punch_file_holds_a_whole_model(tmp_path):
     card = "DMIG    {0:8s}{1:8d}{2:8d}{3:8d}{4:8d}{5:8d}{6:8.1f}\n"
     load = card.format("PAX", 0, 9, 2, 0, 1, 1.0) + "DMIG    PAX            1       0               3       1     1.0\n"
@@ -138,6 +164,15 @@ def test_one_op4_file_holds_a_whole_model(tmp_path):
     (tmp_path / "bridge.op4").write_text("".join(op4_text(one, name=name.upper()) for name, one in named.items()))
     expected = AffineModel({(name.upper(),): term for name, term in TERMS.items()}, M, n_modes=4)
     assert_same(load_affine(tmp_path / "bridge.op4", n_modes=4), expected)
+
+
+def test_square_matrices_may_be_unsymmetric_where_they_are_not_used(tmp_path):
+    skew = np.triu(np.ones((N, N)), 1) * 7.0
+    unsymmetric = op4_text(skew, name="G").replace(f"{6:8d}{2:8d}G ", f"{1:8d}{2:8d}G ")
+    (tmp_path / "bridge.op4").write_text(unsymmetric + op4_text(TOTAL) + op4_text(M, name="MAA"))
+    model = load_affine(tmp_path / "bridge.op4", n_modes=4, stiffness=["KAA"])
+    assert_same(model, AffineModel({("KAA",): TOTAL}, M, n_modes=4))
+    np.testing.assert_array_equal(read_all(tmp_path / "bridge.op4").matrices["G"].toarray(), skew)
 
 
 def test_scipy_writes_what_is_read(tmp_path):

@@ -17,7 +17,7 @@ from skthermo._io import MASS, read_half, read_named_matrices
 from skthermo._tables.arrays import Matrix, check_names, check_path
 from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import difference_terms
+from skthermo.fem.external._differences import SAME, difference_terms, relative
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -81,7 +81,6 @@ Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass", "maax", "maa", "mgg")
 TOTAL_NAMES = ("k", "k0", "stiffness", "nominal", "kaax", "kaa", "kgg")
-SAME = 1e-6
 EXACTLY_SAME = 1e-8
 
 
@@ -389,9 +388,7 @@ def _ratio(term: Matrix, reference: Matrix) -> float:
 
 def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
     """Whether all differences are small relative to the diagonal."""
-    rest = scipy.sparse.coo_array(matrix - expected)
-    diagonal = np.abs(expected.diagonal())
-    return not (np.abs(rest.data) > tolerance * np.sqrt(diagonal[rest.row] * diagonal[rest.col])).any()
+    return not (relative(scipy.sparse.coo_array(matrix - expected), expected.diagonal()) > tolerance).any()
 
 
 def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:

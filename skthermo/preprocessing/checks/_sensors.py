@@ -18,7 +18,7 @@ JUMP = 30.0  # the same, of a value that repeats exactly
 WIDEST, WIDE = 180.0, 90.0  # degrees that a thermometer spans in the open, and that it does beside another
 SMOOTH = 4.0  # times a step between records, that temperatures span and errors do not
 SCALES = (10.0, 100.0, 1000.0)  # tenths, hundredths, thousandths of a degree
-NEAR, APART = 15.0, 20.0  # degrees between the medians of thermometers of one structure, in one unit and in two
+SAME, NEAR, APART = 5.0, 15.0, 20.0  # degrees between medians of thermometers: alike, in one unit, and in two
 AT_ZERO = 10.0  # degrees Fahrenheit from 32, of a sensor in Fahrenheit where the others are at 0 degrees Celsius
 ALIKE = (0.3, 3.0)  # ratio of the spreads of two thermometers
 WARM, WARMEST = (45.0, 85.0), 70.0  # medians, and warmest percent, that a bridge has only in degrees Fahrenheit
@@ -85,7 +85,7 @@ def _compare_sensors(columns: list[Column]) -> None:
     others = [column for place, column in enumerate(columns) if not _is_in_another_unit(column, place, beside)]
     fine = [column for column in others if not _is_scaled(column)]
     for column in fine:
-        if 2 * len(fine) <= len(columns):
+        if len(others) > 2 * len(fine):
             column.found("scaled temperatures", column.levels, f"{column.span}, beside others in such a unit,")
         else:
             beyond = (column.levels < COLDEST) | (column.levels > HOTTEST)
@@ -133,8 +133,9 @@ def _is_in_another_unit(column: Column, place: int, quantiles: Array) -> bool:
     ratio = (high - low) / max(spread, 1e-300)
     beside = f"{column.span} with a median of {middle:.4g}, that of the others is {centre:.4g},"
     at_zero = middle - ratio * centre  # where the others are at 0 degrees Celsius
-    is_apart = middle - centre > APART and abs((middle - FREEZING) / DEGREES - centre) < NEAR
-    if is_apart and abs(at_zero - FREEZING) < AT_ZERO and ALIKE[0] < ratio / DEGREES < ALIKE[1]:
+    off = abs((middle - FREEZING) / DEGREES - centre)
+    is_apart = middle - centre > APART and off < NEAR and (off < SAME or abs(at_zero - FREEZING) < AT_ZERO)
+    if is_apart and ALIKE[0] < ratio / DEGREES < ALIKE[1]:
         column.found("fahrenheit", column.levels, beside)
         return True
     is_wide = high - low > WIDE or column.levels[-1] > HOTTEST or column.levels[0] < COLDEST

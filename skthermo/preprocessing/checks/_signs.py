@@ -309,7 +309,15 @@ def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
 
 def _beside(inputs: Array, columns: Array) -> Array:
     """What inputs leave of columns."""
-    return columns - inputs @ np.linalg.lstsq(inputs, columns, rcond=1e-8)[0]
+    basis = _orthonormal(inputs)
+    return columns - basis @ (basis.T @ columns)
+
+
+def _orthonormal(inputs: Array) -> Array:
+    """Orthonormal columns that span what the inputs do."""
+    basis, triangle = np.linalg.qr(inputs)
+    directions, sizes, _ = np.linalg.svd(triangle)
+    return basis @ directions[:, sizes > 1e-8 * sizes.max()]
 
 
 def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
@@ -339,16 +347,16 @@ def largest_step(inputs: Array, column: Array) -> Step | None:
     if len(known) < LEAST_RECORDS + 2 * inputs.shape[1] or n_places < 2:
         return None
     at = np.arange(1, n_places) * len(known) // n_places
-    order, beside = np.arange(len(known)), inputs[known]
-    left = np.column_stack([order / len(known), order[:, np.newaxis] >= at, column[known]])
-    left = _beside(beside, left)
-    shapes, rest = left[:, :-1], left[:, -1]
-    squares = np.maximum((shapes**2).sum(axis=0), 1e-12 * len(known))
-    changes = shapes.T @ rest / squares
-    remaining = rest @ rest - changes**2 * squares
-    best = 1 + int(remaining[1:].argmin())
-    if remaining[best] > SHARPER * remaining[0]:
+    basis, line, rest = _orthonormal(inputs[known]), np.arange(len(known)) / len(known), column[known]
+    line, rest = (values - basis @ (basis.T @ values) for values in (line, rest))
+    # a step is 1 from its place on: its products are sums of the last rows
+    within, products = (part[::-1].cumsum(axis=0)[::-1][at] for part in (basis, rest))
+    squares = np.maximum(len(known) - at - (within**2).sum(axis=1), 1e-12 * len(known))
+    explained_by_line = (line @ rest) ** 2 / max(line @ line, 1e-12 * len(known))
+    best = int(np.argmax(products**2 / squares))
+    change = products[best] / squares[best]
+    if rest @ rest - change * products[best] > SHARPER * (rest @ rest - explained_by_line):
         return None
-    scatter = rest - changes[best] * shapes[:, best]
+    scatter = rest - change * ((np.arange(len(known)) >= at[best]) - basis @ within[best])
     error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.shape[1])
-    return Step(int(known[at[best - 1]]), float(changes[best]), error)
+    return Step(int(known[at[best]]), float(change), error)

@@ -1,0 +1,245 @@
+"""Whatever goes wrong in a night, the state is that before or after it, and nothing is claimed that was not saved."""
+
+import contextlib
+import errno
+import io
+import json
+import multiprocessing
+import os
+import shutil
+import signal
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import skthermo.reporting
+from skthermo._io import alone_with
+from skthermo.commands.main import main
+from skthermo.monitoring import load_monitor
+from tests.commands.folders import edit, made_bridge, run, write_day
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, truss_records
+
+HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
+LAST = DAMAGED + 4  # the night in which an event opens
+
+
+@pytest.fixture(scope="module")
+def records():
+    records = truss_records()
+    return records.set_axis(records.index.as_unit("ns").rename(None))
+
+
+@pytest.fixture(scope="module")
+def before(records, tmp_path_factory):
+    """A bridge on the eve of an alarm, with the records of the next night in its folder."""
+    folder = made_bridge(tmp_path_factory.mktemp("before"), records=records)
+    edit(folder / "monitor.toml", '# page = "status.html"', 'page = ""')
+    edit(folder / "monitor.toml", "# metrics = ...", 'metrics = "metrics.prom"')
+    assert run("update", folder / "monitor.toml", "--now", write_day(records, folder, FIRST, DAMAGED)).code == HEALTHY
+    write_day(records, folder, DAMAGED, LAST)
+    return folder
+
+
+@pytest.fixture
+def bridge(before, tmp_path):
+    return shutil.copytree(before, tmp_path / "bridge")
+
+
+def night(bridge, records, *options):
+    return run("update", bridge / "monitor.toml", "--now", str(records.index[LAST - 1]), *options)
+
+
+def transitions(bridge):
+    file = bridge / "transitions.jsonl"
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+@pytest.fixture(scope="module")
+def after(before, records, tmp_path_factory):
+    """The same bridge after an undisturbed night."""
+    folder = shutil.copytree(before, tmp_path_factory.mktemp("after") / "bridge")
+    assert night(folder, records).code == ALARM
+    return folder
+
+
+def assert_is_before_or_after(bridge, before, after):
+    """The monitor is one of the two, and the transitions are no more than what it has saved."""
+    monitor = load_monitor(bridge / "monitor.joblib")
+    states = {load_monitor(one / "monitor.joblib").last_: one for one in (before, after)}
+    assert_same_course(monitor, load_monitor(states[monitor.last_] / "monitor.joblib"))
+    saved = [one["id"] for one in monitor.transitions()]
+    told = (bridge / "transitions.jsonl").read_bytes() if (bridge / "transitions.jsonl").exists() else b""
+    whole = [json.loads(line)["id"] for line in told[: told.rfind(b"\n") + 1].splitlines()]
+    assert whole == saved[: len(whole)]
+    return states[monitor.last_] == after
+
+
+def assert_goes_on(bridge, records, after):
+    """The next call ends as if nothing had happened, and leaves nothing behind."""
+    assert night(bridge, records).code == ALARM
+    left, expected = (load_monitor(one / "monitor.joblib") for one in (bridge, after))
+    for name in ("evaluations_", "events_", "days_", "records_"):
+        pd.testing.assert_frame_equal(getattr(left, name), getattr(expected, name), check_exact=True)
+    assert [one["id"] for one in transitions(bridge)] == [one["id"] for one in transitions(after)] != []
+    assert not list(bridge.glob(".*.unfinished"))
+
+
+@pytest.mark.parametrize("write", range(4))
+def test_a_disk_that_is_full_at_any_write(bridge, before, after, records, monkeypatch, write):
+    calls = []
+
+    def full(file):
+        calls.append(file)
+        if len(calls) > write:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        done = night(bridge, records, "--json")
+    is_saved = assert_is_before_or_after(bridge, before, after)
+    (said,) = done.json["bridges"]
+    assert (said["state"], done.code) == (("alarm", ALARM) if is_saved and said["state"] else (None, FAILED))
+    assert said["errors"] or done.json["errors"]
+    assert len(said["transitions"]) <= len(transitions(bridge))
+    assert_goes_on(bridge, records, after)
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs processes that fork")
+@pytest.mark.parametrize("write", range(9))
+def test_a_kill_at_any_write(bridge, before, after, records, write):
+    """Before or after the content of a file is on the disk, or its new name is."""
+
+    def killed():
+        calls, fsync = [], os.fsync
+
+        def kill(file):
+            calls.append(file)
+            if len(calls) > write // 2:
+                if write % 2:
+                    fsync(file)
+                os.kill(os.getpid(), signal.SIGKILL)
+            fsync(file)
+
+        os.fsync = kill
+        with contextlib.redirect_stdout(io.StringIO()):
+            main(["update", str(bridge / "monitor.toml"), "--now", str(records.index[LAST - 1])])
+
+    process = multiprocessing.get_context("fork").Process(target=killed)
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    assert_is_before_or_after(bridge, before, after)
+    assert_goes_on(bridge, records, after)
+
+
+def test_a_line_of_transitions_that_was_cut_off_is_written_again(bridge, after, records):
+    night(bridge, records)
+    file = bridge / "transitions.jsonl"
+    file.write_bytes(file.read_bytes()[:-20])
+    assert_goes_on(bridge, records, after)
+    file.unlink()
+    assert_goes_on(bridge, records, after)
+
+
+def test_two_at_once(bridge, before, after, records):
+    pytest.importorskip("fcntl")
+    with alone_with(bridge / "monitor.joblib", 0):
+        for command in ("update", "fit", "acknowledge"):
+            more = {"acknowledge": ["1", "--damage"], "fit": ["--replace"]}.get(command, [])
+            done = run(command, bridge / "monitor.toml", *more, "--wait", "0.1")
+            assert (done.code, "is in use by process" in done.err) == (FAILED, True)
+        assert run("status", bridge / "monitor.toml", "--now", str(records.index[DAMAGED - 1])).code == HEALTHY
+    assert not assert_is_before_or_after(bridge, before, after)
+    assert_goes_on(bridge, records, after)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written(bridge, before, after, records):
+    bridge.chmod(0o555)
+    try:
+        done = night(bridge, records)
+        assert (done.code, done.out) == (FAILED, "")
+        assert run("status", bridge / "monitor.toml", "--now", str(records.index[DAMAGED - 1])).code == HEALTHY
+    finally:
+        bridge.chmod(0o755)
+    assert not assert_is_before_or_after(bridge, before, after)
+    assert_goes_on(bridge, records, after)
+
+
+def test_a_page_that_cannot_be_written_hides_no_alarm(bridge, after, records, monkeypatch):
+    def fails(*_, **options):
+        raise OSError("no space left")
+
+    edit(bridge / "monitor.toml", 'page = ""', 'page = "status.html"')
+    with monkeypatch.context() as patched:
+        patched.setattr(skthermo.reporting, "owner_report", fails)
+        done = night(bridge, records)
+        assert (done.code, "status.html was not written" in done.err) == (ALARM, True)
+        status = run("report", bridge / "monitor.toml", "--now", "2026-01-01")
+        assert status.code == ALARM
+    monkeypatch.setattr(skthermo.reporting, "owner_report", lambda monitor, path, **options: path)
+    assert_goes_on(bridge, records, after)
+
+
+@pytest.mark.parametrize("clock", ["2020-01-01", "2050-01-01"])
+def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, records, monkeypatch, clock):
+    """The monitor itself asks the clock whether a jump in the stamps is plausible."""
+    monkeypatch.setattr(pd.Timestamp, "now", classmethod(lambda cls, tz=None: pd.Timestamp(clock, tz=tz)))
+    done = run("update", bridge / "monitor.toml")
+    assert done.code == ALARM
+    monkeypatch.undo()
+    assert_goes_on(bridge, records, after)
+
+
+@pytest.mark.parametrize("change", ["renamed", "one more", "one less", "text", "twice", "empty", "no stamps"])
+def test_columns_that_have_changed(bridge, before, after, records, change):
+    file = bridge / "new" / f"{records.index[DAMAGED]:%Y-%m-%d}.csv"
+    good, table = file.read_text(), records[DAMAGED:LAST]
+    texts = {
+        "renamed": table.rename(columns={"f2": "F2"}).to_csv(),
+        "one more": table.assign(f9=1.0).to_csv(),
+        "one less": table.drop(columns="f3").to_csv(),
+        "text": table.astype(str).assign(f3="fault").to_csv(),
+        "twice": table.join(table["f1"].rename("f1 ")).to_csv().replace("f1 ", "f1"),
+        "empty": "\n",
+        "no stamps": table.reset_index(drop=True).to_csv(),
+    }
+    file.write_text(texts[change])
+    done = night(bridge, records, "--json")
+    (said,) = done.json["bridges"]
+    assert (done.code, len(said["errors"])) == (FAILED, 1)
+    assert str(file) in said["errors"][0]
+    assert not assert_is_before_or_after(bridge, before, after)
+    file.write_text(good)
+    assert_goes_on(bridge, records, after)
+
+
+@pytest.mark.nightly
+def test_an_hour_that_comes_twice(tmp_path):
+    """Hourly records by a clock that goes back in October: each night's decisions are those of times in UTC."""
+    random = np.random.default_rng(0)
+    utc = pd.date_range("2026-08-01", "2026-10-29", freq="h", tz="UTC")
+    warm = 10 + 8 * np.sin(np.arange(len(utc)) / 24 * 2 * np.pi) + random.normal(0, 1, len(utc))
+    table = pd.DataFrame({"T1": warm, "f1": 4 - 0.005 * warm + random.normal(0, 0.01, len(utc))}, utc)
+    local, end = table.tz_convert("Europe/Brussels"), "2026-10-23"
+    monitors = []
+    for name, shown, zone in (
+        ("utc", table, "UTC"),
+        ("local", local.tz_localize(None), "Europe/Brussels"),
+        ("offsets", local, "Europe/Brussels"),
+    ):
+        days = local.index.strftime("%Y-%m-%d")
+        shown[days < end].to_csv(tmp_path / "all.csv")
+        made = run("init", tmp_path / "all.csv", "--into", tmp_path / name, "--zone", zone)
+        edit(tmp_path / name / "monitor.toml", '# page = "status.html"', 'page = ""')
+        assert (made.code, run("fit", tmp_path / name / "monitor.toml").code) == (0, 0)
+        for day in sorted(set(days[days >= end])):
+            shown[days == day].to_csv(tmp_path / name / "new" / f"{day}.csv")
+            run("update", tmp_path / name / "monitor.toml", "--now", f"{day} 23:59")
+        monitors.append(load_monitor(tmp_path / name / "monitor.joblib"))
+    evaluated = [one.evaluations_.tz_convert("UTC") for one in monitors]
+    assert len(evaluated[0]) > 120
+    for one in evaluated[1:]:
+        pd.testing.assert_frame_equal(one, evaluated[0], check_names=False, check_freq=False)

@@ -1,0 +1,155 @@
+"""Files of records in any common form are read as they were meant, to the last bit."""
+
+from datetime import timedelta
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo.commands._looking import DAYS, look_at
+from skthermo.commands._record_files import CsvFormat, read_file
+from tests.commands.folders import run
+
+RANDOM = np.random.default_rng(0)
+RECORDS = pd.DataFrame(
+    {"T air [°C]": RANDOM.normal(10, 8, 80).round(3), "f1 (Hz)": RANDOM.normal(4, 0.1, 80)},
+    pd.date_range("2026-01-05 12:30", periods=80, freq="9h"),
+)
+RECORDS.iloc[5, 0] = np.nan
+
+
+@given(
+    separator=st.sampled_from([",", ";", "\t", "|"]),
+    decimal=st.sampled_from([".", ","]),
+    days=st.sampled_from(["%Y-%m-%d", *DAYS]),
+    clock=st.sampled_from([" %H:%M", " %H:%M:%S"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+    missing=st.sampled_from(["", "NaN", "-999", "n/a"]),
+    head=st.sampled_from(["", "Logger 12\n", "station: bridge; serial 4, 7\nfirmware 3\n"]),
+    units=st.booleans(),
+    is_split=st.booleans(),
+)
+@settings(max_examples=40, deadline=timedelta(seconds=5))
+def test_every_form_is_found(
+    tmp_path_factory, separator, decimal, days, clock, encoding, missing, head, units, is_split
+):
+    if separator == decimal:
+        separator = ";"
+    file = tmp_path_factory.mktemp("form") / "records.csv"
+    texts = [[_text(value, decimal, missing) for value in row] for row in RECORDS.to_numpy()]
+    stamps = [RECORDS.index.strftime(days), RECORDS.index.strftime(clock[1:])]
+    stamps = (
+        [*zip(*stamps, strict=True)] if is_split else [(f"{day} {time}",) for day, time in zip(*stamps, strict=True)]
+    )
+    names = [*(["Date", "Time"] if is_split else ["TIMESTAMP"]), *RECORDS, "state"]
+    below = [["", *[""] * is_split, "degC", "Hz", ""]] if units else []
+    rows = [names, *below, *([*stamp, *row, "ok"] for stamp, row in zip(stamps, texts, strict=True))]
+    file.write_text(head + "\n".join(separator.join(row) for row in rows) + "\n", encoding=encoding)
+    found = look_at(file)
+    pd.testing.assert_frame_equal(found.records, RECORDS, check_exact=True, check_freq=False, check_index_type=False)
+    assert found.ignored == {"state": "it holds text"}
+    assert found.units == {"T air [°C]": "°C", "f1 (Hz)": "Hz"}
+    again = read_file(file, found.form, ignore=found.ignored)
+    pd.testing.assert_frame_equal(again, found.records, check_exact=True)
+
+
+def _text(value, decimal, missing):
+    return missing if np.isnan(value) else repr(float(value)).replace(".", decimal)
+
+
+def test_columns_that_measure_nothing_are_left_out_with_a_reason(tmp_path):
+    table = RECORDS.assign(RECORD=range(100, 180), battery=12.5, empty=np.nan)
+    table.to_csv(tmp_path / "a.csv")
+    found = look_at(tmp_path / "a.csv")
+    assert set(found.ignored) == {"RECORD", "battery", "empty"}
+    assert list(found.records) == list(RECORDS)
+
+
+def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):
+    table = RECORDS.set_axis(pd.date_range("2026-01-01", periods=80, freq="3h"))  # no day after the twelfth
+    table.to_csv(tmp_path / "a.csv", date_format="%d/%m/%Y %H:%M")
+    found = look_at(tmp_path / "a.csv")
+    assert found.form.stamps == "%d/%m/%Y %H:%M"
+    assert "%m/%d/%Y" in found.notes[0]
+
+
+def test_seconds_since_1970_and_offsets_are_times_in_utc(tmp_path):
+    utc = RECORDS.tz_localize("UTC")
+    utc.set_axis(utc.index.asi8 // 10**9 if utc.index.unit == "ns" else utc.index.as_unit("s").asi8).to_csv(
+        tmp_path / "s.csv"
+    )
+    utc.tz_convert("Europe/Brussels").to_csv(tmp_path / "offset.csv")
+    for name in ("s.csv", "offset.csv"):
+        found = look_at(tmp_path / name).records
+        assert str(found.index.tz) == "UTC"
+        assert (found.index == utc.index).all()
+
+
+ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "Asia/Kolkata", "America/St_Johns"]
+
+
+@given(
+    zone=st.sampled_from(ZONES),
+    start=st.datetimes(pd.Timestamp("2015-01-01"), pd.Timestamp("2026-12-01")),
+    minutes=st.sampled_from([10, 30, 60]),
+)
+@settings(max_examples=15, deadline=timedelta(seconds=5))
+def test_local_clocks_are_followed_over_their_changes(tmp_path_factory, zone, start, minutes):
+    year = pd.date_range(
+        pd.Timestamp(start).floor("h"), periods=370 * 24 * 60 // minutes // 8, freq=f"{minutes}min", tz="UTC"
+    )
+    local = year.tz_convert(zone)
+    file = tmp_path_factory.mktemp("zone") / "a.csv"
+    pd.DataFrame({"T": range(len(local))}, local.tz_localize(None)).to_csv(file)
+    assert (read_file(file, CsvFormat(time_zone=zone)).index == local).all()
+    pd.DataFrame({"T": range(len(local))}, local).to_csv(file)
+    assert (read_file(file, CsvFormat(time_zone=zone)).index == local).all()
+
+
+def test_an_hour_that_does_not_exist_is_named(tmp_path):
+    hours = pd.date_range("2026-03-28", periods=48, freq="h")  # a clock that stays on winter time
+    pd.DataFrame({"T": 1.0}, hours).to_csv(tmp_path / "a.csv")
+    with pytest.raises(ValueError, match="line 28: 2026-03-29 02:00:00 is no time in Europe/Brussels"):
+        read_file(tmp_path / "a.csv", CsvFormat(time_zone="Europe/Brussels"))
+    assert len(read_file(tmp_path / "a.csv", CsvFormat(time_zone="Etc/GMT-1"))) == 48
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "no columns"),
+        ("time,T1\n", "no columns"),
+        ("a,b\nc,d\n", "no columns"),
+        ("2026-01-01,1.5\n2026-01-02,1.5\n", "line of names"),
+        ("name,T1\nx,1.5\ny,1.5\n", "no column holds times"),
+    ],
+)
+def test_what_is_no_table_of_records_is_an_error(tmp_path, text, expected):
+    (tmp_path / "a.csv").write_text(text)
+    done = run("check", tmp_path / "a.csv")
+    assert (done.code, expected in done.err) == (3, True), done.err
+
+
+def test_columns_find_their_roles_and_units(tmp_path):
+    random = np.random.default_rng(0)
+    days = pd.date_range("2025-01-01", periods=400)
+    air = 10 - 10 * np.cos(2 * np.pi * np.arange(400) / 365) + random.normal(0, 3, 400)
+    table = pd.DataFrame({"steel [K]": air + 273.15, "T_soil [degF]": air * 1.8 + 32, "f1": 4 - 0.01 * air}, days)
+    table["f1"] += random.normal(0, 0.01, 400)
+    table["station"] = air + random.normal(0, 1, 400)
+    table.to_csv(tmp_path / "all.csv")
+    done = run("init", tmp_path / "all.csv", "--into", tmp_path / "b", "--reference", "station")
+    assert done.code == 0, done.err
+    from skthermo.commands._settings import read_settings
+
+    records = read_settings(tmp_path / "b" / "monitor.toml").records
+    assert (records.temperatures, records.responses) == (["steel [K]", "T_soil [degF]"], ["f1"])
+    assert (records.reference, records.convert) == (["station"], {"steel [K]": "K", "T_soil [degF]": "°F"})
+    assert run("fit", tmp_path / "b" / "monitor.toml").code == 0
+    from skthermo.monitoring import load_monitor
+
+    baseline = load_monitor(tmp_path / "b" / "monitor.joblib").baseline_
+    np.testing.assert_allclose(baseline[["steel [K]", "T_soil [degF]"]], np.column_stack([air, air]), atol=1e-9)
+    assert run("init", tmp_path / "all.csv", "--into", tmp_path / "c", "--responses", "f9").code == 3
