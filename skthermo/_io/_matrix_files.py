@@ -1,4 +1,4 @@
-"""Files that may be damaged: SciPy reads them in a child process, with limits of memory and time.
+"""Files that may be damaged: a child process reads them, with limits of memory and time.
 
 SciPy's readers follow the lengths that a file states; where these are damaged they can end the interpreter, or take
 all memory."""
@@ -162,22 +162,22 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> NamedMatr
         return _read_folder(path, is_used)
     form = form_of(path) if path.is_file() else None
     if form is None or form == "labels of rows":
-        raise ValueError(_as_binary([path]) or f"{path} is none of these: {FORMATS}")
+        _refuse_binary([path])
+        raise ValueError(f"{path} is none of these: {FORMATS}")
     content = read_files([(path, form)])[0]
     return _joined(content if isinstance(content, dict) else {path.stem: content}, path)
 
 
-def _as_binary(files: Sequence[Path]) -> str | None:
-    """Text for the error of the first binary file that another package reads; None if there is none."""
+def _refuse_binary(files: Sequence[Path]) -> None:
+    """Raise an error for the first binary file that another package reads."""
     for file in files:
         beginning = _beginning(file, 12) if file.is_file() else b""
         for what, (pattern, instead) in BINARY.items():
             if re.match(pattern, beginning, re.DOTALL):
-                return (
+                raise ValueError(
                     f"{file} is {what}; expected another file ({instead}), or matrices that you read with another "
                     'package, as the guide shows in "From your FE program"'
                 )
-    return None
 
 
 def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
@@ -196,7 +196,8 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
             raise ValueError(f"{folder} holds {key!r} as {both}; expected one of them, or another name for one")
         named[key] = file
     if not named:
-        raise ValueError(_as_binary(sorted(folder.iterdir())) or f"{folder} holds no matrix; expected {FORMATS}")
+        _refuse_binary(sorted(folder.iterdir()))
+        raise ValueError(f"{folder} holds no matrix; expected {FORMATS}")
     of_rows = [file for file in files if forms[file] == "labels of rows"]
     used = [name for name in named if is_used(name)]
     contents = read_files([(file, forms[file]) for file in (*(named[name] for name in used), *of_rows)])

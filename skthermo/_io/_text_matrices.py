@@ -162,11 +162,13 @@ def _symmetric(
 ) -> scipy.sparse.csc_array:
     """A matrix of which one half or all entries are given; ``in_order``: a half is on one side of the diagonal."""
     matrix = _square(rows, columns, values, size)
-    below, above = int((rows > columns).sum()), int((rows < columns).sum())
+    matrix.eliminate_zeros()  # of which a half or a block may hold some
+    kept = values != 0
+    below, above = int((kept & (rows > columns)).sum()), int((kept & (rows < columns)).sum())
     if below and above:
         ones = np.ones(matrix.nnz, dtype=np.int8)
         pattern = scipy.sparse.csc_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
-        paired = pattern.multiply(pattern.T).nnz - np.count_nonzero(rows == columns)
+        paired = pattern.multiply(pattern.T).nnz - np.count_nonzero(kept & (rows == columns))
         if paired >= FULL * (below + above):
             return matrix
         if paired or in_order:

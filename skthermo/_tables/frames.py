@@ -254,12 +254,10 @@ def as_moment(now: Any, zone: tzinfo | None) -> pd.Timestamp:
     return time.tz_localize(zone) if time.tz is None else time.tz_convert(zone)
 
 
-def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp | None:
-    """A moment in the time zone of records; None for none."""
-    if moment is None:
-        return None
+def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp:
+    """A moment in the time zone of records."""
     try:
-        stamp = pd.Timestamp(moment)
+        stamp = pd.Timestamp(pd.NaT if isinstance(moment, Real) else moment)
         stamp = stamp.tz_localize(index.tz) if stamp.tz is None and index.tz is not None else stamp
         if not pd.isna(stamp) and (stamp.tz is None) == (index.tz is None):
             return stamp
@@ -270,9 +268,9 @@ def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp
 
 
 def check_duration(value: Any, name: str) -> pd.Timedelta:
-    """A duration of zero or more."""
+    """A duration of zero or more, as a text or a Timedelta."""
     try:
-        duration = pd.Timedelta(value).as_unit("ns")
+        duration = pd.Timedelta(pd.NaT if isinstance(value, Real) else value).as_unit("ns")
     except (ValueError, TypeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration, such as '7D'") from error
     if not duration >= pd.Timedelta(0):

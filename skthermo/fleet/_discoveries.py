@@ -16,6 +16,7 @@ from skthermo.monitoring import Monitor
 
 FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned
 HEAVIEST = 0.9  # shape of a tail: from 1 on it has no mean
+LONGEST = 100_000  # days
 COLUMNS = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
 
 
@@ -112,7 +113,7 @@ def discover(
 ) -> Discoveries:
     """Compare the events of all monitors that were open within so many days before the newest record of all."""
     fdr = check_size(fdr, "fdr", 0, 1, "a number between 0 and 1, such as 0.1")
-    window = pd.Timedelta(days=check_size(days, "days", 0, np.inf, "a number of days, such as 365"))
+    window = pd.Timedelta(days=check_size(days, "days", 0, LONGEST, f"a number of days up to {LONGEST}, such as 365"))
     last = [without_zone(standing["last"]) for standing in standings.values() if not pd.isna(standing["last"])]
     begin = max(last, default=pd.NaT) - window
     excesses, expected, watched, not_evaluated = {}, 0.0, {}, []

@@ -166,6 +166,8 @@ def _restore(storage: Storage, name: Hashable) -> None:
 def _base(random_state: Any) -> int:
     """A number from which all seeds come."""
     if isinstance(random_state, int | np.integer) and not isinstance(random_state, bool):
+        if not 0 <= random_state < 2**32:
+            raise ValueError(f"random_state is {random_state}; expected a number from 0 to 2**32 - 1")
         return int(random_state)
     source = np.random.RandomState() if random_state is None else random_state
     if not isinstance(source, np.random.RandomState):

@@ -320,6 +320,8 @@ class Fleet:
         come again are known, so that an update that was stopped is simply called again.
         """
         check_jobs(n_jobs)
+        if not isinstance(records, Mapping):
+            raise ValueError(f"records are {records!r:.100}; expected a mapping of the names of bridges to new records")
         unknown = [name for name in records if name not in self._outcomes]
         if unknown:
             raise ValueError(
@@ -365,7 +367,7 @@ class Fleet:
         TimeoutError
             If another process works on the same folder.
         """
-        if bridge not in self.monitors:
+        if not isinstance(bridge, Hashable) or bridge not in self.monitors:
             raise ValueError(
                 f"{bridge!r:.100} is no bridge with a monitor; expected one of {list(self.monitors)!r:.200}"
             )

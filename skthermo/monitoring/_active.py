@@ -341,12 +341,15 @@ class ActiveDetector(SavesFrames):
                 causes.append("the detector gives no damage index")
         return causes
 
-    def reasons(self, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str]) -> list[str]:
-        """Why records from a position on are not evaluated, and what else is worth saying of them, beside their
-        marks."""
+    def reasons(
+        self, records: pd.DataFrame, first: int, index: Array, marks: Sequence[str], outside: NDArray[np.bool_]
+    ) -> list[str]:
+        """Why records from a position on are not evaluated, and what else is worth saying of them, beside their marks.
+
+        ``outside`` says which of them are extrapolated.
+        """
         unknown = np.flatnonzero(np.isnan(index))
         causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
-        outside = self.extrapolated(records.iloc[first:])
         phrases = (
             [causes.get(n, ""), mark, "extrapolated: temperatures outside those of the baseline" if far else ""]
             for n, (mark, far) in enumerate(zip(marks, outside, strict=True))
@@ -358,13 +361,12 @@ class ActiveDetector(SavesFrames):
         """Fall of all responses below which a record that raises no alarm says too little; NaN if there is none."""
         return max(BLIND * self.smallest.common, LEAST_BLIND)
 
-    def is_blind(self, records: pd.DataFrame, first: int) -> NDArray[np.bool_]:
+    def is_blind(self, records: pd.DataFrame, first: int, outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which records from a position on are in weather in which the detector would not see even a large fall."""
-        blind, share = self.extrapolated(records.iloc[first:]), self.most_unseen
-        if np.isnan(self.smallest.common) or not blind.any():
-            return np.zeros(len(blind), dtype=bool)
-        fallen = lowered(records, {name: share * records[name] for name in self.targets})
-        return blind & (self.index(fallen, first) <= self.threshold)
+        if not outside.any() or np.isnan(self.smallest.common):
+            return np.zeros(len(outside), dtype=bool)
+        fallen = lowered(records, {name: self.most_unseen * records[name] for name in self.targets})
+        return outside & (self.index(fallen, first) <= self.threshold)
 
     def extrapolated(self, records: pd.DataFrame) -> NDArray[np.bool_]:
         """Which records have a temperature outside those of the baseline, by more than a twentieth of their range."""

@@ -96,6 +96,8 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     ValueError: path is 'bridge.pkl'; expected a file that ends with .joblib or .skops
     """
     file = _checked(path)
+    if not file.is_file():
+        raise FileNotFoundError(f"there is no file {str(file)!r}; expected one that Monitor.save has written")
     content = file.read_bytes()
     if file.suffix == ".skops":
         import_optional("skops.io", extra="drop-ins")

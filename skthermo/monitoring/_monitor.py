@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
@@ -14,7 +14,7 @@ import pandas as pd
 from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_flag, robust_deviation
+from skthermo._tables.arrays import check_flag, is_real, robust_deviation
 from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, positions_of
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted, probability_text
@@ -36,7 +36,7 @@ from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement, event_ta
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._records import RecordStore, read_records
+from skthermo.monitoring._records import OF_TRAINING, RecordStore, read_records
 from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring._status import MonitorStatus, facts_of
@@ -286,6 +286,8 @@ class Monitor(SavesFrames, Estimator):
         """
         max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
         max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
+        if max_jump is not None and not max_jump:
+            raise ValueError(f"max_jump is {self.max_jump!r}; expected longer than zero, such as '28D'")
         if retention < max_delay + 2 * DAY:
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
@@ -479,7 +481,7 @@ class Monitor(SavesFrames, Estimator):
         since : str or Timestamp, optional
             Only events that are open, or have ended since then; by default all.
         tail_shape : float, optional
-            Shape of the generalised Pareto tail of squared peaks, such as that of other bridges
+            Shape of the generalised Pareto tail of squared peaks, from 0 to less than 1, such as that of other bridges
             (`~skthermo.fleet.Fleet.discoveries`); 0 is an exponential tail. By default the baseline decides whether
             that is heavy enough.
 
@@ -498,6 +500,8 @@ class Monitor(SavesFrames, Estimator):
         event began was given its threshold, and allows for their number, however small.
         """
         check_is_fitted(self)
+        if tail_shape is not None and not (is_real(tail_shape) and 0 <= tail_shape < 1):
+            raise ValueError(f"tail_shape is {tail_shape!r:.100}; expected a number from 0 to less than 1, or None")
         events = self.events_[self.events_["kind"] == DAMAGE]
         if since is not None:
             begin = check_stamp(since, self.baseline_.index, "since")
@@ -576,7 +580,8 @@ class Monitor(SavesFrames, Estimator):
         ``max_jump``, and, while all records since the baseline are kept, for any time.
         """
         check_is_fitted(self)
-        first, last = (check_stamp(one, self.baseline_.index, name) for one, name in ((start, "start"), (end, "end")))
+        stamps = self.baseline_.index
+        first, last = check_stamp(start, stamps, "start"), None if end is None else check_stamp(end, stamps, "end")
         self.status_, number = self.status_.without(self.active_, first, last)
         return number
 
@@ -619,6 +624,7 @@ class Monitor(SavesFrames, Estimator):
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
             records = self.active_.corrections.cleaned(records)
+            _refuse_meaningless(records, self.targets_, self.units_, but=OF_TRAINING)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -898,16 +904,23 @@ class Monitor(SavesFrames, Estimator):
         return {name: of_targets if name in self.targets_ else "°C" for name in columns} | given
 
 
-def _refuse_meaningless(baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str]) -> None:
-    """Raise an error that lists all that makes a baseline useless: gross errors, and responses of another size."""
+def _refuse_meaningless(
+    baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], but: Collection[str] = ()
+) -> None:
+    """Raise an error that lists all that makes records useless for training: gross errors, responses of another size.
+
+    ``but`` are kinds of gross errors that do no harm.
+    """
     F, T = baseline[targets], baseline.drop(columns=targets)
     unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
     wrong = []
     try:
-        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless()
+        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless(but=but)
     except ValueError as error:
         wrong.append(str(error))
     values = F.to_numpy()
+    if not len(values):
+        return
     level, deviation = np.nanmedian(values, axis=0), robust_deviation(values)
     limit = np.where(deviation > 0, np.maximum(TIMES_DEVIATION * deviation, TIMES_LEVEL * np.abs(level)), np.inf)
     far = np.abs(values - level) > limit

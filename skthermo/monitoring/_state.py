@@ -137,7 +137,8 @@ class MonitorState(SavesFrames):
         new = n_memory + len(known)
         index = np.append(known["index"].to_numpy(), active.index(records, new))
         index, is_contested = _by_rivals(index, seen, active, records, n_memory)
-        is_blind = active.is_blind(records, n_memory) & ~seen.is_held
+        outside = active.extrapolated(records.iloc[n_memory:])
+        is_blind = active.is_blind(records, n_memory, outside) & ~seen.is_held
         is_doubtful = seen.is_held | is_contested
         series = active.by_kind(records, n_memory, _not_closing(index, is_doubtful, active))
         times = raw.index.asi8
@@ -157,7 +158,7 @@ class MonitorState(SavesFrames):
             )
             for kind, number in found.items():
                 numbers[kind][own] = number
-        reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :])
+        reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :], outside[len(known) :])
         reasons = known["reason"].tolist() + reasons
         before = self.evaluations["state"].iloc[: self.evaluations.index.searchsorted(begin.day)]
         pending = _pending(
@@ -394,15 +395,20 @@ def _days_of(answers: pd.DataFrame, n_left_out: NDArray[np.int64]) -> pd.DataFra
     ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``n_left_out`` values; ``index_median`` and ``index_max``,
     NaN where there is none.
     """
-    flags = {"known": answers["state"] != "not evaluated", "alarm": answers["state"] == "alarm", "out": n_left_out}
-    by_day = answers.assign(**flags).groupby(answers.index.normalize().rename("day"))
-    return pd.DataFrame(
-        {
-            "n_records": by_day.size(),
-            "n_evaluated": by_day["known"].sum().astype("int64"),
-            "n_alarms": by_day["alarm"].sum().astype("int64"),
-            "n_left_out": by_day["out"].sum().astype("int64"),
-            "index_median": by_day["index"].median(),
-            "index_max": by_day["index"].max(),
-        }
-    )
+    days = answers.index.normalize().rename("day")
+    begins = np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[:1] - 1))
+    state, index = (answers[name].to_numpy() for name in ("state", "index"))
+    known = [one[~np.isnan(one)] for one in np.split(index, begins[1:])] if len(begins) else []
+
+    def total(values: Array | NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.add.reduceat(values.astype(np.int64), begins) if len(begins) else np.zeros(0, dtype=np.int64)
+
+    table = {
+        "n_records": total(np.ones(len(state))),
+        "n_evaluated": total(state != "not evaluated"),
+        "n_alarms": total(state == "alarm"),
+        "n_left_out": total(n_left_out),
+        "index_median": np.array([np.median(one) if len(one) else np.nan for one in known], dtype=float),
+        "index_max": np.array([one.max() if len(one) else np.nan for one in known], dtype=float),
+    }
+    return pd.DataFrame(table, days[begins])

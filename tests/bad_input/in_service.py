@@ -1,19 +1,54 @@
 """Monitoring and fleets: valid calls, with bad values of their arguments."""
 
-from sklearn.linear_model import Ridge
+import copy
+
+from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
-from skthermo import monitoring
+from skthermo import fleet, monitoring
+from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from tests.bad_input.examples import BOTH, CHAIN, MODES, F, T
-from tests.bad_input.registry import NOT_CALLED, use
-from tests.bad_input.values import bad, durations, flag, frequencies, instead, names, number, weather
+from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, UNTRIED, method, use
+from tests.bad_input.values import (
+    NAN,
+    bad,
+    choice,
+    count,
+    durations,
+    flag,
+    frequencies,
+    instead,
+    jobs,
+    names,
+    number,
+    vector,
+    weather,
+)
 
 DETECTOR = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES), MahalanobisDetector())
+SERVICE = make_truss_campaign(2, samples_per_year=120, damage={"bottom": 0.3}, damage_from="2025-06-10", random_state=0)
+NEW = SERVICE.temperatures.join(SERVICE.frequencies)[120:]
+MONITOR = monitoring.Monitor(DETECTOR, watch_per_year=12, sensors=False).fit(BOTH)
+SERVED = copy.deepcopy(MONITOR)
+SERVED.update(NEW)
+SERVED.save(FOLDER / "monitor.joblib")
+MOMENT = bad("soon", True, NAN, [], b"2026", str, "2026-01-01T00:00+01:00", 1j)
 
 
 def monitored(X, **values):
     return monitoring.Monitor(**values).fit(X).update(X[:0])
+
+
+def served(name, result=lambda monitor: monitor.evaluations_):
+    """A method of a copy of the monitor in service, and what it has changed."""
+
+    def call(**values):
+        monitor = copy.deepcopy(SERVED)
+        given = getattr(monitor, name)(**values)
+        return result(monitor) if given is None else given
+
+    return f"monitoring.Monitor.{name}", call
 
 
 use(
@@ -22,14 +57,59 @@ use(
     usual="random_state",
     detector=(DETECTOR, instead(DETECTOR.fit)),
     targets=(MODES, names(MODES, "None")),
-    max_delay=("7D", durations("zero")),
-    retention=("400D", durations()),
+    reference=(["T2"], names(["T2"], "None", "empty")),
+    fem=(None, {cause: value for cause, value in instead().items() if cause != "None"}),
     false_alarms_per_year=(1.0, number(0, -1)),
+    watch_per_year=(12.0, number(0, -1, 1.0, but=("None",))),
     persistence=(3, number(0, -1, 1.5)),
-    direction=("both", bad("up", 3, None, True)),
+    direction=("both", choice()),
+    max_delay=("7D", durations("zero")),
+    max_jump=("28D", durations("None")),
+    retention=("400D", durations()),
     sensors=(True, flag()),
+    units=("Hz", bad(3, True, ["Hz"], {"f1": 3}, {"no such name": "Hz"}, b"Hz", str)),
+    lookback=("1D", durations("None")),
     X=(BOTH, frequencies(BOTH, in_hertz=False, fixed=False, rows=False, fitting=True)),
 )
+use(
+    "monitoring.Monitor.update",
+    lambda new, confirm: copy.deepcopy(MONITOR).update(new, confirm=confirm),
+    new=(NEW[:40], frequencies(NEW[:40], in_hertz=False, rows=False, but=("no rows",))),
+    confirm=(False, flag()),
+)
+method("monitoring.Monitor.status", SERVED, now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
+method("monitoring.Monitor.transitions", SERVED, after=(1, number(-1, 1.5, 10**6)))
+method("monitoring.Monitor.years_watched", SERVED, since=("2025-06-10", MOMENT))
+method(
+    "monitoring.Monitor.event_p_values",
+    SERVED,
+    since=("2025-06-10", MOMENT),
+    tail_shape=(0.1, number(-1, 1, 2, but=("None",))),
+)
+use(
+    *served("acknowledge", lambda monitor: monitor.events_),
+    event=(1, number(0, -1, 1.5, 1000)),
+    harmless=(True, flag()),
+    note=("a special transport", bad(3, None, True, b"a", ["a"], str)),
+)
+use(*served("discard"), start=("2025-06-10", {**MOMENT, "None": None}), end=("2025-08-28", MOMENT))
+use(
+    *served("refit", lambda monitor: monitor.threshold_),
+    records=(NEW[:50], frequencies(NEW[:50], in_hertz=False, rows=False)),
+    until=("2025-06-01", MOMENT),
+    force=(False, flag()),
+)
+use(*served("rebaseline"), since=("2025-06-10", {**MOMENT, "None": None}), until=("2025-08-20", MOMENT))
+PATHS = bad(
+    "no such folder/monitor.joblib", "monitor.txt", "monitor", 3, None, True, b"monitor.joblib", ["a.joblib"], str
+)
+method("monitoring.Monitor.save", SERVED, path=(FOLDER / "saved.joblib", PATHS))
+use(
+    "monitoring.load_monitor",
+    lambda path: monitoring.load_monitor(path).summary(),
+    path=(FOLDER / "monitor.joblib", PATHS),
+)
+HISTORY = monitoring.track_parameters(CHAIN, T, F, ["top"], random_state=0)
 use(
     "monitoring.track_parameters",
     lambda **a: monitoring.track_parameters(**a).rates,
@@ -41,8 +121,99 @@ use(
     freq=("1D", durations("half", "negative number")),
     significance=(0.01, number(0, 1, -0.1)),
 )
+method("monitoring.ParameterHistory.reaches", HISTORY, limit=(-0.1, number(0, -1, -1.5)))
+method("monitoring.ParameterHistory.remove_drift", HISTORY, F=(F, frequencies(F, rows=False)))
 NOT_CALLED |= {
     "monitoring.MonitorStatus": "made by a monitor's status",
     "monitoring.ParameterHistory": "made by track_parameters",
     "monitoring.Retraining": "made by a monitor's refit",
+}
+
+MAKERS = dict.fromkeys("ab", LinearRegression())
+RECORDS = {"a": (T, F), "b": (T, F * 1.01)}
+
+
+def watch(chain):
+    """A monitor of a bridge; whatever its chain is."""
+    return monitoring.Monitor(DETECTOR, sensors=False)
+
+
+def tables(given):
+    """What became of each bridge."""
+    return [given.table.drop(columns=["seconds", "megabytes"]), given.errors]
+
+
+WATCHED = fleet.fit_fleet(MAKERS, RECORDS, monitor=watch, folder=FOLDER / "fleet")
+WATCHED.update({"a": NEW})
+MAPPING = bad(3, None, True, "a", ["a"], {"no such name": 3}, str)
+use(
+    "fleet.fit_fleet",
+    lambda **a: tables(fleet.fit_fleet(**a)),
+    usual="random_state",
+    makers=(MAKERS, MAPPING),
+    records=(RECORDS, MAPPING),
+    monitor=(watch, bad(3, True, "watch", [watch], MONITOR)),
+    folder=(FOLDER / "another fleet", bad(3, True, ["a"], b"a", str)),
+    n_jobs=(1, jobs()),
+    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
+)
+use(
+    "fleet.Fleet",
+    lambda folder: tables(fleet.Fleet(folder)),
+    folder=(FOLDER / "fleet", bad("nowhere", 3, None, True, ["a"], b"a", str)),
+)
+method("fleet.Fleet.status", WATCHED, now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
+method(
+    "fleet.Fleet.update",
+    WATCHED,
+    records=({}, MAPPING),
+    n_jobs=(1, jobs()),
+    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
+)
+use(
+    "fleet.Fleet.discoveries",
+    lambda **a: WATCHED.discoveries(**a).summary(),
+    fdr=(0.1, number(0, 1, -0.1, 2)),
+    days=(365.25, number(0, -1)),
+)
+use(
+    "fleet.Fleet.acknowledge",
+    WATCHED.acknowledge,
+    bridge=("a", bad("no such name", 3, None, ["a"], True)),
+    event=(1, number(0, -1, 1.5, 1000)),
+    harmless=(True, flag()),
+    note=("", bad(3, None)),
+)
+SEVERAL = {name: (T, F * (1 + 0.01 * n)) for n, name in enumerate("abcd")}
+PRIOR = fleet.FleetPrior().fit(SEVERAL)
+use(
+    "fleet.FleetPrior",
+    lambda X, **a: fleet.FleetPrior(**a).fit(X).summary(),
+    n_knots=(4, count("zero", 1000)),
+    families=(None, bad(3, True, "a", ["a"], {"no such name": 3}, str)),
+    link=("log", choice()),
+    X=(SEVERAL, MAPPING),
+)
+method("fleet.FleetPrior.effects", PRIOR, temperatures=([0.0, 10.0], vector([0.0, 10.0], positive=False)))
+use(
+    "fleet.FleetMapper",
+    lambda X, y, **a: fleet.FleetMapper(**a).fit(X, y).predict(X),
+    prior=(PRIOR, bad(3, True, "a", str)),
+    link=("log", choice("None")),
+    X=(T, weather(T, rows=True, fixed=False, fitting=True)),
+    y=(F, frequencies(F, rows=True, fixed=False)),
+)
+MAPPER = fleet.FleetMapper(PRIOR).fit(T, F)
+method("fleet.FleetMapper.predict", MAPPER, X=(T, weather(T, rows=False)), return_std=(False, flag()))
+method("fleet.FleetMapper.predict_covariance", MAPPER, X=(T, weather(T, rows=False)))
+method("fleet.FleetMapper.from_fleet", MAPPER, X=(T, weather(T, rows=False)))
+UNTRIED |= {"fleet.FleetMapper": {"covariates", "families"}}
+LEGAL |= {
+    "lookback": {("zero", "monitoring.Monitor"): "the detector looks at single records"},
+    "max_age": {("zero", f"{owner}.status"): "any age is too old" for owner in ("monitoring.Monitor", "fleet.Fleet")},
+    "new": {
+        (cause, "monitoring.Monitor.update"): "left out, with its reason in the row and in the counts"
+        for cause in ("1e308 inside", "a slipped point")
+    },
+    "records": {("no rows", "monitoring.Monitor.refit"): "the answer says that nothing may train"},
 }

@@ -15,7 +15,8 @@ standard deviations in .1 and .5 % of the values, and twice as much noise in win
 ``HampelFilter()`` on what a linear regression leaves of them.
 
 ``persistence`` 3 is the default of ``Monitor``, 1 means alarms of single records; both by the same fitted detector. The
-first year of the first monitor is evaluated by ``Monitor.update``, too, which has to open the same events. The exit
+first year of the first monitor is evaluated by ``Monitor.update``, too, which has to open the same events. ``watches``
+are events a year of the lower level, of which 12 were asked for (``watch_per_year``). The exit
 code is 1 if a mean over the structures is not .5 to 1.5 events a year with a raw baseline and persistence 3.
 """
 
@@ -42,6 +43,7 @@ LAWS = ("iid", "ar .5", "ar .9", "t3", "outliers .1 %", "outliers .5 %", "winter
 YEARS, YEAR, N_DAYS, STARTS = 3, 365, 180, (20, 200)
 SEVERITIES, PERSISTENCE = (0.05, 0.10, 0.20), (1, 3)
 LEAST, MOST = 0.5, 1.5
+WATCHES = 12.0  # events a year of the lower level
 STAMPS = pd.date_range("2021-01-01", periods=(1 + YEARS) * YEAR)
 
 
@@ -119,7 +121,9 @@ def rows_of(name, law, is_cleaned, seed, also_by_update):
             first = events["start"][events["start"] < STAMPS[2 * YEAR]]
             assert monitor.events_.query("kind == 'damage'")["start"].tolist() == first.tolist()
         row = {"structure": name, "law": law, "cleaned": is_cleaned, "persistence": persistence}
-        row |= {"events": len(events) / YEARS, "threshold": rule.threshold}
+        watch = estimate_false_alarms(monitor.active_.baseline_index, WATCHES, persistence=persistence).rule
+        watches = find_events(index[0.0].to_numpy(), index[0.0].index, watch)
+        row |= {"events": len(events) / YEARS, "watches": len(watches) / YEARS, "threshold": rule.threshold}
         for severity in SEVERITIES:
             days = []
             for start in STARTS:
@@ -155,7 +159,12 @@ def main():
     by = ["persistence", "cleaned", "law"]
     days = {column: (column, median) for column in table if column.startswith("days")}
     summary = table.groupby(by, sort=False).agg(
-        events=("events", "mean"), error=("events", "sem"), threshold=("threshold", "mean"), **days
+        events=("events", "mean"),
+        error=("events", "sem"),
+        watches=("watches", "mean"),
+        watches_error=("watches", "sem"),
+        threshold=("threshold", "mean"),
+        **days,
     )
     by_structure = table.pivot_table(index=by, columns="structure", values="events", sort=False)
     print(f"days: median to the first event within {N_DAYS} days; columns of structures: events a year")

@@ -37,6 +37,7 @@ def mirrored(entries, dofs, in_order):
     """A dense matrix from a mapping of row and column to value, of which a half or all is given."""
     if not 0 < len(dofs) <= MOST_ROWS:
         raise ValueError(f"{len(dofs)} rows")
+    entries = {place: value for place, value in entries.items() if value != 0}
     below = sum(i > j for i, j in entries)
     above = sum(i < j for i, j in entries)
     paired = sum(i != j and (j, i) in entries for i, j in entries)

@@ -85,6 +85,8 @@ def steady_changes(
     basis: FleetBasis, temperatures: ArrayLike, reference: float | None, reach: TrainingRange
 ) -> tuple[Array, Array]:
     """Temperatures, and the functions there less those at a reference, by default the middle of some weather."""
-    values = np.ravel(real_array(temperatures, "temperatures"))
+    values = np.atleast_1d(real_array(temperatures, "temperatures"))
+    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        raise ValueError(f"temperatures are {temperatures!r:.100}; expected finite degrees Celsius in one row")
     middle = float(np.mean([reach.lowest, reach.highest])) if reference is None else float(reference)
     return values, basis.steady(values) - basis.steady(np.array([middle]))

@@ -29,7 +29,7 @@ class FleetPrior(Estimator):
     ----------
     n_knots : int, default=4
         Knots of each of the largest principal components of the inputs, at quantiles of the weather of all bridges, at
-        which lines break.
+        which lines break; at most 100.
     families : mapping, optional
         Family of each parameter (or mode) by name, or of each bridge's name such a mapping. What belongs to one family
         responds to the weather alike; None as a family is never pooled. By default each name is a family of its own.
@@ -110,7 +110,7 @@ class FleetPrior(Estimator):
     """
 
     _parameter_constraints: dict = {
-        "n_knots": [Interval(Integral, 1, None, closed="left")],
+        "n_knots": [Interval(Integral, 1, 100, closed="both")],
         "families": [Mapping, None],
         "link": [str, Mapping],
     }

@@ -14,6 +14,8 @@ from skthermo._effects import ALL_GROUPS
 from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
+from skthermo.monitoring._records import OF_TRAINING
+from skthermo.preprocessing import gross_errors
 
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
@@ -216,13 +218,14 @@ class ParameterHistory:
         Raises
         ------
         ValueError
-            If F is no frame with times, or has other modes.
+            If F is no frame with times, or has other modes; if values are no frequencies, all of which it lists.
         """
-        if not has_stamps(F) or list(F.columns) != list(self.shifts.columns):
+        if not has_stamps(F) or list(getattr(F, "columns", [])) != list(self.shifts.columns):
             raise ValueError(
                 f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
+        gross_errors(frequencies=F).refuse_meaningless(but=OF_TRAINING)
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
         return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
 

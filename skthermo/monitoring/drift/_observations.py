@@ -17,6 +17,7 @@ from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, refuse_no_table, spread_evenly
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._validation import check_is_fitted
+from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
@@ -199,9 +200,11 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
             raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
     refuse_no_table(T, "T")
     refuse_no_table(F, "F")
+    if T.shape[1] != fem.n_features_in_:
+        raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but=OF_TRAINING)
 
 
 def length_of(freq: str) -> float:

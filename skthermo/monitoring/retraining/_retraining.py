@@ -232,8 +232,7 @@ def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
 
 
 def _until(records: pd.DataFrame, until: Any) -> pd.DataFrame:
-    last = check_stamp(until, records.index, "until")
-    return records if last is None else records[records.index <= last]
+    return records if until is None else records[records.index <= check_stamp(until, records.index, "until")]
 
 
 def _too_few(records: pd.DataFrame) -> str:
