@@ -1,4 +1,4 @@
-"""Files that may be damaged: SciPy reads them in a child process, with limits of memory and time.
+"""Files that may be damaged: a child process reads them, with limits of memory and time.
 
 SciPy's readers follow the lengths that a file states; where these are damaged they can end the interpreter, or take
 all memory."""

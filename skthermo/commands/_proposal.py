@@ -277,6 +277,7 @@ def _fem() -> str:
         ),
         "# [fem]",
         '# model = "model.py:make_model"',
+        "# random_state = 0",
     ]
     return "\n".join(lines)
 

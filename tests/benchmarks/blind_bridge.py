@@ -418,7 +418,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     bridge = Bridge(options.seed)
-    years = {(d, c): bridge.evaluations(damage, c) for d, damage in DAMAGES.items() for c in CONDITIONS}
+    years = {(d, c): bridge.evaluated(damage, c) for d, damage in DAMAGES.items() for c in CONDITIONS}
     nominal = footbridge().assemble(GROUPS, n_modes=len(MODES)).frequencies([[1.0] * len(GROUPS)])[0]
     print(f"Cable-stayed footbridge, modes at {nominal.round(2)} Hz; {bridge.n} records to train, {ASKED:.0%} asked")
     found = {}

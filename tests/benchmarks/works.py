@@ -16,6 +16,7 @@ import tempfile
 import time
 import warnings
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ import pandas as pd
 import scipy.io
 import scipy.signal  # which the library loads once it is used
 import scipy.sparse.linalg
+from blind_bridge import GROUPS, MODES, SENSORS, Bridge, footbridge, lagged
 from bridges import frame_bridge
 from joblib.externals.loky import get_reusable_executor
 from sklearn.impute import KNNImputer
@@ -46,6 +48,7 @@ DATA = Path(os.environ["SKTHERMO_DATA"]) if "SKTHERMO_DATA" in os.environ else N
 BOUNDS = 0.3
 EXACT = 1e-9  # largest relative difference of full solves
 REDUCED = 1e-7  # a hundredth of the default tolerance of reduced models
+NEARLY = 2e-3  # a few decisions in a thousand, which surfaces may turn
 NOT_COMPARED = np.inf
 
 
@@ -410,7 +413,35 @@ def detectability(clock, quick):
     study = DetectabilityStudy(fem, detectors, scenarios, n_repeats=5, uncertainty=uncertainty, random_state=0)
     with clock.work():
         table = study.run(year.temperatures, year.frequencies)
-    clock.keep(1e-6, rates=1 + table["rate"])
+    clock.keep(NEARLY, rates=1 + table["rate"])
+
+
+def truss_study(clock, quick):
+    """A study of the truss by default: one detector, 16 scenarios, 20 repeats."""
+    fem, _, later = truss_years()
+    scenarios = sweep(fem, (0.05, 0.1, 0.15, 0.2, 0.3), groups=["bottom", "top", "diagonal"])
+    study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=20, random_state=0)
+    with clock.work():
+        table = study.run(later.temperatures)
+    clock.keep(NEARLY, rates=1 + table["rate"])
+
+
+def footbridge_study(clock, quick, uncertainty=None):
+    """A study of the footbridge of ``blind_bridge.py`` by default: seven states, 4380 records, two detectors."""
+    bridge = Bridge(0)
+    records, later = bridge.training(True), bridge.T[bridge.n :]
+    model = footbridge(pylon=1.1).assemble(GROUPS, n_modes=len(MODES), track=True)
+    fem = DataInformedFEM(model, random_state=0).fit(records[SENSORS], records[MODES])
+    damages = [("side span", 0.06), ("side span", 0.12), ("main stays", 0.03), ("main stays", 0.06)]
+    scenarios = [{}, *({group: s} for group, s in [*damages, ("bearings", 0.1), ("pylon", 0.15)])]
+    compensator = TemperatureCompensator(lagged(TemperatureMapper()), targets=MODES)
+    lasts = {"single": MahalanobisDetector(), "day": WindowedAlarm("1D")}
+    detectors = {name: make_pipeline(compensator, last) for name, last in lasts.items()}
+    options = {} if uncertainty is None else {"uncertainty": uncertainty}
+    study = DetectabilityStudy(fem, detectors, scenarios[:3] if quick else scenarios, random_state=0, **options)
+    with clock.work():
+        table = study.run(later)
+    clock.keep(NOT_COMPARED, error=(table["pi_high"] - table["pi_low"]).mean())
 
 
 def many_detectors(clock, quick):
@@ -544,6 +575,9 @@ WORKS = {
     "identify": identified,
     "study": detectability,
     "study-of-eight": many_detectors,
+    "study-truss": truss_study,
+    "study-footbridge": footbridge_study,
+    "study-footbridge-all": partial(footbridge_study, uncertainty="all"),
     "monitor-fit": monitor_fit,
     "monitor-update": monitor_update,
     "monitor-later": monitor_update_later,

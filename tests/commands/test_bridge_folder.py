@@ -300,5 +300,20 @@ def test_check_and_init_say_what_they_found(records, tmp_path):
     assert (missing.code, len(valid(missing.json)["errors"])) == (FAILED, 1)
 
 
+@pytest.mark.nightly
+def test_an_fe_model_of_a_python_file_follows_drift(bridge, records):
+    (bridge / "model.py").write_text(
+        "from skthermo.datasets import make_truss\n\n\ndef make_model():\n    return make_truss()\n"
+    )
+    text = settings(bridge).read_text()
+    named = '[fem]\nmodel = "model.py:make_model"\nrandom_state = 0'
+    settings(bridge).write_text(text.replace('# [fem]\n# model = "model.py:make_model"\n# random_state = 0', named))
+    assert run("fit", settings(bridge), "--replace").code == 0
+    assert load_monitor(bridge / "monitor.joblib").drift_ is not None
+    edit(settings(bridge), "make_model", "make_modl")
+    failed = run("fit", settings(bridge), "--replace")
+    assert (failed.code, "make_modl" in failed.err) == (FAILED, True)
+
+
 def test_numbers_are_read_to_the_last_bit(bridge, records):
     assert np.array_equal(load_monitor(bridge / "monitor.joblib").baseline_, records[:FIRST])

@@ -11,6 +11,7 @@ from sklearn.base import clone
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
+from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
 from skthermo.studies.replicates import PARTS, Replicates
@@ -219,7 +220,9 @@ def test_bands_of_a_study(study):
     assert curve.a90_band[0] < curve.a90_band[1]
     told = study.summary()
     assert "Bands of 95% hold noise, the weather, the training records and the model." in told
-    assert "A measured campaign of 'bottom 10 %' should show" in told
+    damaged = study.results_.set_index("scenario").drop("healthy")
+    widest = (damaged["pi_high"] - damaged["pi_low"]).idxmax()
+    assert f"A measured campaign of {widest!r} should show" in told
 
 
 def test_models_that_cannot_be_drawn(monkeypatch, fem):
@@ -237,11 +240,11 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"uncertainty": ["noise", "wind"]}, "uncertainty is .*; expected 'all', or some of"),
+        ({"uncertainty": ["noise", "wind"]}, "uncertainty is .*; expected 'auto', 'all', or some of"),
         ({"n_replicates": 1}, "n_replicates is 1; expected at least 2"),
         ({"models": []}, "models is .*; expected a list of FE models"),
         ({"models": [make_truss(n_modes=4)]}, "model 0 of models is .* and 4 modes; expected the chain's"),
-        ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, or 'all'"),
+        ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, 'auto' or 'all'"),
     ],
 )
 def test_wrong_worlds_are_refused(fem, options, message):
@@ -315,3 +318,25 @@ def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
     assert refitted.model is MODELS[0]
     bottom = refitted.parameters_["bottom"] / plain.parameters_["bottom"]
     np.testing.assert_allclose(bottom.median(), 1 / 1.03, rtol=3e-3)
+
+
+def test_by_default_all_but_the_model_varies(fem):
+    assert Replicates.of(fem, "auto", WEATHER, None, 2, [1, 2]).parts == ["weather", "baseline"]
+    assert Replicates.of(fem, "auto", WEATHER, MODELS, 2, [1, 2]).parts == ["weather", "baseline", "model"]
+    assert Replicates.of(fem, "auto", WEATHER, None, 2, [1, 2]).with_noise
+
+
+def test_the_noise_of_replicates_is_as_uncertain_as_that_of_so_many_records(fem):
+    random = np.random.default_rng(0)
+    n_records, deviations = 400, []
+    for _ in range(40):
+        values = random.standard_normal((n_records, 3)) * [1e-3, 2e-3, 5e-3]
+        weather = random.normal(size=(n_records, 2))
+        residuals = BaselineResiduals(weather, values, values, np.zeros(n_records, dtype=int))
+        deviations.append(residuals.level_errors)
+    assert np.mean(deviations) == pytest.approx(1 / np.sqrt(2 * n_records), rel=0.15)
+    replicates = Replicates.of(fem, ("baseline",), WEATHER, None, 400, [1, 2])
+    levels = np.log([replicates.noise_levels(number) for number in range(400)])
+    np.testing.assert_allclose(levels.std(axis=0), fem.residuals().level_errors, rtol=0.15)
+    assert np.abs(levels.mean(axis=0)).max() < 4 * levels.std() / np.sqrt(400)
+    np.testing.assert_array_equal(np.exp(levels[3]), replicates.noise_levels(3))

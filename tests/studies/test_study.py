@@ -359,3 +359,42 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
     np.testing.assert_array_equal(gaps[:, 0], gaps[:, 1])
     assert gaps.any()
     assert (gaps[0] != gaps[1]).any()
+
+
+def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
+    scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
+    for tol in (0.2, 0.02, 0.012, 0.001):
+        options = {"uncertainty": "weather", "n_replicates": 2}
+        study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
+        results = study.run(WEATHER)
+        (number,) = results["n_repeats"].unique()
+        numbers.append(number)
+        assert number == 20 or (results["ci_high"] - results["ci_low"]).max() / 2 < 1.15 * tol
+        fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER)
+        pd.testing.assert_frame_equal(results, fixed)
+    assert numbers == sorted(numbers)
+    assert (numbers[0], numbers[-1]) == (3, 20)
+    assert study_of(fem, MahalanobisDetector(), [{}], n_repeats="auto").run(WEATHER)["n_repeats"].item() == 20
+    with pytest.raises(ValueError, match="n_repeats"):
+        study_of(fem, MahalanobisDetector(), scenarios, n_repeats="many").run(WEATHER)
+    with pytest.raises(ValueError, match="tol"):
+        study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=0.0).run(WEATHER)
+
+
+def test_the_time_is_estimated_before_the_work(fem, capsys):
+    study_of(fem, MahalanobisDetector(), [{}], uncertainty="auto", n_replicates=2, verbose=1).run(WEATHER[:100])
+    lines = capsys.readouterr().out.splitlines()
+    (place,) = [number for number, line in enumerate(lines) if "more repeats take about" in line]
+    assert "first repeat" in lines[place - 1]
+    assert "2 replicates about" in lines[place]
+
+
+@pytest.mark.parametrize("detector", [MahalanobisDetector(), OutlierDetector(IsolationForest()), WindowedAlarm(7)])
+def test_records_evaluated_together_have_the_decisions_of_each_alone(fem, detector, monkeypatch):
+    study = study_of(fem, compensated(detector), sweep(fem, (0.1, 0.2), ["bottom", "top"]))
+    together = study.run(WEATHER)
+    decisions = study.decisions_
+    monkeypatch.setattr("skthermo.studies.detectability._simulation.MOST_ROWS", 1)
+    pd.testing.assert_frame_equal(study.run(WEATHER), together)
+    for key, alone in study.decisions_.items():
+        np.testing.assert_allclose(decisions[key], alone, rtol=1e-5, atol=1e-6)

@@ -1,7 +1,7 @@
 """The detectors of a study: the columns that each sees, what it has learned, and the smallest damage that it finds."""
 
 import warnings
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pickle import PicklingError
@@ -16,6 +16,7 @@ from sklearn.pipeline import Pipeline
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts
+from skthermo.detection import DamageDetector
 from skthermo.studies.detectability._pod_curve import pod_curve
 from skthermo.surrogate import FittedChain
 
@@ -241,11 +242,27 @@ class Candidate:
         """What the last step sees of a table of the columns that the detector sees."""
         return self.detector[:-1].transform(table) if self.head else table
 
-    def decisions(self, entering: Table) -> Array:
-        """Decision function, NaN where there is none; float32 is as much as alarms and intervals need."""
-        return np.asarray(self.last.decision_function(entering), dtype=np.float32)
+    @property
+    def is_rowwise(self) -> bool:
+        """Whether the last step evaluates each record by itself, as a `DamageDetector` without ``lookback_`` does."""
+        return isinstance(self.last, DamageDetector) and self.memory == 1 and not hasattr(self.last, "lookback_")
 
-    def damage_index(self, entering: Table, rows: Table) -> pd.Series:
-        """Minus the detector's ``score_samples``, on the index of the records."""
-        index = rows.index if isinstance(rows, pd.DataFrame) else None
-        return pd.Series(-np.asarray(self.last.score_samples(entering), dtype=float), index, name="damage_index")
+    def decisions(self, entering: Sequence[Table]) -> list[Array]:
+        """Decision function of each of some tables, NaN where there is none; float32 is as much as alarms and intervals
+        need."""
+        return self._each(self.last.decision_function, entering, np.float32)
+
+    def damage_indices(self, entering: Sequence[Table], rows: Sequence[Table]) -> list[pd.Series]:
+        """Minus the detector's ``score_samples`` of each of some tables, on the index of their records."""
+        scores = self._each(self.last.score_samples, entering, float)
+        indices = [one.index if isinstance(one, pd.DataFrame) else None for one in rows]
+        return [pd.Series(-one, index, name="damage_index") for one, index in zip(scores, indices, strict=True)]
+
+    def _each(self, ask: Callable[[Table], Any], tables: Sequence[Table], dtype: Any) -> list[Array]:
+        """Answers for each table, asked at once where each record is evaluated by itself."""
+        if not self.is_rowwise or len(tables) < 2:
+            return [np.asarray(ask(table), dtype=dtype) for table in tables]
+        values = np.vstack([as_floats(table) for table in tables])
+        together = pd.DataFrame(values, columns=tables[0].columns) if hasattr(tables[0], "columns") else values
+        ends = np.cumsum([len(table) for table in tables])[:-1]
+        return np.split(np.asarray(ask(together), dtype=dtype), ends)

@@ -31,11 +31,10 @@ from skthermo.studies.detectability._simulation import (
     Simulation,
     clean_frequencies,
 )
-from skthermo.studies.replicates import Replicates
+from skthermo.studies.replicates import N_DRAWS, Replicates
 from skthermo.studies.scenarios import BaseScenario
 from skthermo.surrogate import FittedChain
 
-N_DRAWS = 3  # draws of the noise in each replicate, to separate its share from that of what else varies
 MOST_FAILURES = 0.5  # share of replicates that may fail
 SMALL = 0.1  # share of a variance that is not worth a word
 NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}

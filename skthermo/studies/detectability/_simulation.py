@@ -20,7 +20,7 @@ from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._intervals import rate_of
+from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.scenarios import BaseScenario
 from skthermo.surrogate import FittedChain
 
@@ -49,10 +49,13 @@ class EvaluatedRecords:
         order = order[times[order] >= start]
         return self.decisions[:, order], times[order] - start
 
+    def rate(self, confidence: float) -> Rate:
+        """Rate of alarms from the onset of the damage on, with its bounds."""
+        return rate_of(self.from_onset()[0], confidence, whole_repeats=self.scenario.n_draws > 1)
+
     def summary(self, confidence: float) -> dict[str, Any]:
         """Rates, bounds and time to detection, from the onset of the damage on."""
-        scenario, (decisions, waits) = self.scenario, self.from_onset()
-        rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
+        scenario, (decisions, waits), rate = self.scenario, self.from_onset(), self.rate(confidence)
         if not rate.n_records:
             raise ValueError(
                 f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
@@ -109,6 +112,18 @@ class Evaluation:
             errors |= one.errors
         return replace(self, errors=errors, **joined)
 
+    def n_repeats_for(self, tol: float, confidence: float, scenarios: Sequence[BaseScenario]) -> int:
+        """About how many repeats it takes until all bounds of simulated rates are so near to the rates."""
+        rates = [
+            one.rate(confidence)
+            for name in {name for name, *_ in self.decisions} - set(self.errors)
+            for one in self.records(name, scenarios)
+            if one.source == SIMULATED
+        ]
+        widths = [(rate.highest - rate.lowest) / 2 for rate in rates if rate.n_records]
+        n_repeats = len(next(iter(self.decisions.values())))
+        return int(np.ceil(n_repeats * (max(widths, default=0.0) / tol) ** 2))
+
     def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
         """Those of a detector, in the order of the scenarios."""
         return [
@@ -160,6 +175,7 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
 
 
 LARGEST_SEED = np.iinfo(np.int32).max
+MOST_ROWS = 20_000  # of records that are evaluated together
 YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
 
 
@@ -257,11 +273,13 @@ class Simulation:
         """The same without the detectors that failed."""
         return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
 
-    def other_repeats(self, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0) -> list[Evaluation]:
-        """Evaluate the records of later repeats; the warnings of the first are the only ones given."""
+    def repeats(
+        self, numbers: range, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
+    ) -> list[Evaluation]:
+        """Evaluate the records of some later repeats; the warnings of the first are the only ones given."""
         with without_warnings():
-            jobs = (delayed(self._one_repeat)(number, pair) for number, pair in enumerate(seeds) if number)
-            return run_jobs(jobs, len(seeds) - 1, unit="repeats", n_jobs=n_jobs, verbose=verbose)
+            jobs = (delayed(self._one_repeat)(number, seeds[number]) for number in numbers)
+            return run_jobs(jobs, len(numbers), unit="repeats", n_jobs=n_jobs, verbose=verbose)
 
     def _one_repeat(self, number: int, seeds: Sequence[int]) -> Evaluation:
         with without_warnings(), single_blas_thread():
@@ -319,28 +337,37 @@ class Simulation:
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
     ) -> Evaluation:
-        """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another."""
+        """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another.
+
+        Without indices, as in later repeats, whose warnings are not given, some are evaluated together.
+        """
         decisions, transitions, indices = {}, {}, {}
-        for one in records:
-            answers, errors = ask_each(self.candidates, partial(self._answer, one, with_indices), errors)
-            for name, (index, decided, during) in answers.items():
-                key = name, one.scenario.name, one.source
-                decisions[key] = decided[np.newaxis]
-                if during is not None:
-                    transitions[key] = during[np.newaxis]
-                if with_indices:
-                    indices[key] = index
+        for some in ([one] for one in records) if with_indices else _together(records):
+            answers, errors = ask_each(self.candidates, partial(self._answers, some, with_indices), errors)
+            for name, found in answers.items():
+                for one, (index, decided, during) in zip(some, found, strict=True):
+                    key = name, one.scenario.name, one.source
+                    decisions[key] = decided[np.newaxis]
+                    if during is not None:
+                        transitions[key] = during[np.newaxis]
+                    if with_indices:
+                        indices[key] = index
         return Evaluation(decisions, errors, transitions, indices=indices)
 
-    def _answer(self, records: Records, with_index: bool, name: str) -> tuple[Any, Array, Array | None]:
-        """Damage index, decisions and those of transitions of one detector."""
+    def _answers(self, records: Sequence[Records], with_indices: bool, name: str) -> list[tuple[Any, Array, Any]]:
+        """Damage index, decisions and those of transitions of one detector for each of some records."""
         candidate = self.candidates[name]
-        entering, memory, during = records.entering(candidate), candidate.memory, None
-        if memory > 1 and records.has_onsets:
+        entering, memory = [one.entering(candidate) for one in records], candidate.memory
+        during: list[Any] = [None] * len(records)
+        if memory > 1:
             with without_warnings():
-                during = transitions_of(candidate.decisions(records.beginning(memory).entering(candidate)), memory)
-        index = candidate.damage_index(entering, records.rows) if with_index else None
-        return index, candidate.decisions(entering), during
+                for number, one in enumerate(records):
+                    if one.has_onsets:
+                        seen = one.beginning(memory).entering(candidate)
+                        during[number] = transitions_of(candidate.decisions([seen])[0], memory)
+        rows = [one.rows for one in records]
+        found = candidate.damage_indices(entering, rows) if with_indices else during
+        return list(zip(found, candidate.decisions(entering), during, strict=True))
 
     def _calibrated(self, found: Evaluation, repeat: int, seeds: Sequence[int]) -> Evaluation:
         """The evaluation with decisions on healthy records with noise of other seeds."""
@@ -351,6 +378,18 @@ class Simulation:
         again = self.evaluate(self.records(healthy, repeat, others), found.errors)
         calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
         return replace(found, errors=again.errors, calibration=calibration)
+
+
+def _together(records: Iterable[Records]) -> Iterator[list[Records]]:
+    """Records that are evaluated together, of so many rows that memory is bounded."""
+    some: list[Records] = []
+    for one in records:
+        if some and sum(len(other.rows) for other in some) + len(one.rows) > MOST_ROWS:
+            yield some
+            some = []
+        some.append(one)
+    if some:
+        yield some
 
 
 def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
+from time import process_time
 from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from sklearn.exceptions import NotFittedError
 
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
-from skthermo._tables.arrays import as_random_state, check_jobs, positive_integer
+from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
@@ -33,6 +34,8 @@ from skthermo.studies.detectability._simulation import (
 from skthermo.studies.replicates import Replicates
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
+
+LEAST_REPEATS, MOST_REPEATS = 3, 20
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 P, Answer = ParamSpec("P"), TypeVar("Answer")
@@ -72,8 +75,13 @@ class DetectabilityStudy(BaseEstimator):
     scenarios : sequence of Scenario, ProgressiveDamage, UncertainDamage or mapping
         With different names; `sweep` makes them for all damage groups and severities. A mapping of damage groups to
         severities is a `Scenario` with a name such as "soil 18 %, piers 5 %"; an empty one is "healthy".
-    n_repeats : int, default=20
-        How often the records are simulated, each time with other noise.
+    n_repeats : int or "auto", default="auto"
+        How often the records are simulated, each time with other noise. "auto" takes 3 repeats, and as many more, up to
+        20 in all, as it takes until the bounds of each rate are within ``tol``. With the noise alone, whose bands are
+        the range of the repeats, it takes 20.
+    tol : float, default=0.02
+        Half of the distance between ``ci_low`` and ``ci_high`` that is small enough, as a share of the records; for
+        "auto" alone.
     noise : float, array-like of shape (n_modes,) or "fitted", default="fitted"
         Of the simulated frequencies, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     gaps : float, "fitted" or None, default="fitted"
@@ -81,7 +89,7 @@ class DetectabilityStudy(BaseEstimator):
         "fitted", detectors that see temperatures also see them with the gaps of the training records.
     outliers : float, "fitted", None or array-like of shape (n_training_records, n_modes), default="fitted"
         Values that are far off, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
-    uncertainty : {"all", "noise", "baseline", "weather", "model"} or sequence of them, default="all"
+    uncertainty : {"auto", "all", "noise", "baseline", "weather", "model"} or sequence of them, default="auto"
         What the bands hold, in which the rate of a measured campaign should lie:
 
         - "noise": another draw of the noise;
@@ -89,24 +97,24 @@ class DetectabilityStudy(BaseEstimator):
           that the structure is another one than the chain; the detectors stay as they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;
         - "model": another FE model of ``models`` in the chain;
+        - "auto": "noise", "baseline" and "weather", and "model" if ``models`` are given;
         - "all": all of these, without "model" if there are no ``models`` and none can be drawn.
 
-        In each of ``n_replicates`` replicates, all of it is drawn at once. On one core, a year of days of the truss in
-        13 scenarios with one detector takes 2 s with the noise alone, which is enough to compare detectors, 19 s with
-        "baseline" and "weather", and 42 s with "all", where 20 chains are refitted.
+        In each of ``n_replicates`` replicates, all of it is drawn at once. The noise alone is enough to compare
+        detectors; "model" takes longest, since a chain is refitted for each replicate.
     models : sequence of FE models, optional
         Which the structure may have, with parameters, damage groups and modes like the chain's. By default
         `~skthermo.updating.ModelUpdater.sample_models` draws ``n_replicates`` from the mean of the training records,
         as it was measured, to which a perfect model would come within 0.5 %; stiffnesses are known to 15 % before.
-    n_replicates : int, default=20
+    n_replicates : int, default=10
         How many replicates the bands are computed from.
     n_jobs : int, optional
         Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None
         Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
-        Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats
-        and replicates are done.
+        Whether `run` prints a line with the time of each of its stages, and after the first repeat how long the others
+        and the replicates will take; from 2, joblib prints how many of them are done.
 
     Attributes
     ----------
@@ -168,7 +176,7 @@ class DetectabilityStudy(BaseEstimator):
     weather, too.
 
     A replicate is a structure that could have given the training records; the detectors stay as they have learned.
-    Bands are those of Student's law on the scale of the logit, with the variances between and within replicates (three
+    Bands are those of Student's law on the scale of the logit, with the variances between and within replicates (two
     draws of the noise in each), about the study's own rate, moved by the mean effect of other weather and models.
     ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
 
@@ -207,13 +215,14 @@ class DetectabilityStudy(BaseEstimator):
         detectors: Any,
         scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,
-        n_repeats: int = 20,
+        n_repeats: int | Literal["auto"] = "auto",
+        tol: float = 0.02,
         noise: ArrayLike | Literal["fitted"] = "fitted",
         gaps: float | Literal["fitted"] | None = "fitted",
         outliers: ArrayLike | Literal["fitted"] | None = "fitted",
-        uncertainty: Literal["all"] | Sequence[str] = "all",
+        uncertainty: Literal["auto", "all"] | Sequence[str] = "auto",
         models: Sequence[FEModel] | None = None,
-        n_replicates: int = 20,
+        n_replicates: int = 10,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
         verbose: bool | int = 0,
@@ -222,6 +231,7 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors = detectors
         self.scenarios = scenarios
         self.n_repeats = n_repeats
+        self.tol = tol
         self.noise = noise
         self.gaps = gaps
         self.outliers = outliers
@@ -325,11 +335,11 @@ class DetectabilityStudy(BaseEstimator):
         """
         check_chain(self.fem)
         detectors = self._checked_detectors()
-        n_repeats = positive_integer(self.n_repeats, "n_repeats")
+        most_repeats, tol = self._most_repeats(), check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         scenarios = self._checked_scenarios(reference)
-        seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(n_repeats, 2))
+        seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(most_repeats, 2))
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
@@ -341,15 +351,26 @@ class DetectabilityStudy(BaseEstimator):
             )
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
-                clean = clean_frequencies(self.fem, scenarios, T, n_repeats)
+                clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
+                simulation.drawn(int(seeds[0][0]))  # so that what is learned once is not timed
+                began = process_time()
                 first = simulation.first_repeat(measured, seeds[0], errors)
+                seconds = process_time() - began
+        if self.verbose:
+            print(f"[{type(self).__name__}] {replicates.foretold(seconds, len(seeds) - 1)}")
         progress = max(self.verbose - 1, 0)
-        with stages.stage(f"other {n_repeats - 1} repeats"):
-            later = simulation.without(first.errors).other_repeats(seeds, self.n_jobs, progress)
-            evaluation = first.with_repeats(later)
+        with stages.stage("other repeats"):
+            left = simulation.without(first.errors)
+            grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
+            n_repeats = LEAST_REPEATS if grows else len(seeds)
+            evaluation = first.with_repeats(left.repeats(range(1, n_repeats), seeds, self.n_jobs, progress))
+            if grows:
+                wanted = min(evaluation.n_repeats_for(tol, confidence, scenarios), len(seeds))
+                more = range(n_repeats, max(wanted, n_repeats))
+                evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
         rates = None
         if replicates.parts:
             with stages.stage(f"{len(replicates.seeds)} replicates"):
@@ -361,6 +382,11 @@ class DetectabilityStudy(BaseEstimator):
         if doubt:
             warn_user(doubt, ResultWarning, "many false alarms")
         return self.findings_.table
+
+    def _most_repeats(self) -> int:
+        if isinstance(self.n_repeats, str) and self.n_repeats == "auto":
+            return MOST_REPEATS
+        return positive_integer(self.n_repeats, "n_repeats")
 
     def _found(self) -> StudyFindings:
         if not hasattr(self, "findings_"):

@@ -22,7 +22,6 @@ from skthermo._tables.arrays import (
     as_random_state,
     check_noise,
     integer_row,
-    positive_integer,
     real_array,
 )
 from skthermo._tables.frames import Table, check_same_rows, column_names
@@ -85,7 +84,7 @@ class CampaignSimulator:
 
     def _measured(self, T: Table, seeds: Sequence[int]) -> tuple[Array, Table]:
         """Factors by which noise, gaps and outliers change frequencies, and temperatures with gaps."""
-        measured, seen = self.measurement.of(self.fem, T, int(seeds[0]))
+        measured, seen = self.measurement.of(self.fem, self.fem.weather(T), int(seeds[0]))
         further = np.random.RandomState(seeds[1]).standard_normal((len(self.modes), len(measured))).T * self.scatter
         further[np.isnan(measured).all(axis=1)] = np.nan
         return 1 + np.hstack([measured, further]), seen
@@ -248,7 +247,7 @@ def compare_extensions(
         ranks,
         check_noise(scatter, len(ranks), [mode_name(rank) for rank in ranks]),
     )
-    n_repeats = positive_integer(study.n_repeats, "n_repeats")
+    n_repeats = int(study.results_["n_repeats"].max())
     seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
     rows: list[dict[str, Any]] = []
     with warnings_once("in the simulations of this study"):

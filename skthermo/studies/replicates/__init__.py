@@ -1,5 +1,5 @@
 """Structures that could have given the training records of a chain, and weather that they may meet."""
 
-from skthermo.studies.replicates._replicates import PARTS, Replicates, checked_models
+from skthermo.studies.replicates._replicates import N_DRAWS, PARTS, Replicates, checked_models
 
-__all__ = ["PARTS", "Replicates", "checked_models"]
+__all__ = ["N_DRAWS", "PARTS", "Replicates", "checked_models"]

@@ -133,7 +133,8 @@ def _on_stamps_of(first: Table, other: Table, number: int) -> Table:
 PARTS = ("noise", "weather", "baseline", "model")
 """What a replicate draws, in the order in which one is added to the others."""
 
-ALL = "all"
+ALL, AUTO = "all", "auto"
+N_DRAWS = 2  # draws of the noise in each replicate, to separate its share from that of what else varies
 LEAST_WORLDS = 2
 LARGEST_SEED = np.iinfo(np.int32).max
 
@@ -158,11 +159,11 @@ class Replicates:
     ) -> Replicates:
         """So many replicates in which the named parts vary; without models, these are drawn from the training
         records."""
-        asked = checked_parts(uncertainty)
+        asked = checked_parts(uncertainty, with_models=models is not None)
         years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
         if positive_integer(number, "n_replicates") < LEAST_WORLDS:
             raise ValueError(
-                f"n_replicates is {number}; expected at least {LEAST_WORLDS}, 20 or more for bands of 90 %"
+                f"n_replicates is {number}; expected at least {LEAST_WORLDS}, 10 or more for bands of 90 %"
             )
         random = np.random.RandomState(seed)
         seeds = random.randint(LARGEST_SEED, size=number + 1)
@@ -170,7 +171,7 @@ class Replicates:
             models = checked_models(fem, models)
             if "model" not in asked:
                 raise ValueError(
-                    f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, or 'all'"
+                    f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, 'auto' or 'all'"
                 )
         elif "model" in asked:
             models = _models_of(fem, number, int(seeds[-1]), is_needed=not _is_all(uncertainty))
@@ -194,6 +195,14 @@ class Replicates:
                 chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
+    def foretold(self, seconds: float, n_repeats: int) -> str:
+        """How long up to so many repeats and all replicates take, if one repeat takes so many seconds."""
+        text = f"up to {n_repeats} more repeats take about {n_repeats * seconds:.1f} s of one core"
+        if self.parts:
+            n_evaluated = N_DRAWS * len(self.parts) * len(self.seeds)
+            text += f", {len(self.seeds)} replicates about {n_evaluated * seconds:.1f} s"
+        return text + (", and the refits of their chains" if "model" in self.parts else "")
+
     def noise_levels(self, number: int) -> Array:
         """Factors of the noise of each mode, (n_modes,), which the training records determine up to an error."""
         errors = self.fem.residuals().level_errors
@@ -211,14 +220,16 @@ def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> lis
         return []
 
 
-def checked_parts(uncertainty: str | Sequence[str]) -> list[str]:
-    """What varies, or an error."""
-    if _is_all(uncertainty):
+def checked_parts(uncertainty: str | Sequence[str], with_models: bool = False) -> list[str]:
+    """What varies, or an error; "auto" is all but models, and models too where they are given."""
+    if _is_all(uncertainty) or (isinstance(uncertainty, str) and uncertainty == AUTO and with_models):
         return list(PARTS)
+    if isinstance(uncertainty, str) and uncertainty == AUTO:
+        return list(PARTS[:-1])
     is_one = isinstance(uncertainty, str | Mapping) or not isinstance(uncertainty, Iterable)
     asked = [uncertainty] if is_one else list(uncertainty)
     if not asked or not all(isinstance(part, str) and part in PARTS for part in asked):
-        raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'all', or some of {list(PARTS)}")
+        raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'auto', 'all', or some of {list(PARTS)}")
     return asked
 
 
