@@ -310,7 +310,7 @@ def gross_found(T, F):
 
 
 def print_false_findings(records, find=found):
-    """Share of healthy records with a finding, by kind of records; returns their number."""
+    """Share of healthy records with a finding, by kind of records; returns the number of those that are false."""
     rows = {}
     for name, tables in records:
         rows.setdefault(name, []).append(find(*tables))
@@ -318,7 +318,7 @@ def print_false_findings(records, find=found):
         kinds = sorted(set().union(*results))
         share = np.mean([bool(result) for result in results])
         print(f"  {name}: {100 * share:.0f} % of {len(results)}{': ' + ', '.join(kinds) if kinds else ''}", flush=True)
-    return sum(bool(result) for results in rows.values() for result in results)
+    return sum(bool(result - ALSO) for results in rows.values() for result in results)
 
 
 def print_hits(title, pairs):

@@ -11,7 +11,7 @@ from skthermo.preprocessing.checks._column import LEAST_KNOWN, LOGGED, Column, f
 from skthermo.preprocessing.checks._reading import Reading
 
 COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
-FREEZING, HOT, DEGREES = 32.0, 160.0, 1.8  # in Fahrenheit
+FREEZING, COLD, HOT, DEGREES = 32.0, -60.0, 170.0, 1.8  # in Fahrenheit
 KELVIN = (183.0, 373.0)  # the same range in kelvin
 FAR = 50.0  # degrees beyond all others, of a value that is none
 JUMP = 30.0  # the same, of a value that repeats exactly
@@ -55,7 +55,8 @@ def _put_no_temperatures_aside(column: Column) -> None:
         above = np.append(False, np.logical_or.accumulate(gap & (levels[1:] > HOTTEST)))
         below = np.append(np.logical_or.accumulate((gap & (levels[:-1] < COLDEST))[::-1])[::-1], False)
         beyond = (levels < COLDEST) | (levels > HOTTEST)
-        is_none = beyond & (above | below | _stand_apart(levels, LOGGED))
+        logged = LOGGED if column.quantile(0.95) < HOTTEST else ()  # tenths of a degree pass through -99
+        is_none = beyond & (above | below | _stand_apart(levels, logged))
         in_kelvin = is_none & (levels > KELVIN[0]) & (levels < KELVIN[1])
         kelvin, others = levels[in_kelvin], levels[is_none & ~in_kelvin]
         column.put_aside("kelvin", kelvin)
@@ -77,7 +78,8 @@ def _compare_sensors(columns: list[Column]) -> None:
         return
     middles, warmest = (np.array([column.quantile(share) for column in columns]) for share in (0.5, 0.99))
     is_warm = WARM[0] < np.median(middles) < WARM[1] or np.median(middles) < WARM[0] < WARMEST < np.median(warmest)
-    if is_warm and middles.min() > FREEZING / 2 and max(column.levels[-1] for column in columns) < HOT:
+    ends = [column.levels[[0, -1]] for column in columns]
+    if is_warm and middles.min() > FREEZING / 2 and np.min(ends) > COLD and np.max(ends) < HOT:
         for column in columns:
             column.found("fahrenheit", column.levels, column.span)
         return
@@ -135,6 +137,7 @@ def _is_in_another_unit(column: Column, place: int, quantiles: Array) -> bool:
     at_zero = middle - ratio * centre  # where the others are at 0 degrees Celsius
     off = abs((middle - FREEZING) / DEGREES - centre)
     is_apart = middle - centre > APART and off < NEAR and (off < SAME or abs(at_zero - FREEZING) < AT_ZERO)
+    is_apart &= column.levels[0] > COLD and column.levels[-1] < HOT
     if is_apart and ALIKE[0] < ratio / DEGREES < ALIKE[1]:
         column.found("fahrenheit", column.levels, beside)
         return True
