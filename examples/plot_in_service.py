@@ -3,7 +3,7 @@ In service, for years
 =====================
 
 A truss is monitored every four hours. Its first year is the baseline. Then a
-:class:`~skthermo.monitoring.Monitor` judges what comes in day by day, for two years, in which four things happen: a
+:class:`~skthermo.monitoring.Monitor` evaluates what comes in day by day, for two years, in which four things happen: a
 thermometer dies for ten weeks, another one jumps by 5 °C and is repaired in January, the lower chord loses 1 % of its
 stiffness a year, and in the last month the upper chord loses 12 % at once. The page shows what the owner sees of each.
 
@@ -49,7 +49,7 @@ records.loc["2026-10-05":"2027-01-20", "T3"] += 5.0
 baseline, later = records[:"2025"], records["2026":]
 
 # %%
-# A detector, an FE model, a promise
+# A detector, an FE model, a number of false alarms
 # ----------------------------------
 # The detector is any of ``skthermo.detection``: here residuals of piecewise-linear regression, evaluated by the
 # mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a

@@ -54,7 +54,7 @@ for expected in (
     r"\d+ of \d+ rows have temperatures far outside",  # the last table counts them
     r"the \d+ baseline records depend on each other",  # one winter of raw frequencies
     "frequencies change at once by what the weather does not explain",  # the frost of January, by a straight line
-    "'TDS' departs from what the other sensors foretell",  # after the frost, for baselines that end before it
+    "'TDS' departs from what the other sensors predict",  # after the frost, for baselines that end before it
     r"\d+ of \d+ records of fold \d of \d are in weather",  # forward in time
 ):
     warnings.filterwarnings("ignore", expected)

@@ -149,3 +149,15 @@ def test_no_file_names_an_address_of_the_project_that_does_not_exist():
 
 def test_the_citation_is_of_this_version():
     assert f"\nversion: {skthermo.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+NOT_OURS = re.compile(
+    r"\b(judge[sd]?|judging|foretells?|foretold|aliens?|told apart|promise[sd]?|absurd|broken lines|weather apart)\b",
+    re.IGNORECASE,
+)
+"""What ``docs/contributing/words.rst`` replaces by the field's words."""
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "words.rst"], ids=lambda page: page.name)
+def test_pages_use_the_fields_words(page):
+    assert not [line for line in page.read_text().splitlines() if NOT_OURS.search(line)]

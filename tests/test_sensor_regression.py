@@ -79,7 +79,7 @@ def test_a_sensor_that_drifts_is_named_with_rows_and_degrees():
     sensors, new = SensorRegression.of(dependent_records(3000, 0)), dependent_records(3000, 1)
     new["girder"] += np.linspace(0, 6, len(new))
     text = sensors.warning(new)
-    assert text.startswith("'girder' departs from what the other sensors foretell in ")
+    assert text.startswith("'girder' departs from what the other sensors predict in ")
     n_rows, first, size = re.search(r"in (\d+) of 3000 rows, row (\d+) the first: by \+([\d.]+) degrees", text).groups()
     assert int(n_rows) > 1000
     assert 300 < int(first) < 2000

@@ -29,7 +29,7 @@ ALL = "all"  # key of findings that stand for those of all records within
 
 @dataclass(frozen=True)
 class Context:
-    """What the warnings and checks within a call know of what was told and found before."""
+    """What the warnings and checks within a call know of what was warned of and found before."""
 
     told: frozenset[str] = frozenset()  # kinds of warnings that an estimator around gives
     found: dict[str, Any] | None = None  # findings of a check by content of its tables

@@ -10,7 +10,8 @@
     skthermo acknowledge bridge/monitor.toml 3 --harmless --note "a special transport"
     skthermo rebaseline bridge/monitor.toml --since 2027-05-01
 
-The file of a monitor alone, .skops or .joblib, stands where settings do. Several settings in one call are a fleet.
+The folder stands for the monitor.toml in it, and the file of a monitor alone, .skops or .joblib, for settings. Several
+settings in one call are a fleet.
 
 Exit codes of update, status and report: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an
 error, and the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its page
@@ -194,7 +195,7 @@ def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:
     """Do the work of a command on each bridge; the exit code of all."""
-    given = options.files if isinstance(options.files, list) else [options.files]
+    given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
     files = [file for file in given if file.suffix in MONITORS]
     records = [file for file in given if file.suffix not in MONITORS]
     if not files or (records and (work is not _bridge.update or len(files) > 1)):
@@ -228,6 +229,12 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
         except OSError as error:
             code = _failed(error, f"{file} was not written: ", facts, code)
     return code
+
+
+def _settings_in(path: Path) -> Path:
+    """The settings in a bridge's folder; any other path as it is."""
+    settings = path / "monitor.toml"
+    return settings if settings.is_file() else path
 
 
 def _for_one(options: argparse.Namespace, number: int) -> argparse.Namespace:

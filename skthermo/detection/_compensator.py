@@ -306,7 +306,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         -----
         UserWarning
             As in `fit`; if temperatures are far outside those of `fit`; if a sensor departs from what the others
-            foretell, as one that drifts or is stuck does; if lags find no record in most rows.
+            predict, as one that drifts or is stuck does; if lags find no record in most rows.
         """
         frequencies, weather, residuals, errors, unknown = self._residuals(X)
         if self.whiten is None:

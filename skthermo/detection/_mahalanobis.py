@@ -102,7 +102,7 @@ class MahalanobisDetector(DamageDetector):
     be evaluated: their index is NaN, and ``predict`` gives 0. Rows with gaps under a ``covariance`` of your own keep
     the distances of the fit.
 
-    The promise of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
+    The rate of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
     this one is fixed, and keeps the rate nearly: 2 % asked and 6 modes give 1.9 % false alarms after 100 and after 365
     independent records, and 2.0 and 2.2 % where neighbours in time have a correlation of 0.9.
 

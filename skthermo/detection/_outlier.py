@@ -75,9 +75,9 @@ class OutlierDetector(DamageDetector):
     can. Estimators that measure distances, such as ``OneClassSVM``, give high modes more weight, because these vary
     more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
 
-    Correlation time, neighbours and the promise are those of `MahalanobisDetector`; blocks last five correlation times
-    at least. Raw frequencies remember as long as the weather does. In a baseline of one winter, such blocks leave out
-    whole spells of frost, which nothing else in it resembles, and the threshold hides damage. A ``block`` of a day, of
+    Correlation time, neighbours and expected rate are those of `MahalanobisDetector`; blocks last five correlation
+    times at least. Raw frequencies remember as long as the weather does. In a baseline of one winter, such blocks leave
+    out whole spells of frost, which nothing else in it resembles, and the threshold hides damage. A ``block`` of a day, of
     hourly records, supposes that frost which comes will be like frost that was: false alarms are then those asked for
     as long as the weather is none that the baseline lacks, and what else records remember is over within the day. After
     365 records of 6 modes, 2 % asked, ``LocalOutlierFactor``, ``IsolationForest``, ``EllipticEnvelope`` and

@@ -21,7 +21,7 @@ def probability_of_false_alarm(damage_index: ArrayLike, threshold: float) -> flo
     ----------
     damage_index : array-like of shape (n_samples,)
         Damage index of records of the healthy structure that are not in the baseline; NaN where nothing can be
-        judged, which counts neither as healthy nor as an alarm. `~skthermo.detection.MahalanobisDetector` gives the
+        evaluated, which counts neither as healthy nor as an alarm. `~skthermo.detection.MahalanobisDetector` gives the
         unsquared distance, and its ``threshold_`` is one of that.
     threshold : float
         A damage index above it is an alarm.
@@ -56,7 +56,7 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
     Parameters
     ----------
     damage_index : array-like of shape (n_samples,)
-        Damage index of records of the damaged structure; NaN where nothing can be judged, which counts neither as
+        Damage index of records of the damaged structure; NaN where nothing can be evaluated, which counts neither as
         found nor as missed.
     threshold : float
         A damage index above it is an alarm.

@@ -194,7 +194,7 @@ def _doubt(status: MonitorStatus, last: pd.Timestamp) -> str:
     if status.newest is None:
         return f"no record has come since the baseline, which ends on {last}"
     if status.is_ahead:
-        return f"the newest record is of {last}, a time after {status.now}"
+        return f"the newest record is of {last}, a time after {status.now.floor('s')}"
     if status.is_late:
         age, limit = duration_text(status.age), duration_text(status.max_age)
         return f"the newest record, of {last}, is {age} old; expected one of the last {limit}"

@@ -67,8 +67,8 @@ class HampelFilter(RecordTransformer):
 
     Notes
     -----
-    Clean the records that an FE model or a detector learns from. Do not clean records before a detector judges them one
-    by one: a threshold for outliers is also one for damage that comes and goes.
+    Clean the records that an FE model or a detector learns from. Do not clean records before a detector evaluates them
+    one by one: a threshold for outliers is also one for damage that comes and goes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Weather of records: its range, similar records, and temperatures that other sensors foretell."""
+"""Weather of records: its range, similar records, and temperatures that other sensors predict."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class SensorRegression:
         return values, deviations
 
     def departures(self, temperatures: Any) -> Array:
-        """What each sensor shows minus what the others of its record foretell; NaN in records with gaps."""
+        """What each sensor shows minus what the others of its record predict; NaN in records with gaps."""
         values = as_floats(temperatures)
         departures = np.full(values.shape, np.nan)
         if self.learned.sum() > 1:
@@ -179,7 +179,7 @@ class SensorRegression:
         rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
         first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
         return (
-            f"{self.reach.names[int(sensor)]!r} departs from what the other sensors foretell in {len(rows)} of "
+            f"{self.reach.names[int(sensor)]!r} departs from what the other sensors predict in {len(rows)} of "
             f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
             f"records, where training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, "
             "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other sensors "

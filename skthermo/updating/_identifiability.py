@@ -157,7 +157,7 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
     return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
 
 
-COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be told apart
+COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be distinguished
 ACCURATE = 0.1  # largest relative standard deviation of the estimates of a recommended subset
 
 NO_INFORMATION = 1e-12
@@ -203,7 +203,7 @@ class Identifiability(Bunch):
                 "a prior."
             )
         for group in self.collinear:
-            yield f"Cannot be told apart: {listed(group)}."
+            yield f"Cannot be distinguished: {listed(group)}."
         within = f"within {100 * ACCURATE:g} % with this noise"
         if self.recommended:
             others = ", the others being known" if len(self.recommended) < len(names) else ""
@@ -249,7 +249,7 @@ def identifiability(
           noise over its own noise, with rows of shapes below where these are measured. The condition number is
           infinite if there are more parameters than rows;
         - ``deviations``: smallest possible relative standard deviation of each parameter's estimate when all
-          are estimated (Cramer-Rao), a series; infinite where it cannot be told apart from others;
+          are estimated (Cramer-Rao), a series; infinite where it cannot be distinguished from others;
         - ``collinear``: lists of parameters whose effects differ only by a factor (cosine of 0.99 or more);
         - ``recommended``: parameters that can be estimated together, the others held, with deviations of
           at most 0.1, most informative first.

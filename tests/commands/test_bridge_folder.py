@@ -72,7 +72,7 @@ def test_records_of_a_folder_are_taken_in_night_by_night_as_in_one_pass(bridge, 
     assert lines == transitions
     assert [one["id"] for one in lines] == list(range(1, len(lines) + 1))
     assert lines[0]["what"] == "opened"
-    again = run("update", settings(bridge), "--now", now, "--json")
+    again = run("update", bridge, "--now", now, "--json")  # the folder stands for its settings
     assert valid(again.json)["bridges"][0]["records"]["new"] == 0
     assert again.json["bridges"][0]["records"]["repeated"] == 0
     assert (again.code, again.json["bridges"][0]["transitions"]) == (ALARM, [])

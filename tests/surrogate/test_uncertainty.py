@@ -389,7 +389,7 @@ def test_intervals_hold_their_share_where_a_sensor_died_after_training(sensor):
 
 
 @pytest.mark.filterwarnings("ignore:missing temperatures were filled")
-@pytest.mark.filterwarnings("ignore:'T.' departs from what the other sensors foretell")  # as it is moved
+@pytest.mark.filterwarnings("ignore:'T.' departs from what the other sensors predict")  # as it is moved
 def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadrature():
     weather = without("T2")
     filled, deviations = FITTED.sensors_.fill(weather)

@@ -14,7 +14,7 @@ from skthermo.fem.modal._dense import EigenSolver
 
 MAX_STEPS = 6
 FURTHER, RANDOM_COLUMNS, RANDOM_STEPS = 2, 2, 3
-CLUSTER = 0.01  # relative distance of eigenvalues that are judged together
+CLUSTER = 0.01  # relative distance of eigenvalues that are evaluated together
 DEPENDENT = 1e-14  # share of modal mass below which a direction is rounding error
 
 

@@ -60,7 +60,7 @@ def clopper_pearson(n_alarms: float, n_records: float, confidence: float) -> tup
 class Blocks:
     """Contiguous blocks of records by their first ones, whose sums in different repeats are independent.
 
-    Judged records are those with a decision, (n_repeats, n_records).
+    Evaluated records are those with a decision, (n_repeats, n_records).
     """
 
     starts: NDArray[np.intp]

@@ -360,7 +360,7 @@ class DetectabilityStudy(BaseEstimator):
                 first = simulation.first_repeat(measured, seeds[0], errors)
                 seconds = process_time() - began
         if self.verbose:
-            print(f"[{type(self).__name__}] {replicates.foretold(seconds, len(seeds) - 1)}")
+            print(f"[{type(self).__name__}] {replicates.predicted_time(seconds, len(seeds) - 1)}")
         progress = max(self.verbose - 1, 0)
         with stages.stage("other repeats"):
             left = simulation.without(first.errors)

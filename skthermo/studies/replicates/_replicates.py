@@ -195,7 +195,7 @@ class Replicates:
                 chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
-    def foretold(self, seconds: float, n_repeats: int) -> str:
+    def predicted_time(self, seconds: float, n_repeats: int) -> str:
         """How long up to so many repeats and all replicates take, if one repeat takes so many seconds."""
         text = f"up to {n_repeats} more repeats take about {n_repeats * seconds:.1f} s of one core"
         if self.parts:
