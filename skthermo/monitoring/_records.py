@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import as_floats
+from skthermo._tables.arrays import as_floats, refuse_no_table
 from skthermo._tables.frames import DAY_NS, YEAR
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
@@ -49,6 +49,7 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
                 "tz_localize or tz_convert gives"
             )
         X = X.loc[:, list(columns)]
+    refuse_no_table(X, "the table of records", least_rows=0)
     values = as_floats(with_nan(X))
     infinite = np.argwhere(np.isinf(values))
     if len(infinite):

@@ -1850,3 +1850,45 @@ LEGAL |= {
     },
     "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
 }
+
+CARRIED = {  # arguments whose names of columns are carried through, and match nothing
+    "frequencies": ("fem.add_noise", "fem.match_modes"),
+    "S": ("updating.select_parameters",),
+    "temperature": ("datasets.steel_modulus",),
+    "measured": ("plotting.PredictionDisplay.from_predictions",),
+}
+EMPTY = {
+    "frequencies": "fem.add_noise",
+    "phi_a": "fem.mac",
+    "phi_b": "fem.mac",
+    "temperature": "datasets.steel_modulus",
+}
+VECTORS = {
+    "y": ("surrogate.TemperatureMapper", "surrogate.InverseSurrogate.fit"),
+    "residuals": ("preprocessing.residual_trend",),
+    "measured": ("plotting.PredictionDisplay.from_predictions",),
+    "temperature": ("datasets.steel_modulus",),
+    "frequencies": ("preprocessing.check_records",),
+}
+CELSIUS = ("kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point")
+
+
+def legal(argument, callables, causes, reason):
+    """Add bad values that are good for an argument of some callables."""
+    LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables for cause in causes})
+
+
+for argument, callables in CARRIED.items():
+    legal(argument, callables, ("levels of names", "tuples as names", "a number among names"), "names are not matched")
+for argument, name in EMPTY.items():
+    legal(argument, [name], ["no columns"], "the answer is empty")
+for argument, callables in VECTORS.items():
+    legal(argument, callables, ["a series"], "a series is a vector, or a table of one column")
+UNITS = ("rad/s", "kHz", "periods")
+WEATHER = ["surrogate.DataInformedFEM.weather"]
+legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
+legal("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather")
+legal("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags")
+READ_FOR_NAMES = [*UNITS, "9999", "a slipped point", "a mode twice"]
+legal("X", ["surrogate.InverseSurrogate"], READ_FOR_NAMES, "beside a model, only names are read")
+legal("frequencies", ["preprocessing.check_records"], UNITS, "without a model, any unit is possible")

@@ -14,6 +14,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from skthermo._tables.arrays import Array, as_columns, means_of_known, range_sums, robust_deviation, spread_evenly
 from skthermo._tables.frames import YEAR, column_names, correlation_time, has_stamps, row_times
+from skthermo._validation import check_array
 from skthermo.preprocessing._weather_regression import out_of_fold
 
 SHORTEST = 5  # number of equal records in a row that may count as stuck
@@ -273,7 +274,8 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
         change  standard_error
     r1  0.0184          0.0011
     """
-    values, times = as_columns(residuals), row_times(residuals)
+    values = as_columns(check_array(residuals, input_name="residuals", dtype=np.float64, ensure_2d=False))
+    times = row_times(residuals)
     names = column_names(residuals, "r") if values.ndim == np.ndim(residuals) else ["r1"]
     order = np.argsort(times, kind="stable")
     return trend_table(np.ones((len(values), 1)), values[order], times[order], names, has_stamps(residuals))

@@ -29,6 +29,7 @@ from skthermo._tables.arrays import (
     check_model,
     is_auto,
     is_real,
+    refuse_no_table,
 )
 from skthermo._tables.frames import (
     Table,
@@ -877,6 +878,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
+        refuse_no_table(y, "y", or_vector=True)
         self.y_is_vector_ = np.ndim(y) == 1
         if self.y_is_vector_:
             y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
