@@ -28,7 +28,8 @@ from tests.bad_input import registry
 
 SHARE = 11  # every eleventh bad value is tried each time
 KINDS = ["legal", "refused", "warned", "silent", "unclear"]
-MOST = {"silent": 0.005, "unclear": 0.002}  # shares of the bad values
+MOST = {"silent": 0.005, "unclear": 0.002}  # shares of all bad values
+BY_CHANCE = 2  # times that share may be in a part of them
 ERRORS = (ValueError, TypeError, FileNotFoundError)
 OURS = str(Path(skthermo.__file__).parent)
 CHECKED_BY = (OURS, str(Path(sklearn.utils._param_validation.__file__)), str(Path(sklearn.utils.validation.__file__)))
@@ -192,7 +193,8 @@ def assert_refused_or_warned_of(every):
     results = list(tried(every))
     for kind, most in MOST.items():
         wrong = [f"{one.callable}({one.argument}: {one.cause}) {one.said:.220}" for one in results if one.kind == kind]
-        assert len(wrong) <= most * len(results), f"{kind}:\n" + "\n".join(wrong)
+        allowed = most * len(results) * (1 if every == 1 else BY_CHANCE)
+        assert len(wrong) <= allowed, f"{kind}:\n" + "\n".join(wrong)
     assert sum(one.kind == "refused" for one in results) > 0.9 * len(results)
 
 
