@@ -11,6 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from skthermo._effects import ALL_GROUPS
+from skthermo._estimators.warnings import warn_each
 from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
@@ -225,7 +226,9 @@ class ParameterHistory:
                 f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
-        gross_errors(frequencies=F).refuse_meaningless(but=OF_TRAINING)
+        found = gross_errors(frequencies=F)
+        found.refuse_meaningless(but=OF_TRAINING)
+        warn_each(found.warnings())
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
         return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
 

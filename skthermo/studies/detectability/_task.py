@@ -15,7 +15,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import warn_user, warnings_once
+from skthermo._estimators.warnings import warn_each, warn_user, warnings_once
 from skthermo._tables.arrays import (
     Array,
     as_columns,
@@ -28,6 +28,7 @@ from skthermo._tables.arrays import (
 from skthermo._tables.frames import Table, column_names, has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
+from skthermo.preprocessing import gross_errors
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
 from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
@@ -537,7 +538,13 @@ def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
         return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
     known = SeenColumns(names, n_sensors, np.arange(len(names)), False)._positions_of(baseline, "the baseline")
     index = baseline.index if has_stamps(baseline) else None
-    return pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
+    records = pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
+    is_sensor = np.asarray(known) < n_sensors
+    T, F = (records.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
+    found = gross_errors(T, F, model=fem.model if len(names) == records.shape[1] else None)
+    found.refuse_meaningless()
+    warn_each(found.warnings())
+    return records
 
 
 def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
