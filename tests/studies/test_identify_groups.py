@@ -177,7 +177,7 @@ def test_bad_records(fem):
         identify_damage(fem, WEATHER.to_numpy(), F.to_numpy()[:, :4], GROUPS)
     zero = F.copy()
     zero.iloc[3, 2] = 0.0
-    with pytest.raises(ValueError, match="row 3 of the frequencies has a value of 0 or less"):
+    with pytest.raises(ValueError, match="'f3' is 0 Hz in 1 of 37 rows"):
         identify_damage(fem, WEATHER, zero, GROUPS)
     with pytest.raises(ValueError, match=r"none of 37\srecords can be compared .*: 37 without a frequency; expected"):
         identify_damage(fem, WEATHER, F * np.nan, GROUPS)
@@ -186,8 +186,8 @@ def test_bad_records(fem):
 @pytest.mark.parametrize(
     ("factors", "message"),
     [
-        (2 * np.pi, r"6 of 6 modes are .*, f1 6\.\d* times \(rad/s instead of Hz\?\); expected Hz"),
-        (0.001, r"6 of 6 modes are .*, f1 0\.001 times; expected Hz"),
+        (2 * np.pi, "rad/s"),
+        (0.001, "kHz"),
         ([1, 1, 1, 1, 1, 5], r"1 of 6 modes are .*, f6 .* times; expected Hz, and modes in the order of fit"),
     ],
 )

@@ -39,8 +39,8 @@ WARNINGS = {
     "markers": "values stand for missing ones: {}; they would be learned as if they were measured; put NaN there",
     "isolated level": "values far from all others repeat exactly: {}; they may stand for missing values, and would be "
     "learned as if they were measured; put NaN there if they do",
-    "implausible values": "values are implausibly far from the others of their column: {}; they widen every spread "
-    "and so hide damage; put NaN where a value is wrong",
+    "implausible values": "values are implausible: {}; they widen every spread and so hide damage; put NaN where a "
+    "value is wrong",
     "constant": "a column is constant: {}; it says nothing, and its spread of zero makes any change infinite; leave "
     "it out",
     "few values": "a column has very few different values: {}; its resolution hides what the weather does; look at "
