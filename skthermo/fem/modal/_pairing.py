@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import Array, check_dofs, check_model, check_theta, real_array, shape_array, without_mask
+from skthermo._tables.arrays import (
+    Array,
+    check_dofs,
+    check_model,
+    check_names,
+    check_theta,
+    real_array,
+    shape_array,
+    without_mask,
+)
 from skthermo.fem._protocol import FEModel, ModalModel
 from skthermo.fem._terms import nominal_theta
 
@@ -241,7 +250,7 @@ def match_modes(
     """
     import pandas as pd  # imported here because fem does without it
 
-    names = [str(name) for name in getattr(frequencies, "columns", ())]
+    names = check_names([str(name) for name in getattr(frequencies, "columns", ())], "columns of the frequencies")
     measured = _mean_frequencies(frequencies)
     names = names or [f"f{i + 1}" for i in range(len(measured))]
     check_model(model)
