@@ -26,7 +26,7 @@ from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing import RecordFindings
 from tests.bad_input import registry
 
-SHARE = 11  # every eleventh bad value is tried each time
+SHARE = 23  # every twenty-third bad value is tried each time
 KINDS = ["legal", "refused", "warned", "silent", "unclear"]
 MOST = {"silent": 0.005, "unclear": 0.002}  # shares of all bad values
 BY_CHANCE = 2  # times that share may be in a part of them

@@ -333,6 +333,7 @@ def test_civil_nx(civil_nx, tmp_path, monkeypatch):
     assert recipe["built"]["1"]["PARAM"][0]["ELAST"] == 2e8
 
 
+@pytest.mark.nightly
 def test_a_study_with_an_emulator_of_a_program():
     """Damage of parameters is detected as often as with the exact model, within the noise of the rates."""
     truss, year = make_truss(), make_truss_campaign(random_state=0)

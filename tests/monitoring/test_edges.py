@@ -63,7 +63,7 @@ SIZES = st.builds(lambda sign, size: float(np.exp(sign * size)), st.sampled_from
 
 
 @settings(
-    max_examples=40, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=20, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
 )
 @given(
     factors=st.dictionaries(st.sampled_from(MODES), SIZES | st.just(0.0) | st.just(-1.0), min_size=1),

@@ -44,7 +44,10 @@ def of_a_year(**options):
 
 
 @pytest.mark.parametrize("modes", [MODES, *([mode] for mode in MODES)], ids=str)
-@pytest.mark.parametrize("last", [None, MahalanobisDetector()], ids=["window", "record"])
+@pytest.mark.parametrize(
+    "last",
+    [pytest.param(None, id="window", marks=pytest.mark.nightly), pytest.param(MahalanobisDetector(), id="record")],
+)
 def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(modes, last):
     monitor = fitted(bridge()[:"2025"], last)
     changes = monitor.smallest_changes_

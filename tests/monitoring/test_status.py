@@ -106,6 +106,7 @@ def test_transitions_replay_what_the_tables_say(after, fitted):
     assert columns == set(after.faults_.loc[after.faults_["until"].isna(), "column"])
 
 
+@pytest.mark.nightly
 def test_batches_give_the_transitions_of_one_pass_each_once(monitor, records, after, tmp_path):
     parts, known = [], 0
     for start in range(FIRST, len(records), 25):

@@ -77,6 +77,7 @@ def test_the_noisier_the_mode_the_less_it_gains(study):
     assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
 
 
+@pytest.mark.nightly
 def test_same_bits_whatever_the_jobs(study):
     few = clone(study).set_params(n_repeats=2)
     few.run(WEATHER)
