@@ -50,7 +50,7 @@ baseline, later = records[:"2025"], records["2026":]
 
 # %%
 # A detector, an FE model, a number of false alarms
-# ----------------------------------
+# -------------------------------------------------
 # The detector is any of ``skthermo.detection``: here residuals of piecewise-linear regression, evaluated by the
 # mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
 # share of the records, but what an owner asks for: one false alarm a year.
