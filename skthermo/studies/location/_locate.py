@@ -57,7 +57,8 @@ def locate_damage(
     fem : DataInformedFEM
         Fitted to healthy records; its model was assembled from the structure. It may have been calibrated since.
     structure : Structure
-        Nodes and members of the model; an `~skthermo.fem.ImportedStructure` for members that another program has assembled.
+        Nodes and members of the model; an `~skthermo.fem.ImportedStructure` for members that another program has
+        assembled.
     T : array-like or DataFrame of shape (n_samples, n_sensors)
         Temperatures of the records to explain, in degrees Celsius.
     F : array-like or DataFrame of shape (n_samples, n_modes)
