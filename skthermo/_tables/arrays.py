@@ -236,7 +236,7 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
 def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
     """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
     if scipy.sparse.issparse(values):
-        raise ValueError(f"{what} is a sparse matrix; expected a dense array of numbers")
+        raise TypeError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
         raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
 

@@ -223,7 +223,7 @@ class FrequencySurface:
         fit = smallest_gap(values) > CLOSE / 3
         n_lower = n_terms(points.shape[1], degree - 1)
         logs = np.log(values[fit])
-        whole, lower = (np.linalg.lstsq(part, logs)[0] for part in (features[fit], features[fit, :n_lower]))
+        whole, lower = (np.linalg.lstsq(part, logs, rcond=None)[0] for part in (features[fit], features[fit, :n_lower]))
         difference = whole.copy()
         difference[:n_lower] -= lower
         self._coefficients = np.hstack([whole, difference])
