@@ -104,9 +104,10 @@ def test_records_of_any_quantity_are_legal_where_no_model_is():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkthermoWarning)
         for table in (inputs, kelvin):
-            compensator().fit(table.join(strains))
-        MahalanobisDetector().fit(strains)
-        make_pipeline(compensator(), MahalanobisDetector()).fit(inputs.join(strains))
+            residuals = compensator().fit(table.join(strains)).transform(table.join(strains))
+            assert np.isfinite(np.asarray(residuals, dtype=float)).any()
+        assert MahalanobisDetector().fit(strains).threshold_ > 0
+        assert make_pipeline(compensator(), MahalanobisDetector()).fit(inputs.join(strains))[-1].threshold_ > 0
 
 
 @pytest.mark.parametrize("whiten", ["auto", "global", "local", None])
@@ -114,11 +115,12 @@ def test_residuals_are_no_frequencies(whiten):
     detector = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES, whiten=whiten), MahalanobisDetector())
     with warnings.catch_warnings():
         warnings.simplefilter("error", RecordsWarning)
-        detector.fit(T.join(F))
+        assert detector.fit(T.join(F))[-1].threshold_ > 0
 
 
 def test_few_new_records_may_lack_a_mode_or_be_alike():
     fitted, few = chain().fit(T, F), slice(20, 24)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        identify_damage(fitted, T[few], F[few].assign(f2=F["f2"].iloc[20], f3=np.nan), ["top"])
+        found = identify_damage(fitted, T[few], F[few].assign(f2=F["f2"].iloc[20], f3=np.nan), ["top"])
+    assert found.records.n_compared > 0

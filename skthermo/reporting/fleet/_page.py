@@ -200,7 +200,7 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
         "Since: when the present state began. A healthy bridge is healthy since its last event ended, or since the "
         "first day of its monitor.",
         "Damage index over threshold: the newest damage index divided by its threshold. An event opens when this is "
-        "above 1 for most of several records. Of an open event, the highest value so far stands beside it. The line "
+        "above 1 for most of several records. Of an open event, its highest value so far is given. The line "
         "shows the highest index of each week in the last year, and the dashed line the threshold.",
         "Slow change: the largest change of the stiffness of a group since the baseline, if it is beyond the error of "
         "the estimate.",
