@@ -65,7 +65,7 @@ shown = ["tuned", "fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "false_a
 print((100 * table[shown]).round(1).to_string())
 
 # %%
-# The true records of that year, which no real bridge would have, evaluate all settings:
+# All settings on the true records of that year, which no real bridge would have:
 
 fitted = [clone(before).set_params(**setting).fit(task.baseline) for setting in search.cv_results_["params"]]
 true = [100 * true_score(one, later, truth)[0] for one in fitted]

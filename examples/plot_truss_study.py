@@ -96,7 +96,7 @@ PredictionDisplay.from_predictions(true, simulated, labels=labels, kind="lines",
 # --------------
 # The detector of the paper, :class:`~skthermo.detection.MahalanobisDetector`, learns the healthy year. A
 # :class:`~skthermo.studies.DetectabilityStudy` then simulates a later year with damage of three groups of members, in
-# steps of 10 %. The truth is known here, and is evaluated beside the simulations.
+# steps of 10 %. The truth is known here, and detectors evaluate it beside the simulations.
 
 later = make_truss_campaign(noise=NOISE, random_state=3)
 

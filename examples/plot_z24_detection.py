@@ -71,7 +71,7 @@ print(f"{len(records.damaged)} after damage began. Every detector is asked for 2
 # The field's detectors
 # ---------------------
 # "Raw" ones see frequencies only. For the others, a :class:`~skthermo.detection.TemperatureCompensator` explains the
-# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates what is left, the
+# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals, the
 # residuals; "whitened", residuals are divided by their spread in similar weather. Each threshold comes from the
 # baseline by one rule: its records are scored by what was learned without them and without their neighbours in time.
 # (:doc:`plot_detectors` explains each detector.) The last two columns count as others do: another publication takes the

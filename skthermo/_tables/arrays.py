@@ -563,7 +563,7 @@ MEMBERS = ("parameter_names", "n_modes", "frequencies")
 
 
 def is_model(candidate: Any) -> bool:
-    """Whether an object is an FE model, evaluated by its attributes."""
+    """Whether an object has the attributes of an FE model."""
     return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in MEMBERS)
 
 
