@@ -135,20 +135,11 @@ def _parser() -> Parser:
         one.add_argument("--verbose", action="store_true", help="say more on stderr")
         return one
 
-    for name, text, command in (
-        ("check", "look at files of records, and say what was found", _check),
-        ("init", "look at files of records, and write settings that fit them", _init),
-    ):
-        one = add(name, text, command)
-        one.add_argument("files", nargs="+", type=Path, help="T.csv F.csv, or one file with all columns")
-        one.add_argument("--temperatures", nargs="+", metavar="COLUMN", help="by default as files or names tell")
-        one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
-        one.add_argument("--reference", nargs="+", default=[], metavar="COLUMN", help="temperatures from elsewhere")
-        one.add_argument("--zone", help='time zone of the logger\'s clock, such as "Europe/Brussels"')
-        one.add_argument("--until", metavar="TIME", help="last moment of the baseline (default: all records)")
-        if name == "init":
-            one.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
-            one.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
+    _on_records(add("check", "look at files of records, and say what was found", _check))
+    init = add("init", "look at files of records, and write settings that fit them", _init)
+    _on_records(init)
+    init.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
+    init.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
     works: tuple[tuple[str, str, Any], ...] = (
         ("fit", "fit monitors to their baselines", _bridge.fit),
         ("update", "take in new records", _bridge.update),
@@ -158,22 +149,36 @@ def _parser() -> Parser:
         ("rebaseline", "begin a new baseline after a repair", _bridge.rebaseline),
     )
     for name, text, work in works:
-        one = add(name, text, partial(_on_bridges, work))
-        many = {} if name in ("acknowledge", "rebaseline") else {"nargs": "+"}
-        what = "settings (.toml), or the file of a monitor (.skops, .joblib)"
-        one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
-        one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
-        one.add_argument("--now", metavar="TIME", help="as of this time (default: that of the clock)")
-        if name in ("update", "status", "report"):
-            one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, or of the fleet")
-            one.add_argument("--title", help="heading of the page")
-            one.add_argument("--fdr", type=float, default=0.1, help="false discovery rate of a fleet (default: 0.1)")
-        if name not in ("status", "report"):
-            one.add_argument(
-                "--wait", type=float, default=60.0, metavar="SECONDS", help="for another command at work (default: 60)"
-            )
+        _on_monitors(add(name, text, partial(_on_bridges, work)), name)
     _add_details(commands.choices)
     return parser
+
+
+def _on_records(one: argparse.ArgumentParser) -> None:
+    """Options of commands that look at files of records."""
+    one.add_argument("files", nargs="+", type=Path, help="T.csv F.csv, or one file with all columns")
+    one.add_argument("--temperatures", nargs="+", metavar="COLUMN", help="by default as files or names tell")
+    one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
+    one.add_argument("--reference", nargs="+", default=[], metavar="COLUMN", help="temperatures from elsewhere")
+    one.add_argument("--zone", help='time zone of the logger\'s clock, such as "Europe/Brussels"')
+    one.add_argument("--until", metavar="TIME", help="last moment of the baseline (default: all records)")
+
+
+def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
+    """Options of commands on monitors."""
+    many = {} if name in ("acknowledge", "rebaseline") else {"nargs": "+"}
+    what = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
+    one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
+    one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
+    one.add_argument("--now", metavar="TIME", help="as of this time (default: that of the clock)")
+    if name in ("update", "status", "report"):
+        one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, or of the fleet")
+        one.add_argument("--title", help="heading of the page")
+        one.add_argument("--fdr", type=float, default=0.1, help="false discovery rate of a fleet (default: 0.1)")
+    if name not in ("status", "report"):
+        one.add_argument(
+            "--wait", type=float, default=60.0, metavar="SECONDS", help="for another command at work (default: 60)"
+        )
 
 
 def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
