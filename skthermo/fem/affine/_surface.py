@@ -99,7 +99,7 @@ class SmoothCoordinates:
         return cls(tuple(pairs))
 
     def of(self, frequencies: Array) -> tuple[Array, Array]:
-        """Coordinates, (n_samples, n_modes), and the halves of the differences with their sign, (n_samples, n_pairs)."""
+        """Coordinates, (n_samples, n_modes), and halves of the differences with their sign, (n_samples, n_pairs)."""
         found, halves = np.log(frequencies), np.empty((len(frequencies), len(self.pairs)))
         for number, (i, j) in enumerate(self.pairs):
             mean, halves[:, number] = (found[:, j] + found[:, i]) / 2, (found[:, j] - found[:, i]) / 2
@@ -191,22 +191,9 @@ class FrequencySurface:
     ):
         rows = np.asarray(theta, dtype=float)
         self._box = PrincipalBox.around(rows, None if bounds is None else np.asarray(bounds, dtype=float))
-        random = np.random.RandomState(0)
-        checks = self._box.drawn(CHECK_POINTS, random)
-        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
-        points, values = checks[:0], exact[:0]
-        self._coordinates = SmoothCoordinates.of_modes(exact)
-        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
-        self.share_ = 0.0
-        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
-            n_more = POINTS_PER_TERM * n_terms(rows.shape[1], degree) - len(points)
-            more = self._box.drawn(n_more, random)
-            points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
-            self._fit(points, values, degree)
-            self._check(checks, exact, near, tol)
-            if self.share_ >= ENOUGH:
-                break
-        self.n_solves_ = len(points) + len(checks)
+        self.n_solves_, self.share_ = 0, 0.0
+        if highest_degree >= FIRST_DEGREE:
+            self._learn(solve, highest_degree, tol)
         if self.share_ < LEAST_SERVED:
             raise RuntimeError(
                 f"polynomials of degree {highest_degree} give frequencies to {tol:g} at {self.share_:.0%} of the check "
@@ -263,6 +250,24 @@ class FrequencySurface:
         frequencies[~served] = np.nan
         return frequencies, served
 
+    def _learn(self, solve: Callable[[Array], Array], highest_degree: int, tol: float) -> None:
+        """Raise the degree until polynomials serve enough check points, or no higher one is allowed."""
+        random = np.random.RandomState(0)
+        checks = self._box.drawn(CHECK_POINTS, random)
+        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
+        points, values = checks[:0], exact[:0]
+        self._coordinates = SmoothCoordinates.of_modes(exact)
+        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
+        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
+            n_more = POINTS_PER_TERM * n_terms(checks.shape[1], degree) - len(points)
+            more = self._box.drawn(n_more, random)
+            points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
+            self._fit(points, values, degree)
+            self._check(checks, exact, near, tol)
+            if self.share_ >= ENOUGH:
+                break
+        self.n_solves_ = len(points) + len(checks)
+
     def _fit(self, points: Array, values: Array, degree: int) -> None:
         from sklearn.preprocessing import PolynomialFeatures  # importing fem does not load scikit-learn
 
@@ -275,7 +280,8 @@ class FrequencySurface:
         difference[:n_lower] -= lower
         apart = np.abs(halves) > CLOSE / 2
         signed = [
-            np.linalg.lstsq(features[one], half[one], rcond=None)[0] for one, half in zip(apart.T, halves.T, strict=True)
+            np.linalg.lstsq(features[one], half[one], rcond=None)[0]
+            for one, half in zip(apart.T, halves.T, strict=True)
         ]
         self._coefficients = np.column_stack([whole, difference, *signed])
 
@@ -308,7 +314,8 @@ class FrequencySurface:
     def _in_order(self, frequencies: Array, halves: Array) -> NDArray[np.bool_]:
         """Rows in which the polynomials of differences, with their sign, agree with the others to a half."""
         found = self._coordinates.of(frequencies)[1]
-        return (np.abs(halves - found) < np.abs(found) / 2).all(axis=1)
+        agreed: NDArray[np.bool_] = np.abs(halves - found) < np.abs(found) / 2
+        return np.asarray(agreed.all(axis=1))
 
 
 def n_terms(n_parameters: int, degree: int) -> int:
