@@ -18,7 +18,7 @@ def test_filters_tell_kinds_apart_and_point_to_the_line_of_the_user():
         with warnings_once("more"):
             for number in range(3):
                 warn_user("it is hot", WeatherWarning, "weather")
-                warn_user(f"{number} records", FewRecordsWarning, "few rows")
+                warn_user(f"{number} records", FewRecordsWarning, "few-rows")
     assert [(one.category, one.filename) for one in caught] == [(FewRecordsWarning, __file__)]
     assert re.fullmatch("0 records .and 2 times more more.", str(caught[0].message))
     with warnings.catch_warnings():
@@ -29,15 +29,15 @@ def test_filters_tell_kinds_apart_and_point_to_the_line_of_the_user():
 
 def test_what_is_explained_stays_so_after_the_estimator_around():
     rows = np.array([True, False])
-    with told_around(["few rows"]):
+    with told_around(["few-rows"]):
         table = explain_rows(np.array([np.nan, 1.0]), rows)
-        warn_user("few", FewRecordsWarning, "few rows")
+        warn_user("few", FewRecordsWarning, "few-rows")
     assert explained_rows(table).tolist() == [True, False]
     assert not explained_rows(table.copy())
     table[0] = 1.0
     assert not explained_rows(table).any()
     with pytest.warns(FewRecordsWarning):
-        warn_user("few", FewRecordsWarning, "few rows")
+        warn_user("few", FewRecordsWarning, "few-rows")
 
 
 def test_another_thread_has_a_context_of_its_own():

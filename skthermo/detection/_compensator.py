@@ -412,11 +412,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
         outside = reach.warning(inputs)
         if outside:
-            warn_user(outside, WeatherWarning, "weather outside the training range")
+            warn_user(outside, WeatherWarning, "outside-training-weather")
         warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
         apart = self.sensors_.warning(temperatures)
         if apart:
-            warn_user(apart, RecordsWarning, "sensor apart from others")
+            warn_user(apart, RecordsWarning, "sensor-disagrees")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -435,7 +435,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         try:
             check_temperatures(named.drop(columns=names[self.targets_]))
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error), RecordsWarning, "temperatures")
+            warn_user(str(error), RecordsWarning, "implausible-temperatures")
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:
@@ -529,7 +529,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
             "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
             FewRecordsWarning,
-            "lags without stamps",
+            "lags-without-stamps",
         )
         return "contiguous"
 
@@ -540,7 +540,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     consequence = "the spread of residuals is widened by what that costs"
     message = told_fills(deviations, column_names(temperatures, "x"), consequence)
     if message:
-        warn_user(message, RecordsWarning, "filled temperatures")
+        warn_user(message, RecordsWarning, "filled-temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -550,7 +550,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     others = "of which the estimator predicts nothing, as where lags reach to no record"
     message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
     if message:
-        warn_user(message, UnevaluatedRowsWarning, "rows that cannot be predicted")
+        warn_user(message, UnevaluatedRowsWarning, "not-predicted")
     return unknown
 
 

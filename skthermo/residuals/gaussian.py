@@ -255,7 +255,7 @@ def _settled(step: Callable[[Array], Array], n_rows: int, n_modes: int) -> tuple
             f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
             "part of it nearly undetermined",
             ResultWarning,
-            "covariance with gaps",
+            "covariance-with-gaps",
         )
     return state[0], state[1:]
 

@@ -100,7 +100,7 @@ def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> N
                 f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
             )
     if text:
-        warn_user(text, WeatherWarning, "weather of folds")
+        warn_user(text, WeatherWarning, "unseen-fold-weather")
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,7 @@ class _Records:
 
 
 def _stuck(records: _Records) -> Iterator[Finding]:
-    for what, table, names in (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes)):
+    for what, table, names in (("stuck-sensor", records.T, records.sensors), ("stuck-mode", records.F, records.modes)):
         for name, column in zip(names, table.T, strict=True):
             for rows in stuck_runs(column):
                 if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
@@ -227,11 +227,11 @@ def _against_weather(records: _Records) -> Iterator[Finding]:
     usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
     shift = best_shift(lines, past, places, F, folds, records.inertia)
     if shift is not None:
-        yield records.finding("time shift", "", *_shifted(records, shift))
+        yield records.finding("time-shift", "", *_shifted(records, shift))
         return
     if len(share) and (share < NOTHING).all() and not records.has_faulty_sensors:
         detail = f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
-        yield records.finding("weather", "", usable, detail)
+        yield records.finding("no-thermal-effect", "", usable, detail)
         return
     yield from (finding for finding, _ in slow)
     yield from changes
@@ -267,7 +267,7 @@ def _slow_means(records: _Records) -> Iterator[tuple[Finding, Array]]:
                 f"{part['fall'].mean():.0%}: ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
             )
             inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-            yield records.finding("memory", sensor, usable, detail), inputs
+            yield records.finding("thermal-memory", sensor, usable, detail), inputs
 
 
 def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
@@ -275,7 +275,7 @@ def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iter
         names = f"{records.modes[first]!r} and {records.modes[second]!r}"
         n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
         detail = f"{names} in {len(rows)} of {n_both} rows, {records.period(rows)}"
-        yield records.finding("exchanged modes", names, rows, detail)
+        yield records.finding("exchanged-modes", names, rows, detail)
         records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
 
 
@@ -313,7 +313,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[Findi
                 f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g}{records.unit} in "
                 f"{records.period(rows[:1])}"
             )
-            yield records.finding("outliers", name, rows, detail)
+            yield records.finding("frequency-outliers", name, rows, detail)
     F[far] = np.nan
     records.outliers |= far
 
@@ -349,7 +349,9 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
             detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"
-            found.append(records.finding("step", name, known, f"{detail}, standard error {step.standard_error:.1g}"))
+            found.append(
+                records.finding("sudden-change", name, known, f"{detail}, standard error {step.standard_error:.1g}")
+            )
             continue
         change, error = row["change"], row["standard_error"]
         scatter = error * np.sqrt(row["n_independent"] / 12)

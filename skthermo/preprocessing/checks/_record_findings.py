@@ -14,7 +14,7 @@ from skthermo.preprocessing.checks._kinds import MEANINGLESS, WARNINGS, Finding
 
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
 MOST_NAMED = 12  # findings of one kind that a sentence lists
-UNWARNED = frozenset({"few rows"})  # estimators that need more warn of them
+UNWARNED = frozenset({"few-rows"})  # estimators that need more warn of them
 
 
 @dataclass(frozen=True, repr=False)

@@ -82,7 +82,7 @@ class ReplicateRates:
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
                 ModelWarning,
-                "failed replicates",
+                "failed-replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)
         keys = [key for key in found[0] if all(key in one for one in (own, *found))]

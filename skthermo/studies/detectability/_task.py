@@ -248,7 +248,7 @@ class DetectionTask(Bunch):
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
                     "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
                     ResultWarning,
-                    "search that refits",
+                    "search-refits",
                 )
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
         check_detector(detector, "the detector")
@@ -315,7 +315,7 @@ class DetectionTask(Bunch):
                 "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
                 "was tuned",
                 WeatherWarning,
-                "same weather",
+                "same-weather",
             )
         rows = []
         for name, detector in named.items():

@@ -268,7 +268,7 @@ def compare_extensions(
             f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
             "the study; expected a study with larger severities",
             ResultWarning,
-            "families that are not found",
+            "undetected-families",
         )
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
