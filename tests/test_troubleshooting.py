@@ -23,8 +23,8 @@ REPORTS = [
     "answer",
     "limits",
     "sentences",
-    "waits_told",
-    "false_alarms_told",
+    "waits_text",
+    "false_alarms_text",
 ]
 """Functions whose sentences tell what is doubtful."""
 

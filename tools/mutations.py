@@ -353,7 +353,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
     ("_estimators/warnings.py", "detection/test_checked_once.py"): [
-        ("what an estimator around has told", "if kind in context.told:", "if kind in ():"),
+        ("what the calling estimator has reported", "if kind in context.reported:", "if kind in ():"),
         (
             "a check that is shared",
             "content = ALL if ALL in found else content_of(tables)",

@@ -11,7 +11,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
-from skthermo._estimators.warnings import checked_once, findings_of, told_around
+from skthermo._estimators.warnings import checked_once, findings_of, reported_by_caller
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import FusedDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures, check_records
@@ -137,9 +137,9 @@ class TestChecks:
         np.testing.assert_array_equal(fitted[0].folds_, alone[0].folds_)
 
     def test_findings_of_an_estimator_around_are_those_of_its_parts(self):
-        with told_around(["stuck-sensor"], "what was found"):
+        with reported_by_caller(["stuck-sensor"], "what was found"):
             assert findings_of(None, T, F) == "what was found"
-        with pytest.raises(ValueError, match="broken"), told_around([], "what was found"):
+        with pytest.raises(ValueError, match="broken"), reported_by_caller([], "what was found"):
             raise ValueError("broken")
         assert said(findings_of, check_records, STUCK[list(T)], F)[1]
 
