@@ -241,7 +241,7 @@ def test_other_detectors_are_judged_too(fem, detector):
     task = task_of(fem, columns=MODES)
     assert list(task.X) == MODES
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*temperature-names")
+        warnings.filterwarnings("ignore", ".*LocalOutlierFactor was fitted with feature names")
         scores = cross_val_score(detector, task.X, task.y, cv=task.cv, scoring=task.scoring)
     assert ((scores >= 0) & (scores < 1)).all()
     only = task_of(fem, baseline=YEAR.frequencies)

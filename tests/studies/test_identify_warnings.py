@@ -87,7 +87,7 @@ def test_what_is_no_fitted_chain_is_named():
         identify_damage(DataInformedFEM(make_truss()), T, F)
 
 
-@pytest.mark.filterwarnings("ignore:.*temperature-names")
+@pytest.mark.filterwarnings("ignore:.*feature names")
 def test_temperatures_of_other_sensors_are_errors(fem):
     with pytest.raises(ValueError, match="X has 2 features, but DataInformedFEM is expecting 3"):
         identify_damage(fem, T.to_numpy()[:, :2], F)
