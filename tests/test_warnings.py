@@ -1,4 +1,4 @@
-"""Warnings are of a few kinds, which Python's filters tell apart, and leave nothing behind."""
+"""Warnings are of a few kinds, which Python's filters distinguish, and leave nothing behind."""
 
 import pickle
 import re

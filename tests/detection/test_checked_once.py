@@ -170,7 +170,7 @@ class TestRows:
         assert f"the first row 4 ({LATER.index[4]})" in texts[1]
         np.testing.assert_array_equal(np.flatnonzero(alarms == 0), [3, 4])
 
-    def test_no_row_with_temperatures_is_told_once_too(self):
+    def test_no_row_with_temperatures_is_reported_once_too(self):
         fitted = detector(LinearRegression()).fit(X)
         alarms, texts = said(fitted.predict, without(slice(None), list(T)))
         assert not alarms.any()
@@ -191,7 +191,7 @@ class TestRows:
         with pytest.warns(UserWarning, match="^4 of .*not-evaluated"):
             assert len(detector.predict(residuals)) == len(LATER) + 1
 
-    def test_lags_that_find_nothing_are_told_once(self):
+    def test_lags_that_find_nothing_are_reported_once(self):
         lags = make_pipeline(LagFeatures([0, 1], freq="2D", tolerance="0h", padding="nan"), LinearRegression())
         fitted, _ = said(detector(lags).fit, X)
         alarms, texts = said(fitted.predict, LATER)
@@ -226,7 +226,7 @@ class TestRows:
         ],
         ids=["hot", "drift"],
     )
-    def test_weather_and_sensors_are_told_once(self, change, message):
+    def test_weather_and_sensors_are_reported_once(self, change, message):
         long = make_truss_campaign(2, random_state=5)
         both = [detector(part).fit(long.temperatures.join(long.frequencies)) for part in (LinearRegression(), chain())]
         for fitted in both:

@@ -68,7 +68,7 @@ def test_a_record_in_unknown_weather_is_healthy_only_if_a_large_fall_would_be_se
 
 
 @pytest.mark.nightly
-def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
+def test_winter_weeks_keep_the_false_alarm_rate_of_a_year_and_find_damage():
     events, unaware, found = [], [], []
     for seed in range(6):
         records, damaged = served(seed), served(seed, damage=0.1)
