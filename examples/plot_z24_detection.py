@@ -55,7 +55,7 @@ for expected in (
     "few-baseline-records",  # one winter of raw frequencies
     "sudden-change",  # the frost of January, by a straight line
     "sensor-disagrees",  # after the frost, for baselines that end before it
-    "unseen-fold-weather",  # forward in time
+    "weather-of-one-fold",  # forward in time
 ):
     warnings.filterwarnings("ignore", f".*{expected}")
 records = Records.of(bridge)

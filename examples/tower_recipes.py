@@ -32,7 +32,7 @@ def quietly(function, *arguments):
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*outside-training-weather")
         warnings.filterwarnings("ignore", ".*not-predicted")
-        warnings.filterwarnings("ignore", ".*unseen-fold-weather")
+        warnings.filterwarnings("ignore", ".*weather-of-one-fold")
         return function(*arguments)
 
 

@@ -100,7 +100,7 @@ def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: s
                 f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
             )
     if text:
-        warn_user(text, WeatherWarning, "unseen-fold-weather")
+        warn_user(text, WeatherWarning, "weather-of-one-fold")
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def test_no_target_of_a_fold_reaches_its_own_prediction():
 
 
 def test_contiguous_folds_of_one_year_are_warned_of_with_numbers():
-    with pytest.warns(UserWarning, match="[0-9]+ of 584 .*of 5 .*'T' .*unseen-fold-weather") as given:
+    with pytest.warns(UserWarning, match="[0-9]+ of 584 .*of 5 .*'T' .*weather-of-one-fold") as given:
         residuals = compensator(DecisionTreeRegressor(max_depth=5), cv="contiguous").fit_transform(winter_year())
     assert len(given) == 1
     assert len(residuals) == len(STAMPS)

@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
         "rows-from-fleet",
-        "unseen-fold-weather",
+        "weather-of-one-fold",
         "outside-training-weather",
         "frequency-outliers",
         "few-baseline-records",

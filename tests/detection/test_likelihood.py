@@ -24,7 +24,7 @@ from skthermo.detection import (
 from skthermo.preprocessing import BlockedKFold
 
 pytestmark = [  # folds of few records predict weather not seen, and raw frequencies follow the season
-    pytest.mark.filterwarnings("ignore:.*unseen-fold-weather"),
+    pytest.mark.filterwarnings("ignore:.*weather-of-one-fold"),
     pytest.mark.filterwarnings("ignore:.*outside-training-weather"),
     pytest.mark.filterwarnings("ignore:.*few-baseline-records"),
     pytest.mark.filterwarnings("ignore:.*frequency-outliers"),

@@ -139,7 +139,7 @@ def test_some_of_a_long_baseline_tell_the_spread_of_all(monkeypatch):
         np.testing.assert_allclose(spread, np.eye(2), atol=0.3)
 
 
-@pytest.mark.filterwarnings("ignore:.*unseen-fold-weather")
+@pytest.mark.filterwarnings("ignore:.*weather-of-one-fold")
 def test_few_records_have_one_covariance():
     few = X.iloc[:90]
     assert compensator().fit(few).spread_.smoothing is None

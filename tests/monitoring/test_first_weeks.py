@@ -19,7 +19,7 @@ pytestmark = [
     for message in (
         "missing-seasons",
         "extrapolated-threshold",
-        "unseen-fold-weather",
+        "weather-of-one-fold",
         "few-baseline-records",
         "baseline-excursion",
         "not-evaluated",

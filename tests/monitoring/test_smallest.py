@@ -18,7 +18,7 @@ from skthermo.monitoring._smallest import LARGE, LoweredIndices
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 ANSWER = ["state", "index", "reason", "event"]
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(unseen-fold-weather|not-evaluated|missing-seasons|few-baseline-records|extrapolated-threshold)"
+    "ignore:.*(weather-of-one-fold|not-evaluated|missing-seasons|few-baseline-records|extrapolated-threshold)"
 )
 
 

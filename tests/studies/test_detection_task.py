@@ -142,7 +142,7 @@ def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
     task = task_of(fem_of_arrays, T=T)
     assert list(task.X.index) == list(range(365 + 6 * 120))
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(no-earlier-records|lags-without-stamps|unseen-fold-weather)")
+        warnings.filterwarnings("ignore", ".*(no-earlier-records|lags-without-stamps|weather-of-one-fold)")
         detector = task.refit(with_memory(3, targets=[3, 4, 5, 6, 7, 8]))
         found = task.scoring.decisions(detector, task.X[365:]).values
         for start in range(0, len(found), 120):
@@ -265,7 +265,7 @@ def test_halving_takes_a_parameter_as_its_resource(fem):
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"windowedalarm__window": ["1D", "7D"]}
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(unseen-fold-weather|not-predicted)")
+        warnings.filterwarnings("ignore", ".*(weather-of-one-fold|not-predicted)")
         search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     with pytest.warns(UserWarning, match="search-refits"):
         best = task.refit(search)

@@ -23,7 +23,7 @@ pytestmark = [
     for message in (
         "rows-from-fleet",
         "outside-(prior|training-weather)",
-        "unseen-fold-weather",
+        "weather-of-one-fold",
         "few-rows",
         "hidden-offsets",
         "mode-offsets",

@@ -252,7 +252,7 @@ def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
 
 def test_folds_in_unseen_weather_are_named():
     short = chain().fit(T[:150], F[:150])
-    with pytest.warns(UserWarning, match=r"\d+ of 30 .*unseen-fold-weather"):
+    with pytest.warns(UserWarning, match=r"\d+ of 30 .*weather-of-one-fold"):
         short.records_.out_of_fold(short.mapper_, short.thermal_.frequencies, short.discrepancy_, folds=KFold(5))
 
 
