@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
+from skthermo._estimators.answers import answer_once
 from skthermo._estimators.warnings import (
     explain_rows,
     explained_rows,
@@ -407,6 +408,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Frequencies and weather of new records, residuals in Hz, errors of predictions, rows without a prediction."""
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
+        predict = partial(self._predicted, temperatures)
+        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
+
+    def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
+        """Weather of new records, predictions in Hz, their errors, and the rows without any."""
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
@@ -420,10 +427,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
-        residuals = as_floats(frequencies) - predicted
         fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
-        errors = self.regression_.errors(filled).plus(fills, len(residuals))
-        return frequencies, weather, residuals, errors, unknown
+        return weather, predicted, self.regression_.errors(filled).plus(fills, len(predicted)), unknown
 
     def _split(self, X: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies of new records, with a warning of values that are none."""

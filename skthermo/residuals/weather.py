@@ -250,6 +250,11 @@ class PredictionError:
         """That of predictions of which no error is known."""
         return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
 
+    def of_part(self, rows: slice) -> PredictionError:
+        """That of some rows of a table, counted from the first of them."""
+        first, stop = np.searchsorted(self.rows, [rows.start, rows.stop])
+        return PredictionError(self.rows[first:stop] - rows.start, self.covariances[first:stop])
+
     def of_all(self, n_rows: int, n_modes: int) -> Array:
         """The covariance of each row of a table, zero where nothing is known."""
         covariances = np.zeros((n_rows, n_modes, n_modes))
