@@ -13,6 +13,7 @@ from joblib import delayed
 from scipy.special import expit, logit
 from scipy.stats import t
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, without_warnings
 from skthermo._io import run_jobs
@@ -82,7 +83,7 @@ class ReplicateRates:
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
                 ModelWarning,
-                "failed replicates",
+                "failed-replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)
         keys = [key for key in found[0] if all(key in one for one in (own, *found))]
@@ -210,7 +211,7 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
     random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
     seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
     here, steps, drawn = simulation, [], []
-    with without_warnings(), checked_once(), single_blas_thread():
+    with without_warnings(), answers_kept(), checked_once(), single_blas_thread():
         try:
             for part, chain, T in replicates.replicate(number):
                 if not drawn or here.T is not T:

@@ -15,7 +15,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
+from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
 from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
@@ -378,9 +378,9 @@ class DetectabilityStudy(BaseEstimator):
                 rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, progress)
         found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
         doubt = found.many_false_alarms()
-        self.findings_ = replace(found, warnings=[*texts, doubt]) if doubt else found
-        if doubt:
-            warn_user(doubt, ResultWarning, "many false alarms")
+        doubts = [ResultWarning(doubt, "many-false-alarms")] if doubt else []
+        self.findings_ = replace(found, warnings=[*texts, *map(str, doubts)])
+        warn_each(doubts)
         return self.findings_.table
 
     def _most_repeats(self) -> int:
