@@ -246,7 +246,7 @@ def test_records_that_are_not_evaluated_are_said(fem):
     study.run(WEATHER)
     share = study.ranking().loc["half", "not_evaluated"]
     assert share == pytest.approx(0.5, abs=0.01)
-    assert f"neither healthy nor damaged: 'half' {share:.1%}." in study.summary()
+    assert f"(neither healthy nor damaged): 'half' {share:.1%}." in study.summary()
 
 
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
@@ -258,7 +258,7 @@ def test_without_other_noise_nothing_is_significant(fem, options):
         table = study.ranking(by=by)
         assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
         assert not table["significantly_worse"].any()
-    assert "do not show which detectors" in study.summary()
+    assert "does not show which detectors" in study.summary()
 
 
 def test_measured_records_rank_by_what_was_found(fem):
