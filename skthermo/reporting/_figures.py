@@ -24,14 +24,15 @@ from skthermo.plotting import (
     PredictionDisplay,
     StructureDisplay,
 )
-from skthermo.reporting._findings import Finding
 from skthermo.reporting._html import Html, image
 from skthermo.reporting._readable import Values, readable
-from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from skthermo.reporting._findings import Finding
+    from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
 
 
 class HasFigure(Protocol):
@@ -213,10 +214,10 @@ def draw_identified_damage(identified: IdentifiedDamage) -> Html:
         axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
         return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
 
-    told = ", ".join(
+    explanations = ", ".join(
         f"{label}: {chance_text(row['probability'])}" for label, row in identified.summary_table.head(3).iterrows()
     )
-    alt = f"Explanations with their probabilities ({told}), severities, and measured and explained shifts."
+    alt = f"Explanations with their probabilities ({explanations}), severities, and measured and explained shifts."
     return draw(make, alt, height=sum(heights))
 
 

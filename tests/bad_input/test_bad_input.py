@@ -126,7 +126,7 @@ def findings(result):
 def verdict(example, argument, cause, value, good_result, good_warnings):
     """One of "legal", "refused", "warned", "silent", "unclear", and what was said."""
     with np.errstate(all="ignore"):
-        result, error, told = answer(example, example.good | {argument: value})
+        result, error, warned = answer(example, example.good | {argument: value})
     if isinstance(error, TooLong):
         return "unclear", f"still running after {SECONDS} s"
     if error is not None:
@@ -138,7 +138,7 @@ def verdict(example, argument, cause, value, good_result, good_warnings):
     named = findings(result) - findings(good_result)
     if named:
         return "warned", f"findings: {sorted(named)}"
-    new = {text for text in told if not any(re.sub(r"\d", "", text) == re.sub(r"\d", "", o) for o in good_warnings)}
+    new = {text for text in warned if not any(re.sub(r"\d", "", text) == re.sub(r"\d", "", o) for o in good_warnings)}
     return ("warned", next(iter(new))) if new else ("silent", f"gave {result!r:.80}")
 
 
@@ -182,9 +182,9 @@ def tried(every=1, beginnings=()):
     good = {}
     for example, argument, cause, value in chosen:
         if id(example) not in good:
-            result, error, told = answer(example, example.good)
+            result, error, warned = answer(example, example.good)
             assert error is None, f"the good example of {example.name} fails: {error!r}"
-            good[id(example)] = result, told
+            good[id(example)] = result, warned
         yield Tried(example.name, argument, cause, *verdict(example, argument, cause, value, *good[id(example)]))
 
 

@@ -1,4 +1,4 @@
-"""What a threshold still sees, and that no record is healthy in which even a large change would go unseen."""
+"""Changes that a threshold still detects; no record is healthy in which even a large change would be missed."""
 
 import itertools
 import warnings
@@ -17,7 +17,9 @@ from skthermo.monitoring._smallest import LARGE, LoweredIndices
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 ANSWER = ["state", "index", "reason", "event"]
-pytestmark = pytest.mark.filterwarnings("ignore:.*(season|independent|not evaluated|of fold|is extrapolated)")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(weather-of-one-fold|not-evaluated|missing-seasons|few-baseline-records|extrapolated-threshold)"
+)
 
 
 @cache

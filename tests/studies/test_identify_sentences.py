@@ -73,7 +73,7 @@ def test_what_is_most_probable_what_else_could_be_and_whether_anything_has_chang
     assert records == "Compared: 60 records; with 365 training records."
 
 
-def test_what_only_adds_to_the_most_probable_explanation_is_told_in_short():
+def test_what_only_adds_to_the_most_probable_explanation_is_reported_in_short():
     more = {
         "deck": (0.8, {"deck": (0.12, 0.012)}),
         "deck + piers": (0.05, {"deck": (0.11, 0.012), "piers": (0.014, 0.003)}),
@@ -120,8 +120,8 @@ def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
 
 def test_silence_is_never_healthy():
     found = CASES["healthy"]
-    first, others, unnoticed, unseen, *_ = said(found)
-    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with that of the unseen group
+    first, others, unnoticed, unobservable, *_ = said(found)
+    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with the unobservable one's
     assert others.startswith(
         "It could also be: something else than damage of these groups (3 %); a loss of 2 % in deck"
     )
@@ -130,7 +130,7 @@ def test_silence_is_never_healthy():
         f"A loss of stiffness of up to {100 * bounds['deck']:.2g} % in deck and {100 * bounds['piers']:.2g} % in piers "
         "could have gone unnoticed."
     )
-    assert unseen == "Damage in vertical cannot be seen in these modes: nothing is known of it."
+    assert unobservable == "Damage in vertical cannot be seen in these modes: nothing is known of it."
     doubtful = identified(HEALTHY, unobservable=["vertical"], p_value=0.01)
     assert "Yet a healthy structure shows such shifts with a probability of only 1 %." in said(doubtful)
 
@@ -160,7 +160,7 @@ def test_where_no_damage_explains_the_shifts_likely_causes_are_named(measured, c
         f"{100 * measured[worst]:+.2f} % (standard error 0.10 %), of which these groups explain +0.00 %."
     )
     assert causes.startswith(f"Likely causes: {cause}")
-    assert cause in by_kind(found)["unexplained shifts"]
+    assert cause in by_kind(found)["unexplained-shifts"]
 
 
 @pytest.mark.parametrize(
@@ -184,14 +184,14 @@ def test_strengthening_that_was_sought_is_not_named_as_a_cause():
     assert "strengthening" not in sought.summary()
 
 
-def test_what_the_most_probable_explanation_leaves_is_told():
+def test_what_the_most_probable_explanation_leaves_is_reported():
     found = identified(CLEAR, misfit_p_value=0.004, shifts=shifts([-0.02, -0.001, -0.012, 0.0], -0.001))
     (misfit,) = (line for line in said(found) if "unexplained" in line)
     assert misfit == (
         "The most probable explanation leaves something unexplained (probability by chance 0.4 %): mode f1 departs "
         "most: it moved by -2.00 % (standard error 0.10 %), of which these groups explain -0.10 %."
     )
-    assert "likely causes: damage outside these groups" in by_kind(found)["unexplained shifts"]
+    assert "likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
     assert "any shift can be explained" in identified(CLEAR, misfit_p_value=np.nan).summary()
 
 
@@ -224,14 +224,14 @@ def test_probabilities_have_no_more_digits_than_they_deserve(probability, text):
     assert chance_text(1.0) == f"above 99.9{SPACE}%"
 
 
-def test_records_that_were_left_out_or_scatter_widely_are_told():
+def test_records_that_were_left_out_or_scatter_widely_are_reported():
     left_out = {"without a frequency": 12, "in foreign weather": 3}
     records = ComparedRecords(90, left_out, 75.0, 365, 365.0, {"f3": 2.4})
     found = identified(CLEAR, records=records)
     assert records.n_compared == 75
     assert "15 of 90 records could not be compared: 12 without a frequency and 3 in foreign weather." in found.summary()
     assert "Mode f3 scatters 2.4 times as widely as in the training records" in found.summary()
-    assert "records that were not compared" in by_kind(found)
+    assert "not-compared" in by_kind(found)
 
 
 @pytest.mark.parametrize("is_few", [True, False])
@@ -240,8 +240,7 @@ def test_few_independent_records_are_warned_of(is_few):
     found = identified(CLEAR, records=ComparedRecords(60, {}, worth[0], 365, worth[1], {}))
     assert ("60 records, worth 1.6 independent ones" in found.summary()) == is_few
     kinds = by_kind(found)
-    assert ("few independent records" in kinds) == is_few
-    assert ("few independent training records" in kinds) == is_few
+    assert ("few-independent-records" in kinds) == is_few
 
 
 @pytest.mark.parametrize(
@@ -256,7 +255,7 @@ def test_few_independent_records_are_warned_of(is_few):
 def test_only_a_severity_may_be_at_the_bound_of_severities(amount, kind, is_at_bound):
     found = identified({"deck": (1.0, {"deck": amount})}, kinds={"deck": kind})
     kinds = [warning.kind for warning in found.warnings()]
-    assert ("severity at its bound" in kinds) == is_at_bound
+    assert ("severity-at-bound" in kinds) == is_at_bound
 
 
 @pytest.mark.parametrize(("amount", "text"), [(0.0812, "8.1"), (0.3, "30"), (-0.996, "100"), (2.12, "212")])

@@ -88,7 +88,7 @@ def test_years_are_matched_by_season():
         other_years([np.zeros((3, 1)), np.zeros((2, 1))])
 
 
-def test_repeats_do_not_depend_on_the_worlds(fem, study):
+def test_repeats_do_not_depend_on_the_replicates(fem, study):
     alone = study_of(fem, "noise")
     results = alone.run(WEATHER)
     left = study.results_.drop(columns=["pi_low", "pi_high"])
@@ -103,7 +103,7 @@ def test_repeats_do_not_depend_on_the_worlds(fem, study):
 
 
 @pytest.mark.nightly
-def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
+def test_replicates_do_not_depend_on_the_number_of_jobs(fem):
     study = study_of(fem, ("noise", "baseline", "weather"))
     twin = clone(study).set_params(n_jobs=2)
     results = study.run(WEATHER)
@@ -112,7 +112,7 @@ def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
     pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(twin)).uncertainty_, study.uncertainty_)
 
 
-def test_a_world_is_drawn_from_its_seed_alone(fem):
+def test_a_replicate_is_drawn_from_its_seed_alone(fem):
     few, many = (Replicates.of(fem, ("baseline", "weather"), WEATHER, None, number, [1, 2]) for number in (2, 4))
     for number in (0, 1):
         for (part, chain, T), (again, other, T_again) in zip(
@@ -123,7 +123,7 @@ def test_a_world_is_drawn_from_its_seed_alone(fem):
             pd.testing.assert_frame_equal(chain.predict(T), other.predict(T))
 
 
-@pytest.mark.filterwarnings("ignore:the aligner hides offsets")
+@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
 def test_parts_come_one_after_the_other(fem):
     replicates = Replicates.of(fem, ("model", "noise", "baseline", "weather"), WEATHER, MODELS, 3, [1, 2])
     (weather, chain, T), (baseline, other, _), (model, third, _) = replicates.replicate(1)
@@ -201,7 +201,7 @@ def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(p
     assert np.mean(replicates.single(key)) == pytest.approx(centre, abs=0.005)
 
 
-def test_all_worlds_alike_have_no_spread():
+def test_all_replicates_alike_have_no_spread():
     found = Spread.of(np.full((5, 3), 0.25))
     assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
 
@@ -218,11 +218,11 @@ def test_bands_of_a_study(study):
     curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.replicates])
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
     assert curve.a90_band[0] < curve.a90_band[1]
-    told = study.summary()
-    assert "Bands of 95% hold noise, the weather, the training records and the model." in told
+    summary = study.summary()
+    assert "95% prediction intervals include the uncertainty of noise, the weather, the training records and" in summary
     damaged = study.results_.set_index("scenario").drop("healthy")
     widest = (damaged["pi_high"] - damaged["pi_low"]).idxmax()
-    assert f"A measured campaign of {widest!r} should show" in told
+    assert f"The widest is that of {widest!r}: " in summary
 
 
 def test_models_that_cannot_be_drawn(monkeypatch, fem):
@@ -232,7 +232,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
     monkeypatch.setattr("skthermo.studies.replicates._replicates.ModelUpdater.fit", fails)
     with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
         Replicates.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
-    with pytest.warns(UserWarning, match="bands hold no error of the model: other models like"):
+    with pytest.warns(UserWarning, match="bands-without-models"):
         replicates = Replicates.of(fem, "all", WEATHER, None, 3, [1, 2])
     assert replicates.parts == ["weather", "baseline"]
 
@@ -247,7 +247,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
         ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, 'auto' or 'all'"),
     ],
 )
-def test_wrong_worlds_are_refused(fem, options, message):
+def test_wrong_options_are_refused(fem, options, message):
     with pytest.raises(ValueError, match=message):
         study_of(fem, **({"uncertainty": "noise"} | options)).run(WEATHER)
 
@@ -263,7 +263,7 @@ class Failing(Scenario):
         return super()._changes(T, repeat)
 
 
-def test_worlds_that_fail_are_counted(fem, monkeypatch):
+def test_replicates_that_fail_are_counted(fem, monkeypatch):
     years = [WEATHER, WEATHER + 0.1, WEATHER + 0.2, WEATHER + 0.3]
     study = DetectabilityStudy(
         fem,
@@ -274,7 +274,7 @@ def test_worlds_that_fail_are_counted(fem, monkeypatch):
         n_replicates=4,
     )
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.25)
-    with pytest.warns(UserWarning, match="1 of 4 replicates failed, the first with ValueError: too warm"):
+    with pytest.warns(UserWarning, match="1 of 4 .*too warm.*failed-replicates"):
         study.run(years)
     assert len(study.replicates_.rates["MahalanobisDetector", "damage"]) == 3
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.05)
@@ -282,7 +282,7 @@ def test_worlds_that_fail_are_counted(fem, monkeypatch):
         study.run(years)
 
 
-def test_uncertain_damage_differs_from_world_to_world(fem):
+def test_uncertain_damage_differs_from_replicate_to_replicate(fem):
     uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
     options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_replicates": 2, "random_state": 0}
     study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], **options)
@@ -311,7 +311,7 @@ def test_a_refitted_chain_finds_the_same_parameters(fem):
     assert (np.abs(fem.refitted().parameters_ - fem.parameters_) < 0.02 * deviations).all(axis=None)
 
 
-@pytest.mark.filterwarnings("ignore:the aligner hides offsets")
+@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
 def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
     plain = clone(fem).set_params(aligner="passthrough").fit(*fem.training_records_)
     refitted = plain.refitted(model=MODELS[0])

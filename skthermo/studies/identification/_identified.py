@@ -253,8 +253,8 @@ def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
 def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
     """Causes that are likely over all explanations together, unless they are those of the first and sure."""
     table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unobservable)]
-    told_first = {amounts[0].cause for amounts in first.changes}
-    if told_first.issuperset(table.index) and (table["probability"] >= SURE).all():
+    in_first = {amounts[0].cause for amounts in first.changes}
+    if in_first.issuperset(table.index) and (table["probability"] >= SURE).all():
         return
     named = []
     for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():
@@ -302,17 +302,17 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
         sets = "; ".join(" and ".join(causes) for causes in found.indistinguishable)
         yield ResultWarning(
             f"groups that these modes cannot distinguish: {sets}. Only their common effect is known",
-            "indistinguishable groups",
+            "indistinguishable-groups",
         )
     if found.unobservable:
         names = ", ".join(found.unobservable)
         yield ResultWarning(
-            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable groups"
+            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable-groups"
         )
     highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
         yield ResultWarning(
-            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity at its bound"
+            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity-at-bound"
         )
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
@@ -323,7 +323,7 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
         yield ResultWarning(
             f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
             f"{likely_causes(found)}",
-            "unexplained shifts",
+            "unexplained-shifts",
         )
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._effects import read_groups
-from skthermo._estimators.warnings import told_around, warn_user, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo._tables.arrays import as_random_state
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
@@ -28,7 +28,7 @@ WORTH_DIVIDING = 0.05  # probability of a group, and of a piece of a damaged gro
 CANNOT_TELL = 0.75  # share of a group's pieces that may be worth it before dividing them would tell nothing
 WORTH_ASKING = 0.02  # probability of a whole group from which on it is divided at all
 MOSTLY_ELSE = 0.5  # probability of something else from which on a warning says so
-OF_WHOLE_GROUPS = ("unexplained shifts", "indistinguishable groups")
+OF_WHOLE_GROUPS = ("unexplained-shifts", "indistinguishable-groups")
 """Warnings that hold for whole groups, and may not hold for parts of them."""
 
 SOME_ELSE = 0.1  # probability of something else from which on every group is divided: a part of one may be behind it
@@ -128,7 +128,7 @@ def locate_damage(
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
-    with told_around(OF_WHOLE_GROUPS):
+    with reported_by_caller(OF_WHOLE_GROUPS):
         found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
     with without_warnings():  # identify_damage has given them
         seen = observe(fem, T, F, noise)
@@ -159,7 +159,7 @@ def locate_damage(
             "no damage of neighbouring members explains the shifts (something else has a probability of "
             f"{located.probability_other:.0%})",
             ResultWarning,
-            "unexplained shifts",
+            "unexplained-shifts",
         )
     return located
 

@@ -123,7 +123,7 @@ MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
-UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
+RESOLUTION = 0.1  # percent of a frequency, below which single records from ambient vibration show no change
 LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
 SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
 LEFT_BY_CALIBRATION = 0.3  # percent by which a calibrated model was found to miss mean frequencies
@@ -143,7 +143,7 @@ LARGE_DISCREPANCY, SMALL_DISCREPANCY = 1.0, 0.5
 given: on the truss and nine bridges it is up to 0.35 of that effect, with models that are 2 to 5 % off."""
 
 MANY_OUTLIERS = 0.05  # share of the frequencies above which a warning is given
-TOLD_OFFSET = 0.3  # smallest offset in percent that the warning names
+SMALLEST_OFFSET = 0.3  # smallest offset in percent that the warning names
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
@@ -294,10 +294,10 @@ class FitReport(SavesFrames):
         """The inputs that the fleet has seen farthest beyond these records."""
         own = self.fleet["highest"] - self.fleet["lowest"]
         farther = (self.fleet["fleet highest"] - self.fleet["fleet lowest"]) / own.where(own > 0, 1.0)
-        told = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:MOST_INPUTS]]
+        widest = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:MOST_INPUTS]]
         return ", ".join(
             f"{name!r} from {lowest:.3g} to {highest:.3g}, here {own_lowest:.3g} to {own_highest:.3g}"
-            for name, own_lowest, own_highest, lowest, highest in told.itertuples()
+            for name, own_lowest, own_highest, lowest, highest in widest.itertuples()
         )
 
     def _modes(self) -> pd.DataFrame:
@@ -339,7 +339,7 @@ class FitReport(SavesFrames):
         yield FewRecordsWarning(
             f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
             "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
-            "half of the rows",
+            "rows-left-out",
         )
 
     def _few_for_parameters(self) -> Iterator[SkthermoWarning]:
@@ -349,15 +349,19 @@ class FitReport(SavesFrames):
         yield FewRecordsWarning(
             f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
             "rows for each",
-            "few rows",
+            "few-rows",
         )
 
     def _mostly_filled(self) -> Iterator[SkthermoWarning]:
-        for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples():
+        mostly = [
+            f"{name!r} is missing in {rows} of {self.n_rows} rows ({when}; standard deviation {deviation:.2g} degrees)"
+            for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples()
+        ]
+        if mostly:
             yield RecordsWarning(
-                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the others "
-                f"({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
-                f"mostly filled {name}",
+                f"temperatures were filled from the other sensors in more than half of the rows: {', '.join(mostly)}. "
+                "Repair these sensors, or leave them out",
+                "mostly-filled",
             )
 
     def _worse_than_mean(self) -> Iterator[SkthermoWarning]:
@@ -369,20 +373,20 @@ class FitReport(SavesFrames):
             f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
             f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
             "see report_.offsets, update the model, or use the default aligner and discrepancy",
-            "worse than the mean",
+            "worse-than-mean",
         )
 
     def _hidden(self) -> Iterator[SkthermoWarning]:
         if not self.has_hidden_offsets:
             return
-        large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
-        told = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+        large = self.hidden_offsets[self.hidden_offsets.abs() >= SMALLEST_OFFSET]
+        offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
         yield ModelWarning(
-            f"the aligner hides offsets between measurement and model that weather does not explain ({told}): "
+            f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}): "
             "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
             "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
             "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
-            "hidden offsets",
+            "hidden-offsets",
         )
 
     def _many_outliers(self) -> Iterator[SkthermoWarning]:
@@ -392,7 +396,7 @@ class FitReport(SavesFrames):
         yield RecordsWarning(
             f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
             "by one way of identification: see report_.findings",
-            "many outliers",
+            "many-outliers",
         )
 
     def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
@@ -400,21 +404,21 @@ class FitReport(SavesFrames):
             return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
-        told = ", ".join(
+        modes = ", ".join(
             f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
         )
-        if told:
+        if modes:
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {told}: predictions rely on the discrepancy, and "
-                "simulated damage on a model that is not calibrated; expected a model updated to these records "
+                f"the FE model cannot follow what the weather does to {modes}: predictions rely on the discrepancy, "
+                "and simulated damage on a model that is not calibrated; expected a model updated to these records "
                 "(ModelUpdater), or parameters that this weather changes",
-                "large discrepancy",
+                "large-discrepancy",
             )
 
     def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
         if self.round_trip is None:
             return
-        shares = self.round_trip.abs() / self.scatter.clip(lower=UNSEEN)
+        shares = self.round_trip.abs() / self.scatter.clip(lower=RESOLUTION)
         if not (shares > 1).any():
             return
         worst = shares.idxmax()
@@ -423,7 +427,7 @@ class FitReport(SavesFrames):
             f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
             f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
             "refines its estimates, narrow_bounds=True, or more samples",
-            "round trip",
+            "round-trip-error",
         )
 
 
@@ -584,7 +588,7 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
             yield ModelWarning(
                 f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
                 f"order of its modes, or model.with_modes({order.tolist()})",
-                "order of modes",
+                "mode-order",
             )
             return
     if len(far):
@@ -592,5 +596,5 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
         yield RecordsWarning(
             f"measured modes differ from the model's nominal frequencies: {listed}; expected Hz, the modes of "
             "the model in their order, and a model updated to the structure",
-            "offset of modes",
+            "mode-offsets",
         )
