@@ -263,8 +263,8 @@ class ActiveDetector(SavesFrames):
         if blind:
             warn_user(
                 f"a fall by {PROBED[-1]:g} standard deviations of the baseline stays at or below the threshold "
-                f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
-                "another detector, or more false alarms a year",
+                f"{self.threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another "
+                "detector, or allow more false alarms a year",
                 ResultWarning,
                 "blind-detector",
             )

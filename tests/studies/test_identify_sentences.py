@@ -191,7 +191,7 @@ def test_what_the_most_probable_explanation_leaves_is_reported():
         "The most probable explanation leaves something unexplained (probability by chance 0.4 %): mode f1 departs "
         "most: it moved by -2.00 % (standard error 0.10 %), of which these groups explain -0.10 %."
     )
-    assert "likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
+    assert "Likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
     assert "any shift can be explained" in identified(CLEAR, misfit_p_value=np.nan).summary()
 
 

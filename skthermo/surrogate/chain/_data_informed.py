@@ -823,7 +823,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             warn_user(
-                f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
+                f"the score is of {scored} of {len(predicted)} rows: the others have gaps. Compare scores of the same "
+                "rows only",
                 UnevaluatedRowsWarning,
                 "rows-not-scored",
             )
