@@ -410,8 +410,8 @@ class FitReport(SavesFrames):
         )
         if modes:
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {modes}. Predictions rely on the discrepancy, and "
-                "simulated damage on a model that is not calibrated. Update the model (ModelUpdater), or give it "
+                f"the FE model cannot follow what the weather does to {modes}. Predictions rely on the discrepancy, "
+                "and simulated damage on a model that is not calibrated. Update the model (ModelUpdater), or give it "
                 "parameters that this weather changes",
                 "large-discrepancy",
             )
