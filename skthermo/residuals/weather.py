@@ -78,7 +78,8 @@ class TrainingRange:
         return (
             f"{rows.sum()} of {len(rows)} rows have temperatures outside the training range by more than "
             f"{FAR_OUTSIDE:.0%} of it: {self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} "
-            f"to {highest:.4g}. Predictions there are extrapolated. Give degrees Celsius{kelvin}, or train on such weather"
+            f"to {highest:.4g}. Predictions there are extrapolated. Give degrees Celsius{kelvin}, or train on such "
+            "weather"
         )
 
 

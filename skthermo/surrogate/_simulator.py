@@ -63,8 +63,8 @@ class Box:
         lowest, highest = self.bounds[worst]
         return (
             f"{rows.sum()} of {rows.size} rows give parameters {tested}. {self.names[worst]!r} is {values.min():.3g} "
-            f"to {values.max():.3g} in {len(values)} rows, with bounds {lowest:.6g} to {highest:.6g}. Give frequencies in "
-            "Hz in the order of the model's modes, wider bounds, or the noise of the measurement"
+            f"to {values.max():.3g} in {len(values)} rows, with bounds {lowest:.6g} to {highest:.6g}. Give frequencies "
+            "in Hz in the order of the model's modes, wider bounds, or the noise of the measurement"
         )
 
 

@@ -230,7 +230,7 @@ class TestForeignWeather:
             record = caught(method, weather)
             outside = [str(w.message) for w in record if "outside-training-weather" in str(w.message)]
             assert len(outside) == 1
-            assert "expected degrees Celsius" in outside[0]
+            assert "degrees Celsius" in outside[0]
 
     def test_extrapolation_distance_is_in_units_of_the_training_range(self, fitted):
         width = T.max() - T.min()

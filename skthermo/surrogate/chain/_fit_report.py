@@ -406,7 +406,7 @@ class FitReport(SavesFrames):
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
         modes = ", ".join(
-            f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
+            f"{name!r} ({weather[name]:.2g} % by the model, discrepancy {size:.2g} %)" for name, size in large.items()
         )
         if modes:
             yield ModelWarning(
