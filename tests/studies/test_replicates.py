@@ -219,10 +219,10 @@ def test_bands_of_a_study(study):
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
     assert curve.a90_band[0] < curve.a90_band[1]
     summary = study.summary()
-    assert "Bands of 95% hold noise, the weather, the training records and the model." in summary
+    assert "95% prediction intervals include the uncertainty of noise, the weather, the training records and" in summary
     damaged = study.results_.set_index("scenario").drop("healthy")
     widest = (damaged["pi_high"] - damaged["pi_low"]).idxmax()
-    assert f"A measured campaign of {widest!r} should show" in summary
+    assert f"The widest is that of {widest!r}: " in summary
 
 
 def test_models_that_cannot_be_drawn(monkeypatch, fem):
