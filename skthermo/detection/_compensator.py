@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, overload
 
@@ -472,12 +472,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         folds = Folds.of(self._wanted_folds(filled), filled)
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         with warnings_once():
-            self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
-            predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
-            longer = folds.longer(filled, measured - predicted)
-            if longer is not None:
-                folds = longer
-                predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
+            learn = partial(LearnedRegression.of, self.estimator, filled, frequencies, findings, folds)
+            learned = answer_once(type(self), (self.estimator, filled, frequencies, folds), measured.size, learn)
+        self.regression_, folds, stated = learned.regression, learned.folds, learned.errors
+        predicted = learned.out_of_fold.copy()
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         if not self.regression_.states_errors:
@@ -537,6 +535,29 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             "lags-without-stamps",
         )
         return "contiguous"
+
+
+@dataclass(frozen=True)
+class LearnedRegression:
+    """A fitted regression, and its predictions out of fold in Hz with their errors."""
+
+    regression: Regression
+    folds: Folds
+    out_of_fold: Array
+    errors: PredictionError
+
+    @classmethod
+    def of(
+        cls, estimator: BaseEstimator, temperatures: Any, frequencies: Any, findings: RecordFindings, folds: Folds
+    ) -> LearnedRegression:
+        """Learn from all rows, and again on other folds; these are longer where residuals depend on each other."""
+        regression = Regression.of(estimator, temperatures, frequencies, findings)
+        predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
+        longer = folds.longer(temperatures, as_floats(frequencies) - predicted)
+        if longer is not None:
+            folds = longer
+            predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
+        return cls(regression, folds, predicted, stated)
 
 
 def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:

@@ -385,7 +385,7 @@ def test_the_time_is_estimated_before_the_work(fem, capsys):
     study_of(fem, MahalanobisDetector(), [{}], uncertainty="auto", n_replicates=2, verbose=1).run(WEATHER[:100])
     lines = capsys.readouterr().out.splitlines()
     (place,) = [number for number, line in enumerate(lines) if "more repeats take about" in line]
-    assert "first repeat" in lines[place - 1]
+    assert "second repeat" in lines[place - 1]
     assert "2 replicates about" in lines[place]
 
 
