@@ -40,9 +40,10 @@ def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
     known = present.any(axis=1)
     if 2 * known.sum() < len(known):
         warn_user(
-            f"the score is of {known.sum()} of {len(known)} rows: the others have no value",
+            f"the score is of {known.sum()} of {len(known)} rows: the others have no value. Compare scores of the same "
+            "rows only",
             UnevaluatedRowsWarning,
-            "rows with a likelihood",
+            "rows-not-scored",
         )
     return float(densities[known].sum() / present.sum()) if known.any() else float("nan")
 

@@ -27,7 +27,7 @@ from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
-DECIMALS = 6  # of a damage index
+DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
@@ -226,12 +226,13 @@ class ActiveDetector(SavesFrames):
         times = records.index.asi8
         start = self.memory.start(times, first)
         exact = self._exact(records.iloc[start:])[first - start :]
-        scaled = exact * 10.0**DECIMALS
-        from_edge = np.abs(np.abs(scaled - np.floor(scaled)) - 0.5)
-        close = np.flatnonzero(from_edge <= CLOSE * np.maximum(np.abs(exact), 1.0) * 10.0**DECIMALS)
+        size = np.clip(np.abs(exact), 1.0, LARGEST)
+        scale = 10.0 ** (DECIMALS - np.floor(np.log10(size)))
+        from_edge = np.abs(exact * scale - np.floor(exact * scale) - 0.5)
+        close = np.flatnonzero(from_edge <= CLOSE * size * scale)
         for row in close:
             exact[row] = self.alone(records, times, first + row)
-        return np.round(exact, DECIMALS)
+        return np.round(exact * scale) / scale
 
     def alone(self, records: pd.DataFrame, times: NDArray[np.int64], row: int) -> float:
         """Damage index of one record by a call with just its memory."""
@@ -256,17 +257,17 @@ class ActiveDetector(SavesFrames):
                 lost = int(np.flatnonzero(seen[:-1] & ~seen[1:])[0])
                 raise ValueError(
                     f"the detector is in alarm where {target} falls by {PROBED[lost]:g} standard deviations of the "
-                    f"baseline, and not where it falls by {PROBED[lost + 1]:g}: one of its steps drops or fills large "
-                    "changes; expected more alarm for more change: filter the baseline before fit"
+                    f"baseline, and not where it falls by {PROBED[lost + 1]:g}. One of its steps drops or fills large "
+                    "changes; expected an alarm for larger changes, too. Filter the baseline before fit"
                 )
             blind += [] if seen[-1] else [str(target)]
         if blind:
             warn_user(
                 f"a fall by {PROBED[-1]:g} standard deviations of the baseline stays at or below the threshold "
-                f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
-                "another detector, or more false alarms a year",
+                f"{self.threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another "
+                "detector, or allow more false alarms a year",
                 ResultWarning,
-                "blind detector",
+                "blind-detector",
             )
 
     def _check_memory(self) -> None:
@@ -280,8 +281,8 @@ class ActiveDetector(SavesFrames):
             row = int(np.argmin(same))
             raise ValueError(
                 f"the damage index of {baseline.index[rows[row]]} is {whole[row]:.6g} among all records and "
-                f"{alone[row]:.6g} with the records of {self.memory} before it: the detector looks at later records, "
-                "or farther back; expected steps that look back only, and lookback='48h' where that is how far"
+                f"{alone[row]:.6g} with the records of {self.memory} before it. The detector uses later records, or "
+                "earlier ones; expected steps that look back only, and lookback='48h' if that is how far"
             )
 
     def _exact(self, records: pd.DataFrame) -> Array:

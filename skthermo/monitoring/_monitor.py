@@ -162,8 +162,8 @@ class Monitor(SavesFrames, Estimator):
     batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
     come late are evaluated with those around them, and later ones anew: what `update` says last of a stamp counts.
 
-    The damage index is rounded to six decimals. Where the last bits, which depend on how many records are evaluated at
-    once, would decide how, the index of the record alone with its memory counts.
+    The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
+    how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
 
     More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
     25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not
@@ -322,10 +322,10 @@ class Monitor(SavesFrames, Estimator):
         n_markers = int((trained.isna() & baseline.notna()).to_numpy().sum())
         if n_markers:
             warn_user(
-                f"{n_markers} of {baseline.size} values of the baseline stand for missing ones, such as -999, and "
-                "are taken as missing; expected NaN there",
+                f"{n_markers} of {baseline.size} values of the baseline are codes for missing values, such as -999. "
+                "They count as missing. Put NaN there",
                 RecordsWarning,
-                "markers",
+                "placeholders",
             )
         _refuse_meaningless(trained, self.targets_, self.units_)
         trained, columns = trained[inputs], inputs if compensators else self.targets_
@@ -984,5 +984,5 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
         UnevaluatedRowsWarning,
-        "records not evaluated",
+        "not-evaluated",
     )

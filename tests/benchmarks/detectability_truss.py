@@ -26,7 +26,7 @@ def differences(study):
 def by_curve(studies):
     """Severity in percent where the fitted curves reach 90 %, with the first study's interval."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="the severities")
+        warnings.filterwarnings("ignore", message=".*separated-severities")
         found = [100 * study.minimum_detectable_damage(0.9, "curve") for study in studies]
     each = pd.concat(found).groupby(level=[0, 1], sort=False)["mdd"]
     return found[0].assign(**{"mean of seeds": each.mean(), "lowest seed": each.min(), "highest seed": each.max()})

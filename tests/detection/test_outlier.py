@@ -98,10 +98,7 @@ def test_rows_with_missing_modes_are_not_evaluated():
     index = detector.damage_index(holed)
     assert index.index.equals(STAMPS)
     np.testing.assert_array_equal(np.flatnonzero(index.isna()), [3, 7])
-    message = (
-        r"2 of 400 rows are not evaluated \(predict gives 0\), the first row 3 \(2025-01-01 03:00:00\): this detector "
-        "needs every column, and f2 in 2 of them are missing"
-    )
+    message = r"2 of 400 rows .*row 3 \(2025-01-01 03:00:00\): .*f2 in 2 of them.*not-evaluated"
     with pytest.warns(UserWarning, match=message):
         alarms = detector.predict(holed)
     np.testing.assert_array_equal(np.flatnonzero(alarms == 0), [3, 7])
@@ -120,7 +117,7 @@ class Recorder(FromZero):
         return self
 
 
-@pytest.mark.filterwarnings("ignore:the 1000 baseline records depend on each other")
+@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
 def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_time():
     memory = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=1000))
     Recorder.seen.clear()
@@ -134,7 +131,7 @@ def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_t
 
 
 @pytest.mark.parametrize("block", [24, "1D", pd.Timedelta("1D")])
-@pytest.mark.filterwarnings("ignore:the 398 baseline records depend on each other")
+@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
 def test_blocks_as_long_as_wanted_are_left_out_and_nothing_else(block):
     rows = pd.DataFrame({"score": np.arange(400.0), "number": np.arange(400)}, STAMPS)
     rows.loc[STAMPS[[5, 100]], "score"] = np.nan

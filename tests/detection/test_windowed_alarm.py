@@ -41,9 +41,7 @@ HOLED = LATER.mask(np.random.default_rng(0).random(LATER.shape) < 0.4)
 
 
 # A call does not know the records before its first ones, whose windows therefore hold too few.
-pytestmark = pytest.mark.filterwarnings(
-    r"ignore:\d+ of \d+ rows are not evaluated \(predict gives 0\), the first row 0 "
-)
+pytestmark = pytest.mark.filterwarnings("ignore:.*not-evaluated")
 
 
 # The mean of a window
@@ -126,7 +124,7 @@ def test_a_mode_without_a_value_is_refused(rule):
 def test_implausible_records_of_the_baseline_are_reported_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
-    with pytest.warns(match="are implausible") as record:
+    with pytest.warns(match="implausible-values") as record:
         WindowedAlarm(8, rule=rule).fit(baseline)
     assert ["'f2' is 900" in str(one.message) for one in record if "are implausible" in str(one.message)] == [True]
 
@@ -203,9 +201,7 @@ def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_e
     evaluated = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
     np.testing.assert_array_equal(alarm.damage_index(holed).notna(), evaluated)
     assert (~evaluated).sum() == 2 + (215 - 203) + (232 - 219)
-    message = (
-        f"{(~evaluated).sum()} of 1500 rows are not evaluated .* their windows hold fewer than 3 records with a value"
-    )
+    message = f"{(~evaluated).sum()} of 1500 rows .*fewer than 3 records.*not-evaluated"
     with pytest.warns(UserWarning, match=message):
         alarms = alarm.predict(holed)
     np.testing.assert_array_equal(alarms == 0, ~evaluated)

@@ -31,7 +31,9 @@ TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*(season|baseline|independent|not evaluated|far beyond)")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-excursion|not-evaluated)"
+)
 
 
 def campaign(n, seed, start="2025-01-01"):
@@ -203,6 +205,18 @@ def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch
     assert first[0] == 3.000001
 
 
+def test_large_indices_are_computed_in_one_call(monkeypatch):
+    monitor, _, _ = fitted("lags")
+    evaluate, fallen, calls = monitor.active_, ALL.copy(), []
+    fallen[MODES] *= 0.2
+    exact = evaluate._exact(fallen)
+    monkeypatch.setattr(ActiveDetector, "alone", lambda self, records, times, row: calls.append(row) or exact[row])
+    found = evaluate.index(fallen, N_BASELINE)
+    assert found.min() > 100
+    assert len(calls) < len(found) / 10
+    np.testing.assert_allclose(found, exact[N_BASELINE:], rtol=1e-6)
+
+
 def test_events_are_those_of_the_rule_on_the_whole_series():
     _, answers, after = fitted("lags")
     events = find_events(answers["index"].to_numpy(), answers.index, after.false_alarm_estimate_.rule)
@@ -268,7 +282,7 @@ def test_too_late_records_are_reported_and_not_evaluated():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[50:80])
     before = monitor.evaluations_
-    with pytest.warns(UserWarning, match="2 of 2 new records are not evaluated"):
+    with pytest.warns(UserWarning, match="2 of 2 .*not-evaluated"):
         answers = monitor.update(SERVICE[:2])
     assert answers["state"].eq("not evaluated").all()
     assert answers["reason"].str.contains("came too late, more than 7 days after newer records").all()

@@ -1,6 +1,5 @@
 """The detectors of a study: the columns that each sees, what it has learned, and the smallest damage that it finds."""
 
-import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.warnings import reported_by_caller
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts
@@ -145,8 +145,7 @@ class Arrangement:
 def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     """a90 of the curve; without a finite slope, the middle of its bracket; infinite where damage is not found."""
     try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="the (severities|curve lies)")
+        with reported_by_caller({"separated-severities", "poor-curve-fit"}):
             curve = pod_curve(severities, n_detected, n_records)
     except ValueError:  # the rate does not increase with severity, or nothing could be evaluated
         return np.inf
@@ -154,16 +153,19 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
 
 
 class LearnedHeads:
-    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records."""
+    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records.
+
+    Each is a pipeline whose last step passes on what it gets, so that a ``memory`` remembers all others.
+    """
 
     def __init__(self) -> None:
         self._learned: dict[str, tuple[Pipeline, Table]] = {}
 
     def of(self, pipeline: Pipeline, healthy: Table) -> tuple[Pipeline, Table]:
         """The steps before the last one of a pipeline, fitted, and what they make of healthy records."""
-        head = pipeline[:-1]
+        head = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], "passthrough")], memory=pipeline.memory)
         try:
-            key = joblib.hash((head.steps, healthy))
+            key = joblib.hash((pipeline.steps[:-1], healthy))
         except PicklingError:
             return head, head.fit_transform(healthy)
         if key not in self._learned:
@@ -199,7 +201,7 @@ class Candidate:
         seed_parts(fitted, deepcopy(random_state))
         if isinstance(fitted, Pipeline) and len(fitted) > 1:
             head, seen = heads.of(fitted, healthy)
-            fitted.steps[:-1] = head.steps
+            fitted.steps[:-1] = head.steps[:-1]
             fitted[-1].fit(seen)
         else:
             fitted.fit(healthy)

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
+from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
 from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
@@ -90,7 +91,7 @@ class DetectabilityStudy(BaseEstimator):
     outliers : float, "fitted", None or array-like of shape (n_training_records, n_modes), default="fitted"
         Values that are far off, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     uncertainty : {"auto", "all", "noise", "baseline", "weather", "model"} or sequence of them, default="auto"
-        What the bands hold, in which the rate of a measured campaign should lie:
+        What the prediction intervals include, in which the rate of a measured campaign should lie:
 
         - "noise": another draw of the noise;
         - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
@@ -113,7 +114,7 @@ class DetectabilityStudy(BaseEstimator):
     random_state : int, RandomState or None, default=None
         Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
-        Whether `run` prints a line with the time of each of its stages, and after the first repeat how long the others
+        Whether `run` prints a line with the time of each of its stages, and after the second repeat how long the others
         and the replicates will take; from 2, joblib prints how many of them are done.
 
     Attributes
@@ -144,7 +145,7 @@ class DetectabilityStudy(BaseEstimator):
     uncertainty_ : DataFrame or None
         Indexed by detector and scenario: standard deviation of the rate due to each part of ``uncertainty`` ("noise",
         "weather", "baseline", "model") and to all ("together"), and the share of each in the variance ("model share").
-        None where the bands hold the noise alone.
+        None where the bands include the noise alone.
     replicates_ : ReplicateRates or None
         Rates of alarms in every replicate, ``replicates_.rates[detector, scenario]`` of shape (n_replicates, n_parts,
         n_draws), where each of ``replicates_.parts`` is added to those before it.
@@ -311,7 +312,7 @@ class DetectabilityStudy(BaseEstimator):
               length and state should lie with the probability ``confidence``, with all that ``uncertainty`` names. With
               the noise alone, it is the range of the rates of single repeats: fewer than 39 are too few for 95 %, as
               the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN). That of reference
-              records holds their noise alone;
+              records includes their noise alone;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can evaluate;
             - ``n_not_evaluated``: number of the other records, which count neither as healthy nor as alarms;
@@ -343,8 +344,8 @@ class DetectabilityStudy(BaseEstimator):
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
-        stages = Stages(self, 4 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
+        stages = Stages(self, 5 + bool(replicates.parts))
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once(), answers_kept():
             parts, heads = seeded(self.random_state), LearnedHeads()
             candidates, errors = ask_each(
                 detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts, heads), {}
@@ -355,18 +356,20 @@ class DetectabilityStudy(BaseEstimator):
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
-                simulation.drawn(int(seeds[0][0]))  # so that what is learned once is not timed
-                began = process_time()
                 first = simulation.first_repeat(measured, seeds[0], errors)
-                seconds = process_time() - began
-        if self.verbose:
-            print(f"[{type(self).__name__}] {replicates.predicted_time(seconds, len(seeds) - 1)}")
+        left = simulation.without(first.errors)
+        with stages.stage("second repeat"):
+            began = process_time()
+            evaluation = first.with_repeats(left.repeats(range(1, min(len(seeds), 2)), seeds, None))
+            seconds = process_time() - began
+        if self.verbose and len(seeds) > 1:
+            text = replicates.predicted_time(seconds, len(seeds) - 2, left.share_in_replicates)
+            print(f"[{type(self).__name__}] {text}")
         progress = max(self.verbose - 1, 0)
         with stages.stage("other repeats"):
-            left = simulation.without(first.errors)
             grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
             n_repeats = LEAST_REPEATS if grows else len(seeds)
-            evaluation = first.with_repeats(left.repeats(range(1, n_repeats), seeds, self.n_jobs, progress))
+            evaluation = evaluation.with_repeats(left.repeats(range(2, n_repeats), seeds, self.n_jobs, progress))
             if grows:
                 wanted = min(evaluation.n_repeats_for(tol, confidence, scenarios), len(seeds))
                 more = range(n_repeats, max(wanted, n_repeats))
@@ -378,9 +381,9 @@ class DetectabilityStudy(BaseEstimator):
                 rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, progress)
         found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
         doubt = found.many_false_alarms()
-        self.findings_ = replace(found, warnings=[*texts, doubt]) if doubt else found
-        if doubt:
-            warn_user(doubt, ResultWarning, "many false alarms")
+        doubts = [ResultWarning(doubt, "many-false-alarms")] if doubt else []
+        self.findings_ = replace(found, warnings=[*texts, *map(str, doubts)])
+        warn_each(doubts)
         return self.findings_.table
 
     def _most_repeats(self) -> int:

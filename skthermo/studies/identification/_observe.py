@@ -83,7 +83,8 @@ class ComparedRecords:
     def sentences(self) -> Iterator[str]:
         """How many records were compared, what they are worth, and what was left out."""
         new = _worth("record", self.n_compared, self.n_independent)
-        yield f"Compared: {new}; with {_worth('training record', self.n_trained, self.n_trained_independent)}."
+        known = _worth("training record", self.n_trained, self.n_trained_independent)
+        yield f"{new} compared with {known}."
         if self.left_out:
             yield f"{self._left_out()}."
         if self.n_latest >= IN_A_ROW:
@@ -91,30 +92,30 @@ class ComparedRecords:
             yield f"{latest[0].upper()}{latest[1:]}."
         for mode, factor in self.wider.items():
             yield (
-                f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its "
-                "uncertainty allows for that."
+                f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its standard "
+                "error includes this."
             )
 
     def warnings(self) -> Iterator[SkthermoWarning]:
         """What is doubtful."""
         if self.left_out:
-            yield UnevaluatedRowsWarning(self._left_out(), "records that were not compared")
+            yield UnevaluatedRowsWarning(self._left_out(), "not-compared")
         if self.n_latest >= IN_A_ROW:
-            yield ResultWarning(self._latest(), "the last records differ")
+            yield ResultWarning(self._latest(), "last-records-differ")
         few = [(self.n_independent, self.n_compared, "record", FEW)]
         few += [(self.n_trained_independent, self.n_trained, "training record", FEW_TRAINED)]
         for independent, number, noun, least in few:
             if independent < least:
                 yield FewRecordsWarning(
-                    f"too few independent {noun}s: {_worth(noun, number, independent)}; expected {least:g} or more, "
-                    "since probabilities and standard errors are rough with fewer",
-                    f"few independent {noun}s",
+                    f"too few independent {noun}s: {_worth(noun, number, independent)} (expected {least:g} or more). "
+                    "Probabilities and standard errors are rough. Take records over a longer time",
+                    "few-independent-records",
                 )
 
     def _latest(self) -> str:
         return (
-            f"the last {counted(self.n_latest, 'record')} are all far from those before and were left out: perhaps the "
-            "structure has just changed; expected records of one state, so identify the last ones on their own"
+            f"the last {counted(self.n_latest, 'record')} are all far from those before and were left out. The "
+            "structure may have just changed. Identify the last ones on their own"
         )
 
     def _left_out(self) -> str:
@@ -128,7 +129,7 @@ def _worth(noun: str, number: int, independent: float) -> str:
     if independent > 0.95 * number:
         return counted(number, noun)
     said = significant(independent) if independent < 10 else f"{independent:,.0f}"
-    return f"{counted(number, noun)}, worth {said} independent {'one' if said == '1.0' else 'ones'}"
+    return f"{counted(number, noun)} (worth {said} independent {'one' if said == '1.0' else 'ones'})"
 
 
 def left_out_rows(fem: Any, T: Any, theta: Array, F: Array) -> dict[str, NDArray[np.bool_]]:
@@ -210,7 +211,7 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no-rows", "missing-column", "constant"})
     return frequencies
 
 
@@ -225,15 +226,16 @@ def _named_as_in_fit(fem: Any, T: Any) -> Any:
         return T
     if names is None:
         warn_user(
-            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
-            "columns are taken in the order that they have",
+            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names. The "
+            "columns are used in the order that they have. Fit the chain with a frame",
             RecordsWarning,
-            "names of temperatures",
+            "temperature-names",
         )
         return T.set_axis(range(len(columns)), axis=1)
     warn_user(
-        f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
+        f"the temperatures have no valid feature names. Their columns are used as {list(names)}, in the order of fit. "
+        "Give a frame with these columns",
         RecordsWarning,
-        "names of temperatures",
+        "temperature-names",
     )
     return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)
