@@ -1137,7 +1137,7 @@ use(
     samples_per_day=(1, count()),
     damage=({"top": 0.1}, DAMAGE),
 )
-GROUP = next(iter(datasets.make_kw51_campaign(n_hours=24, random_state=0).model.groups))
+GROUP = "girders"
 use(
     "datasets.make_kw51_campaign",
     usual="noise random_state",
