@@ -48,7 +48,7 @@ parser.add_argument("--full", action="store_true", help="as in the guide, about 
 parser.add_argument("--seeds", type=int, help="repetitions to average over (default 1, with --full 5)")
 options = parser.parse_args()
 size, seeds = FULL if options.full else SMALL, range(options.seeds or (5 if options.full else 1))
-warnings.filterwarnings("ignore")  # of optimisers that stop early, and of unseen weather, the point here
+warnings.filterwarnings("ignore")  # of optimisers that stop early, and of extrapolation, which this page is about
 
 
 def show(table):

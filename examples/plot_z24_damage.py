@@ -12,11 +12,11 @@ damage.
 
    The data belong to KU Leuven and are not part of this package: tables and figures on this page were made once with
    them, by ``python examples/plot_z24_damage.py path/to/z24_monitoring.csv``. :doc:`plot_z24_bridge` says where to get
-   them. The page needs :download:`z24_damage_recipes.py`, :download:`z24_bench_recipes.py`,
+   them. The page needs :download:`z24_damage_recipes.py`, :download:`z24_detector_recipes.py`,
    :download:`detector_recipes.py`, :download:`z24_recipes.py` and :download:`page_recipes.py` beside it.
 """
 
-# sphinx_gallery_thumbnail_path = 'images/z24_bench.png'
+# sphinx_gallery_thumbnail_path = 'images/z24_detectors.png'
 
 import tempfile
 import warnings
@@ -24,8 +24,8 @@ import warnings
 import matplotlib.pyplot as plt
 import pandas as pd
 from page_recipes import save_figures
-from z24_bench_recipes import DAMAGED, agreement, bench, bench_of_a_warning, choose, detectors, side_by_side
 from z24_damage_recipes import FROST, changes, identify, in_parameters
+from z24_detector_recipes import DAMAGED, agreement, choose, compare, compare_before_damage, detectors, side_by_side
 from z24_recipes import GREY, PAVEMENT, WHITENINGS, Records, alarm_table, compensate, plot_kinds, read_arguments
 
 from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
@@ -182,7 +182,7 @@ IdentifiedDamageDisplay.from_predictions(found)
 
 memory = tempfile.TemporaryDirectory()  # what compensators learn is kept there from one study to the next
 candidates = detectors(memory.name)
-results = bench(bridge, fem, found.scenario(DAMAGED), candidates)
+results = compare(bridge, fem, found.scenario(DAMAGED), candidates)
 print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results)).round(3).to_string(), sep="\n\n")
 
 # %%
@@ -222,7 +222,7 @@ groups = {name: "raw frequencies" if name.startswith("raw") else "with temperatu
 DetectorsDisplay.from_predictions(results, groups=groups)
 
 # %%
-# .. image:: /images/z24_bench.png
+# .. image:: /images/z24_detectors.png
 #    :alt: Rates of alarms of 22 detectors, measured as dots on simulated bands: false alarms from 0 to 23 %, damage
 #          found from 0 to 98 %; nearly every dot lies in its band
 #
@@ -245,7 +245,7 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 # assumed of a pier that is to be lowered, a loss of 18 % in the soil below it. The weather is still that of the test
 # and of the last month. Since the severity is fixed, only noise is in the band.
 
-results = bench_of_a_warning(bridge, candidates=candidates)
+results = compare_before_damage(bridge, candidates=candidates)
 print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results)).round(3).to_string(), sep="\n\n")
 
 # %%

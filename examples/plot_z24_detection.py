@@ -13,7 +13,7 @@ records after damage began show what it finds. Neither of the two chooses any se
 
    The data belong to KU Leuven and are not part of this package: tables and figures on this page were made once with
    them, by ``python examples/plot_z24_detection.py path/to/z24_monitoring.csv``. :doc:`plot_z24_bridge` says where to
-   get them. The page needs :download:`z24_bench_recipes.py`, :download:`detector_recipes.py`,
+   get them. The page needs :download:`z24_detector_recipes.py`, :download:`detector_recipes.py`,
    :download:`z24_recipes.py` and :download:`page_recipes.py` beside it.
 """
 
@@ -27,7 +27,7 @@ import pandas as pd
 from page_recipes import save_figures
 from sklearn.base import clone
 from sklearn.model_selection import TimeSeriesSplit
-from z24_bench_recipes import detectors, measured_table, short_baselines
+from z24_detector_recipes import detectors, measured_table, short_baselines
 from z24_recipes import (
     FREQUENCIES,
     KINDS,

@@ -442,15 +442,15 @@ def reach_of(estimator: Any, X: Any) -> tuple[Any, Any] | None:
     return reach_of(last.mapper_, inputs) if hasattr(last, "mapper_") else (last.reach_, inputs)
 
 
-def told_by_fleet(estimator: Any, X: Any) -> NDArray[np.bool_]:
+def rows_from_fleet(estimator: Any, X: Any) -> NDArray[np.bool_]:
     """Rows in weather that only the fleet of an estimator has seen; none where it offers no ``from_fleet``."""
     if not offers(estimator, "from_fleet"):
         return np.zeros(X.shape[0], dtype=bool)
     last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)
     if isinstance(last, MultiOutputRegressor):
-        return np.any([told_by_fleet(part, inputs) for part in last.estimators_], axis=0)
+        return np.any([rows_from_fleet(part, inputs) for part in last.estimators_], axis=0)
     if hasattr(last, "mapper_"):
-        return told_by_fleet(last.mapper_, inputs)
+        return rows_from_fleet(last.mapper_, inputs)
     return np.asarray(last.from_fleet(inputs), dtype=bool)
 
 

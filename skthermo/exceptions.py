@@ -1,4 +1,4 @@
-"""Kinds of warnings, which Python's own filters can tell apart."""
+"""Kinds of warnings, which Python's own filters distinguish."""
 
 __all__ = [
     "FewRecordsWarning",

@@ -46,7 +46,7 @@ class Logs(RegressorMixin, BaseEstimator):
 
 
 class BayesianLogs(Logs):
-    """The same that tells a share of its covariance, and where it stands on the fleet: within ``reach``."""
+    """The same with a share of its covariance, and with the weather of a fleet: within ``reach``."""
 
     def predict_covariance(self, X):
         B = basis(X)

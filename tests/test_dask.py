@@ -19,7 +19,7 @@ from tests.fem.frames import FRAME
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
 pytestmark = pytest.mark.filterwarnings(
-    "default",  # Dask's own warnings are not ours to judge
+    "default",  # Dask's own warnings are not tested
     r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside",
     "ignore:modes change their order",
 )

@@ -129,7 +129,7 @@ def test_signatures_are_readable():
 
 
 def faults(name):
-    """What numpydoc finds; a method may inherit its docstring, which is then judged where it stands."""
+    """What numpydoc finds; a method may inherit its docstring, which is then checked at its definition."""
     if Validator._load_obj(name).__doc__ is None and inspect.getdoc(Validator._load_obj(name)):
         return []
     return [f"{name}: {code} {message}" for code, message in validate(name)["errors"] if code not in NOT_ASKED]

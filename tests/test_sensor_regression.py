@@ -1,4 +1,4 @@
-"""Temperatures that other sensors foretell."""
+"""Temperatures that other sensors predict."""
 
 import re
 
@@ -120,7 +120,7 @@ def test_compensator_and_chain_warn_of_a_sensor_that_departs():
     chain = LINEAR_CHAIN.fit(year.temperatures, year.frequencies)
     name = records.columns[0]
     new.iloc[200:, 0] += 15
-    for judge in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
+    for evaluate in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
         with pytest.warns(RecordsWarning, match=f"'{name}'") as caught:
-            judge()
+            evaluate()
         assert sum(warning.message.kind == "sensor apart from others" for warning in caught) == 1

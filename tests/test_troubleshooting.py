@@ -23,8 +23,8 @@ REPORTS = [
     "answer",
     "limits",
     "sentences",
-    "waits_told",
-    "false_alarms_told",
+    "waits_text",
+    "false_alarms_text",
 ]
 """Functions whose sentences tell what is doubtful."""
 
@@ -188,8 +188,8 @@ def explains(term, text):
 
 def test_the_page_explains_every_warning(warnings_of_the_package, sentences_of_reports, terms):
     explained = [term for title, found in terms.items() if title != ERRORS for term in found]
-    told = warnings_of_the_package | sentences_of_reports
-    missing = [text for text in sorted(told) if not any(explains(term, text) for term in explained)]
+    given = warnings_of_the_package | sentences_of_reports
+    missing = [text for text in sorted(given) if not any(explains(term, text) for term in explained)]
     assert missing == []
 
 

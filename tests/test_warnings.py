@@ -1,4 +1,4 @@
-"""Warnings are of a few kinds, which Python's filters tell apart, and leave nothing behind."""
+"""Warnings are of a few kinds, which Python's filters distinguish, and leave nothing behind."""
 
 import re
 import threading
@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo._estimators.warnings import explain_rows, explained_rows, told_around, warn_user, warnings_once
+from skthermo._estimators.warnings import explain_rows, explained_rows, reported_by_caller, warn_user, warnings_once
 from skthermo.exceptions import FewRecordsWarning, WeatherWarning
 
 
@@ -29,7 +29,7 @@ def test_filters_tell_kinds_apart_and_point_to_the_line_of_the_user():
 
 def test_what_is_explained_stays_so_after_the_estimator_around():
     rows = np.array([True, False])
-    with told_around(["few rows"]):
+    with reported_by_caller(["few rows"]):
         table = explain_rows(np.array([np.nan, 1.0]), rows)
         warn_user("few", FewRecordsWarning, "few rows")
     assert explained_rows(table).tolist() == [True, False]

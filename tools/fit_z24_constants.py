@@ -4,7 +4,7 @@
 
 DATA_FILE is what load_z24 reads. ModelUpdater finds four constants, drawn mildly to where they start from;
 modes are followed from there, where their kinds are checked. Prints the rounded constants, the frequencies
-they give beside the measured means, and how well the model's four parameters can be told apart.
+they give beside the measured means, and how well the model's four parameters can be distinguished.
 """
 
 import argparse

@@ -164,7 +164,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
-        ("parameters told apart", "values > np.sqrt(NO_INFORMATION) * values[0]", "values >= 0"),
+        ("parameters distinguished", "values > np.sqrt(NO_INFORMATION) * values[0]", "values >= 0"),
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
@@ -324,7 +324,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("records that lags reach to", "max(self.lags_) * freq + tolerance", "max(self.lags_) * freq"),
     ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
-        ("rows that cannot be judged", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
+        ("rows that cannot be evaluated", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
     ("detection/_thresholds.py", "detection/test_thresholds.py"): [
         ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
@@ -353,7 +353,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
     ("_estimators/warnings.py", "detection/test_checked_once.py"): [
-        ("what an estimator around has told", "if kind in context.told:", "if kind in ():"),
+        ("what the calling estimator has reported", "if kind in context.reported:", "if kind in ():"),
         (
             "a check that is shared",
             "content = ALL if ALL in found else content_of(tables)",
@@ -400,7 +400,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("known scatter of outliers", "np.hypot(deviations, OF_WEATHER * usual)", "0.0"),
     ],
     ("studies/identification/_identified.py", "studies/test_identify_sentences.py"): [
-        ("alike groups told together", "similarity.loc[one, other] >= ALIKE", "similarity.loc[one, other] > 1"),
+        ("alike groups reported together", "similarity.loc[one, other] >= ALIKE", "similarity.loc[one, other] > 1"),
         ("groups that are not seen", "seen if seen in known else causes", "causes"),
     ],
     ("studies/detectability/_simulation.py", "studies/test_study.py"): [
@@ -418,8 +418,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
     ],
     ("studies/detectability/_replicate_rates.py", "studies/test_replicates.py"): [
-        ("noise in the variance between worlds", " - within / values.shape[1]", ""),
-        ("a band of the mean of all worlds", "variance * (1 + 1 / number)", "variance / number"),
+        ("noise in the variance between replicates", " - within / values.shape[1]", ""),
+        ("a band of the mean of all replicates", "variance * (1 + 1 / number)", "variance / number"),
     ],
     ("studies/replicates/_replicates.py", "studies/test_replicates.py"): [
         ("weather of any season", "SEASON = 15", "SEASON = 90"),
@@ -466,7 +466,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("plotting/_detectors.py", "plotting/test_detectors.py"): [
         ("measured rates outside their bands", 'is_open=rates["inside"] == 0', 'is_open=rates["inside"] == 2'),
-        ("measured records that nobody judged", "if measured > 0:", "if measured > 1:"),
+        ("measured records not evaluated", "if measured > 0:", "if measured > 1:"),
     ],
     ("reporting/service/_standing.py", "reporting/test_service.py"): [
         ("silence called healthy", "return self.now - self.last > self.step + LATE", "return False"),
@@ -495,7 +495,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
     ],
     ("monitoring/_direction.py", "monitoring/test_direction.py"): [
-        ("direction told by lowered frequencies", "and left < nnls(effects", "and left > nnls(effects"),
+        ("direction found from lowered frequencies", "and left < nnls(effects", "and left > nnls(effects"),
         ("a mixed change called stiffening", "-1 if explained and left", "-1 if left"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [

@@ -118,9 +118,9 @@ def monitor():
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=list(F.columns)), WindowedAlarm(14))
     service = Monitor(detector).fit(both)
     parts = [service.update(later[start : start + 97]) for start in range(0, len(later), 97)]
-    told = pd.concat(parts)
-    states = np.array([{"healthy": 1.0, "alarm": -1.0}.get(state, 0.0) for state in told["state"]])
-    return {"states": states, "index": told["index"].to_numpy(float), "events": np.array([len(service.events_)])}
+    answers = pd.concat(parts)
+    states = np.array([{"healthy": 1.0, "alarm": -1.0}.get(state, 0.0) for state in answers["state"]])
+    return {"states": states, "index": answers["index"].to_numpy(float), "events": np.array([len(service.events_)])}
 
 
 def drift():

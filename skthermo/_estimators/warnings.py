@@ -31,7 +31,7 @@ ALL = "all"  # key of findings that stand for those of all records within
 class Context:
     """What the warnings and checks within a call know of what was warned of and found before."""
 
-    told: frozenset[str] = frozenset()  # kinds of warnings that an estimator around gives
+    reported: frozenset[str] = frozenset()  # kinds of warnings that the calling estimator gives
     found: dict[str, Any] | None = None  # findings of a check by content of its tables
     given: set[str] | None = None  # kinds that the folds of the job that is counted have given
     explained: tuple[tuple[Callable[[], Any], NDArray[np.bool_]], ...] = ()
@@ -67,7 +67,7 @@ def warn_each(warned: Iterable[SkthermoWarning]) -> None:
 
 def _give(warning: Warning, kind: str) -> None:
     context = _context.get()
-    if kind in context.told:
+    if kind in context.reported:
         return
     frame, level, in_folds, jobs = sys._getframe(1), 2, False, None
     while frame.f_back is not None and (module := frame.f_globals.get("__name__", "")).split(".")[0] in PASSED_OVER:
@@ -106,13 +106,13 @@ def _may_filter() -> bool:
     return threading.current_thread() is threading.main_thread() or _context.get().given is not None
 
 
-def told_around(kinds: Iterable[str], findings: Any = None) -> AbstractContextManager[None]:
-    """Parts within give no warnings of some kinds, and check no records: the estimator around them has done so.
+def reported_by_caller(kinds: Iterable[str], findings: Any = None) -> AbstractContextManager[None]:
+    """Parts within give no warnings of some kinds, and check no records: the estimator that calls them has done so.
 
     What it has found in its records, if given, is what `findings_of` gives the parts.
     """
     context = _context.get()
-    return _within(told=context.told | set(kinds), found=context.found if findings is None else {ALL: findings})
+    return _within(reported=context.reported | set(kinds), found=context.found if findings is None else {ALL: findings})
 
 
 def checked_once() -> AbstractContextManager[None]:
@@ -208,9 +208,9 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
         _again(same[0], texts[-1])
 
 
-def give_again(told: Iterable[warnings.WarningMessage]) -> None:
+def give_again(caught: Iterable[warnings.WarningMessage]) -> None:
     """Give warnings that were recorded, those for users at the user's line of now."""
-    for one in told:
+    for one in caught:
         _again(one, str(one.message))
 
 

@@ -180,13 +180,13 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         check_is_fitted(self)
         F = self._validated(X, reset=False, order="C")
         index = self._index(self._records(X, F))
-        told = explained_rows(X) | explained_rows(index)
-        untold = np.isnan(index) & ~told
-        if np.isnan(index).all() and untold.any():
-            self._warn_of_not_evaluated(X, untold)
+        explained = explained_rows(X) | explained_rows(index)
+        unexplained = np.isnan(index) & ~explained
+        if np.isnan(index).all() and unexplained.any():
+            self._warn_of_not_evaluated(X, unexplained)
         if isinstance(X, pd.DataFrame):
-            return explain_rows(pd.Series(index, index=X.index, name="damage_index"), told)
-        return explain_rows(index, told)
+            return explain_rows(pd.Series(index, index=X.index, name="damage_index"), explained)
+        return explain_rows(index, explained)
 
     def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
         """Negative damage index: higher is healthier.
@@ -241,9 +241,9 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """
         decision = self.decision_function(X)
         unknown = np.isnan(decision)
-        untold = unknown & ~explained_rows(decision)
-        if untold.any() and not unknown.all():  # where all are, `damage_index` has said so
-            self._warn_of_not_evaluated(X, untold)
+        unexplained = unknown & ~explained_rows(decision)
+        if unexplained.any() and not unknown.all():  # where all are, `damage_index` has said so
+            self._warn_of_not_evaluated(X, unexplained)
         return np.where(unknown, 0, np.where(decision < 0, -1, 1))
 
     @available_if(lambda detector: detector._has_likelihood())

@@ -57,9 +57,9 @@ from skthermo.residuals.weather import (
     PredictionError,
     SensorRegression,
     TrainingRange,
-    told_fills,
-    told_unpredicted,
-    warn_of_unseen,
+    filled_text,
+    unpredicted_text,
+    warn_of_unseen_weather,
 )
 
 AS_FLOATS = {"order": "C", "dtype": np.float64}
@@ -186,16 +186,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
     >>> healthy, later = (make_truss_campaign(2, random_state=seed) for seed in (0, 1))
     >>> baseline = healthy.temperatures.join(healthy.frequencies)
-    >>> unseen = later.temperatures.join(later.frequencies)
+    >>> second_year = later.temperatures.join(later.frequencies)
     >>> compensator = TemperatureCompensator(KNeighborsRegressor(), targets=list(healthy.frequencies))
     >>> detector = make_pipeline(compensator, MahalanobisDetector()).fit(baseline)
-    >>> print(f"{(detector.predict(unseen) == -1).mean():.0%} false alarms")
+    >>> print(f"{(detector.predict(second_year) == -1).mean():.0%} false alarms")
     2% false alarms
 
     A threshold set on residuals of rows that the regressor was fitted on is too low:
 
     >>> in_sample = MahalanobisDetector().fit(compensator.fit(baseline).transform(baseline))
-    >>> print(f"{(in_sample.predict(compensator.transform(unseen)) == -1).mean():.0%} false alarms")
+    >>> print(f"{(in_sample.predict(compensator.transform(second_year)) == -1).mean():.0%} false alarms")
     14% false alarms
     """
 
@@ -468,39 +468,39 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         with warnings_once():
             self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
-            predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
+            predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
             longer = folds.longer(filled, measured - predicted)
             if longer is not None:
                 folds = longer
-                predicted, told = self.regression_.out_of_fold(filled, frequencies, folds)
+                predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
-        if not self.regression_.tells_errors:
-            warn_of_unseen(filled, self.folds_, "their residuals are too large, and may hide damage")
+        if not self.regression_.states_errors:
+            warn_of_unseen_weather(filled, self.folds_, "their residuals are too large, and may hide damage")
         length = None if folds.blocks is None else folds.blocks.length(filled)
         self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
         predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
         warn_of_unpredicted(predicted[self.folds_ >= 0], as_floats(filled)[self.folds_ >= 0])
         residuals = measured - predicted
         fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
-        errors = told.plus(fills, len(residuals))
+        errors = stated.plus(fills, len(residuals))
         taught = residuals.copy()
         if len(fills.rows) < len(residuals) / 2:
             taught[fills.rows] = np.nan
         if self.whiten is None:
-            self.spread_ = Spread.of_all(taught, told)
+            self.spread_ = Spread.of_all(taught, stated)
             return self.spread_.shrunk(residuals, errors)
         empty = np.isnan(taught).all(axis=0)
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
             raise ValueError(f"target {name!r} has no out-of-fold residual; expected records of it in several periods")
         weather = as_floats(filled)
-        self.spread_ = Spread.of(taught, np.fmax.reduce(np.abs(measured)), told)
-        white = self.spread_.whiten(weather, taught, told)
+        self.spread_ = Spread.of(taught, np.fmax.reduce(np.abs(measured)), stated)
+        white = self.spread_.whiten(weather, taught, stated)
         if self.whiten != "global":
             floor, near = self.whiten == "auto", rows_near_in_time(filled)
             extrapolation = self._extrapolation(filled, frequencies) if floor else None
-            followed, white = self.spread_.followed(weather, taught, told, floor=floor, near=near)
+            followed, white = self.spread_.followed(weather, taught, stated, floor=floor, near=near)
             self.spread_ = replace(followed, extrapolation=extrapolation)
         if not len(fills.rows):
             return white
@@ -510,7 +510,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _extrapolation(self, temperatures: Any, frequencies: Any) -> Extrapolation | None:
         """How predictions err beyond the baseline's weather; None where the estimator states it, or too few show it."""
         measured = as_floats(frequencies)
-        if self.regression_.tells_errors or (~np.isnan(measured).all(axis=1)).sum() < FEWEST:
+        if self.regression_.states_errors or (~np.isnan(measured).all(axis=1)).sum() < FEWEST:
             return None
 
         def residuals_of(apart: NDArray[np.bool_]) -> Array:
@@ -538,7 +538,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
     filled, deviations = sensors.fill(temperatures)
     consequence = "the spread of residuals is widened by what that costs"
-    message = told_fills(deviations, column_names(temperatures, "x"), consequence)
+    message = filled_text(deviations, column_names(temperatures, "x"), consequence)
     if message:
         warn_user(message, RecordsWarning, "filled temperatures")
     return frame_like(temperatures, filled)
@@ -548,7 +548,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     """Rows of which nothing is predicted, so that they are not evaluated; a warning counts those not yet explained."""
     unknown = np.isnan(predicted).all(axis=1)
     others = "of which the estimator predicts nothing, as where lags reach to no record"
-    message = told_unpredicted(unknown & ~explained_rows(predicted), weather, others)
+    message = unpredicted_text(unknown & ~explained_rows(predicted), weather, others)
     if message:
         warn_user(message, UnevaluatedRowsWarning, "rows that cannot be predicted")
     return unknown

@@ -16,7 +16,7 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._estimators.warnings import explain_rows, explained_rows, told_around, without_warnings
+from skthermo._estimators.warnings import explain_rows, explained_rows, reported_by_caller, without_warnings
 from skthermo._tables.arrays import as_columns, as_floats, is_model
 from skthermo._tables.frames import column_names
 from skthermo._validation import (
@@ -27,13 +27,13 @@ from skthermo._validation import (
     offers,
     predicted_covariance,
     reach_of,
-    told_by_fleet,
+    rows_from_fleet,
 )
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.weather import PredictionError, TrainingRange
 
-TOLD = (
+REPORTED = (
     "filled temperatures",
     "rows that cannot be predicted",
     "weather outside the training range",
@@ -46,7 +46,7 @@ TOLD = (
 class Regression:
     """A fitted estimator, of which the first transformers got all rows and the rest those that it accepts.
 
-    One that offers ``predict_covariance`` tells the errors of its predictions.
+    One that offers ``predict_covariance`` states the errors of its predictions.
     """
 
     estimator: BaseEstimator
@@ -54,7 +54,7 @@ class Regression:
     rest: CompleteRowsRegressor
 
     @property
-    def tells_errors(self) -> bool:
+    def states_errors(self) -> bool:
         """Whether the estimator says how uncertain its predictions are."""
         return offers(self.rest.regressor_, "predict_covariance")
 
@@ -74,7 +74,7 @@ class Regression:
 
     def errors(self, X: Any) -> PredictionError:
         """Errors of the predictions that the estimator tells; none where it does not."""
-        if not self.tells_errors:
+        if not self.states_errors:
             return PredictionError.none()
         with without_warnings():  # which predictions have given, here and below
             return PredictionError.of_rows(self.rest.predict_covariance(self._inputs(X)))
@@ -85,12 +85,12 @@ class Regression:
         The first transformers know all rows.
         """
         partition = [*folds.splits, (folds.untested, folds.untested)] if folds.untested.size else folds.splits
-        learner, n_targets = clone(self.rest).set_params(tells_errors=self.tells_errors), y.shape[1]
+        learner, n_targets = clone(self.rest).set_params(states_errors=self.states_errors), y.shape[1]
         # With metadata routing, scikit-learn 1.6 fails where params are None.
         found = cross_val_predict(learner, self._inputs(X), y, cv=partition, params={})
         predicted, covariances = found[:, :n_targets], found[:, n_targets:]
         predicted[folds.untested] = np.nan
-        if not self.tells_errors:
+        if not self.states_errors:
             return predicted, self.errors(X)
         return predicted, PredictionError.of_rows(covariances.reshape(-1, n_targets, n_targets))
 
@@ -122,22 +122,22 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
 
     The compensator around has checked the records with some findings, and warns of what it hands on. With
-    ``tells_errors``, the covariance of each row's prediction follows in the columns behind it.
+    ``states_errors``, the covariance of each row's prediction follows in the columns behind it.
     """
 
-    def __init__(self, estimator: BaseEstimator, findings: RecordFindings, tells_errors: bool = False):
+    def __init__(self, estimator: BaseEstimator, findings: RecordFindings, states_errors: bool = False):
         self.estimator = estimator
         self.findings = findings
-        self.tells_errors = tells_errors
+        self.states_errors = states_errors
 
     def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
-        with told_around(TOLD, self.findings):  # also in a worker process
+        with reported_by_caller(REPORTED, self.findings):  # also in a worker process
             return self._fit(X, y)
 
     def predict(self, X: Any) -> NDArray[np.float64]:
-        with told_around(TOLD):
+        with reported_by_caller(REPORTED):
             predicted = self._predict(X)
-        if not self.tells_errors:
+        if not self.states_errors:
             return predicted
         return np.hstack([predicted, self.predict_covariance(X).reshape(len(predicted), -1)])
 
@@ -145,14 +145,14 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         usable = self._predictable(X)
         covariances = np.full((X.shape[0], self.n_targets_, self.n_targets_), np.nan)
         if usable.any():
-            with told_around(TOLD):
+            with reported_by_caller(REPORTED):
                 covariances[usable] = predicted_covariance(self.regressor_, X[usable])
         return covariances
 
     def from_fleet(self, X: Any) -> NDArray[np.bool_]:
         rows = self._predictable(X)
         if rows.any():
-            rows[rows] = told_by_fleet(self.regressor_, X[rows])
+            rows[rows] = rows_from_fleet(self.regressor_, X[rows])
         return rows
 
     def _fit(self, X: Any, y: Any) -> CompleteRowsRegressor:

@@ -115,8 +115,8 @@ class FusedDetector(DamageDetector, _BaseComposition):
             scores = [fitted.score_samples(X) for fitted in self.detectors_]
         thresholds = [last_step(fitted).threshold_ for fitted in self.detectors_]
         index = _mean([-score / limit for score, limit in zip(scores, thresholds, strict=True)])
-        told = [explained_rows(score) for score in scores]
-        return explain_rows(index, np.logical_and.reduce(np.broadcast_arrays(np.isnan(index), *told)))
+        explained = [explained_rows(score) for score in scores]
+        return explain_rows(index, np.logical_and.reduce(np.broadcast_arrays(np.isnan(index), *explained)))
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return f"none of the {len(self.detectors_)} detectors can evaluate them"

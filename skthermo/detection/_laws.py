@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import betainc, betaincinv
 from scipy.stats import chi
 
-from skthermo._estimators.warnings import told_around, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, without_warnings
 from skthermo._tables.arrays import Array
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._patterns import as_if_complete
@@ -82,7 +82,7 @@ class CountLaw:
     def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> CountLaw:
         """Learned from the records in some rows."""
         detector = MahalanobisDetector(contamination, threshold="quantile")
-        with told_around(OF_COLUMNS):  # the whole baseline has been checked
+        with reported_by_caller(OF_COLUMNS):  # the whole baseline has been checked
             detector.fit(windows.rows[rows])
         n = int(np.median(windows.sizes))
         if m is not None and m > n:

@@ -357,15 +357,15 @@ class ActiveDetector(SavesFrames):
         return ["; ".join(filter(None, parts)) for parts in phrases]
 
     @property
-    def most_unseen(self) -> float:
+    def fall_to_detect(self) -> float:
         """Fall of all responses below which a record that raises no alarm says too little; NaN if there is none."""
         return max(BLIND * self.smallest.common, LEAST_BLIND)
 
     def is_blind(self, records: pd.DataFrame, first: int, outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which records from a position on are in weather in which the detector would not see even a large fall."""
+        """Which records from a position on are in weather in which the detector would not detect even a large fall."""
         if not outside.any() or np.isnan(self.smallest.common):
             return np.zeros(len(outside), dtype=bool)
-        fallen = lowered(records, {name: self.most_unseen * records[name] for name in self.targets})
+        fallen = lowered(records, {name: self.fall_to_detect * records[name] for name in self.targets})
         return outside & (self.index(fallen, first) <= self.threshold)
 
     def extrapolated(self, records: pd.DataFrame) -> NDArray[np.bool_]:

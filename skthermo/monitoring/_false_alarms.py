@@ -204,8 +204,8 @@ class FalseAlarmEstimate:
     ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
     ``highest`` of them with a probability of 90 %, by chance and because one baseline leaves the rate uncertain.
     ``n_years`` is the time that the baseline's evaluated records cover, ``n_peaks`` the number of its highest
-    excursions that the threshold comes from, ``unseen`` the seasons without baseline records, for which there is no
-    estimate ("" if there is none), ``method`` how the threshold was found, in words.
+    excursions that the threshold comes from, ``missing_season`` the seasons without baseline records, for which there
+    is no estimate ("" if there is none), ``method`` how the threshold was found, in words.
     """
 
     rule: EventRule
@@ -214,7 +214,7 @@ class FalseAlarmEstimate:
     highest: int
     n_years: float
     n_peaks: int
-    unseen: str
+    missing_season: str
     method: str
     tail: Tail
 
@@ -222,7 +222,7 @@ class FalseAlarmEstimate:
         expected = counted_number(self.expected, "false alarm")
         return (
             f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
-            + (f"; no estimate for {self.unseen}" if self.unseen else "")
+            + (f"; no estimate for {self.missing_season}" if self.missing_season else "")
         )
 
     def p_value(self, peak: float, n_years: float, shape: float | None = None) -> float:
@@ -307,17 +307,17 @@ def estimate_false_alarms(
     scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
     tail = Tail.of(squares, asked, tuple(scales.tolist()))
     release = release_level(known, hold, persistence) if release is None else release
-    rule, unseen = (
+    rule, missing_season = (
         EventRule(max(tail.threshold(asked), release), release, hold, persistence),
-        _unseen_season(known.index),
+        _days_without_records(known.index),
     )
     lowest, highest = tail.numbers(asked, n_years)
     method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
         ", extrapolated" if asked < FAR else ""
     )
     seen = None if smallest_at is None else smallest_at(rule.threshold)
-    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, unseen, seen)
-    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, unseen, method, tail)
+    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, missing_season, seen)
+    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, missing_season, method, tail)
 
 
 def _warn_of_baseline(
@@ -327,15 +327,15 @@ def _warn_of_baseline(
     asked: float,
     per_year: float,
     years: str,
-    unseen: str,
+    missing_season: str,
     seen: SmallestChanges | None,
 ) -> None:
     """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
     highest, second = excursions["index"].iloc[:2]
-    if unseen:
+    if missing_season:
         warn_user(
-            f"the baseline has no record of {unseen}: the number of false alarms a year is that of the other seasons, "
-            "and there is no estimate for these; expected a whole year",
+            f"the baseline has no record of {missing_season}: the number of false alarms a year is that of the other "
+            "seasons, and there is no estimate for these; expected a whole year",
             WeatherWarning,
             "seasons without baseline",
         )
@@ -354,7 +354,7 @@ def _warn_of_baseline(
             f"alarm from {100 * LARGE:g} % of all responses on: more records in a window, less scatter, or more alarms "
             "a year",
             ResultWarning,
-            "large changes unseen",
+            "large changes not detected",
         )
     if tail.has_outlier(DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
@@ -379,7 +379,7 @@ def _largest_share(k: int, probability: float) -> float:
     return 1.0 - (probability / k) ** (1 / (k - 1)) if k > 1 else 1.0
 
 
-def _unseen_season(stamps: pd.DatetimeIndex) -> str:
+def _days_without_records(stamps: pd.DatetimeIndex) -> str:
     """Days of the year that no record is near, as their number and the longest stretch of them; "" if there is none."""
     seen = np.zeros(365, dtype=bool)
     days = np.unique(np.minimum(stamps.day_of_year, 365) - 1)

@@ -73,7 +73,7 @@ class SmallestChanges:
 
     @property
     def is_large(self) -> bool:
-        """Whether a large fall of all responses goes unseen, and a larger one does not."""
+        """Whether a large fall of all responses is not detected, and a larger one is."""
         return self.is_relative and self.common > LARGE
 
     def as_dict(self) -> dict[str, Any]:

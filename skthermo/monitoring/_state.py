@@ -170,7 +170,7 @@ class MonitorState(SavesFrames):
             "stiffer than the baseline": numbers.get(STIFFENING, np.zeros(len(raw))) > 0,
             "above the threshold, not yet for long": pending,
             "thermometers contradict each other, and without one of them it would be in alarm": is_contested,
-            f"even a fall of all responses by {100 * active.most_unseen:.2g} % would not be seen there": is_blind,
+            f"even a fall of all responses by {100 * active.fall_to_detect:.2g} % would stay undetected": is_blind,
         }
         for row in range(len(known), len(raw)):
             said = [reasons[row], *(remark for remark, rows in remarks.items() if rows[row])]

@@ -130,8 +130,8 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_explanations(self, ax: Axes) -> BarContainer:
         """Bars with the causes above and the probability behind them."""
-        told = 100 * self.identified.summary_table["probability"].astype(float)
-        shown = told.iloc[:MOST_BARS]
+        probabilities = 100 * self.identified.summary_table["probability"].astype(float)
+        shown = probabilities.iloc[:MOST_BARS]
         if (others := 100 - shown.sum()) >= 0.1:
             shown = pd.concat([shown, pd.Series({"all others": others})])
         places = np.arange(len(shown))

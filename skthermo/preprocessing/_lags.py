@@ -161,8 +161,8 @@ class LagFeatures(PastFeatures):
         """Warn of first rows whose lags are not known, unless they are those of `fit`; which rows these are."""
         reach, n_rows = max(self.lags_), len(values)
         begins = values[: reach + 1]
-        is_told = bool(reach) and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True)
-        if is_told:
+        is_warned = bool(reach) and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True)
+        if is_warned:
             done = "are padded with the first record" if self.padding == "edge" else "lack lags"
             warn_user(
                 f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
@@ -170,13 +170,13 @@ class LagFeatures(PastFeatures):
                 FewRecordsWarning,
                 "padded lags",
             )
-        return is_told & (np.arange(n_rows) < reach)
+        return is_warned & (np.arange(n_rows) < reach)
 
     def _warn_of_no_history(self, stamps: pd.DatetimeIndex, unknown: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Warn if more than half of the rows have lags that reach before the first of them and find no record; which
         rows these are."""
-        is_told = bool(2 * unknown.sum() > len(unknown))
-        if is_told:
+        is_warned = bool(2 * unknown.sum() > len(unknown))
+        if is_warned:
             reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
             warn_user(
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
@@ -184,7 +184,7 @@ class LagFeatures(PastFeatures):
                 FewRecordsWarning,
                 "no records for lags",
             )
-        return is_told & unknown
+        return is_warned & unknown
 
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
@@ -216,8 +216,8 @@ class LagFeatures(PastFeatures):
             unknown |= (stale | before) & (wanted < own.min())
             source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
             sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        told = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old[found]).all() else np.False_
-        return _rows_by_lag(records, sources), told
+        warned = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old[found]).all() else np.False_
+        return _rows_by_lag(records, sources), warned
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

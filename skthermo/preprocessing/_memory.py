@@ -161,8 +161,8 @@ class ExponentialMeans(PastFeatures):
         sorted_times, sorted_records = times[order], records[np.ix_(order, self.sensors_)]
         rows = np.argsort(order)[len(order) - len(own) :]
         means = [trailing_means(sorted_times, sorted_records, int(constant))[rows] for constant in self.time_constants_]
-        told = self._warn_of_no_past(X, values, own, sorted_times)
-        return np.hstack([values, *means]).astype(values.dtype, copy=False), told
+        warned = self._warn_of_no_past(X, values, own, sorted_times)
+        return np.hstack([values, *means]).astype(values.dtype, copy=False), warned
 
     def lacks_past(self, X: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows follow the first record by less than two time constants: their means lack the weather before.

@@ -169,7 +169,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         Warns
         -----
         UserWarning
-            If two reference modes are so near to each other, in frequency and shape, that they can be confused.
+            If two reference modes are so near to each other, in frequency and shape, that they cannot be distinguished.
         """
         if isinstance(self.follow, bool):
             raise ValueError(f"follow is {self.follow}; expected a number of records, a duration or None")

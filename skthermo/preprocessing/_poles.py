@@ -188,7 +188,7 @@ class ReferenceModes(NamedTuple):
         return np.split(order, np.flatnonzero(steps) + 1)
 
     def warn_of_similar(self, max_shift: float, min_mac: float) -> None:
-        """Warn of modes that neither their frequencies nor their shapes can tell apart."""
+        """Warn of modes that neither their frequencies nor their shapes distinguish."""
         pairs = np.array(list(combinations(range(len(self.names)), 2)), dtype=int).reshape(-1, 2)
         low, high = np.sort(self.frequencies[pairs], axis=1).T
         similar = (1 - max_shift) * high <= (1 + max_shift) * low
@@ -199,11 +199,11 @@ class ReferenceModes(NamedTuple):
             first = "/".join(self.names[mode] for mode in pairs[similar][0])
             by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
             warn_user(
-                f"{similar.sum()} of {len(pairs)} pairs of reference modes can be confused, the first {first}: a "
-                f"frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift or "
-                "more sensors",
+                f"{similar.sum()} of {len(pairs)} pairs of reference modes cannot be distinguished, the first {first}: "
+                f"a frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift "
+                "or more sensors",
                 RecordsWarning,
-                "modes that can be confused",
+                "indistinguishable modes",
             )
 
 

@@ -121,8 +121,8 @@ class PastFeatures(RecordTransformer):
     time_zone_: str | None
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        features, told = self._features(X, values, self._stamps_as_in_fit(X))
-        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), told)
+        features, warned = self._features(X, values, self._stamps_as_in_fit(X))
+        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), warned)
 
     @abstractmethod
     def _features(

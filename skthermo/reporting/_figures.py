@@ -213,10 +213,10 @@ def draw_identified_damage(identified: IdentifiedDamage) -> Html:
         axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
         return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
 
-    told = ", ".join(
+    explanations = ", ".join(
         f"{label}: {chance_text(row['probability'])}" for label, row in identified.summary_table.head(3).iterrows()
     )
-    alt = f"Explanations with their probabilities ({told}), severities, and measured and explained shifts."
+    alt = f"Explanations with their probabilities ({explanations}), severities, and measured and explained shifts."
     return draw(make, alt, height=sum(heights))
 
 

@@ -56,9 +56,10 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
 
 def _explanations(identified: IdentifiedDamage) -> Html:
     """Explanations, the most probable first."""
-    told = identified.summary_table[identified.summary_table["probability"] >= LEAST]
+    probable = identified.summary_table[identified.summary_table["probability"] >= LEAST]
     explanations = [
-        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))] for _, row in told.iterrows()
+        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))]
+        for _, row in probable.iterrows()
     ]
     return table(
         "Explanations with their probabilities, and credible intervals of 90 % of the severities if the explanation is "
@@ -86,9 +87,9 @@ def _shifts(identified: IdentifiedDamage) -> Html:
     )
 
 
-def _row(cause: str, row: pd.Series, is_unseen: bool) -> list[str]:
+def _row(cause: str, row: pd.Series, is_unobservable: bool) -> list[str]:
     """Cells of one cause."""
-    if is_unseen:
+    if is_unobservable:
         return [cause, "unobservable", UNITS[row["kind"]], "not known", "", ""]
     amounts = row[["severity", "ci_low", "ci_high", "highest_if_damaged"]].astype(float)
     lowest, highest = sorted(amounts[["ci_low", "ci_high"]].abs())

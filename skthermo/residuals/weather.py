@@ -25,7 +25,7 @@ EXPLAINED = 0.99  # share of the variance of the weather that its coordinates ke
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 MOST_KEPT = 4_000_000  # distances to nearest places that are kept, and as many positions
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
-UNSEEN, LEAST_UNSEEN = 0.1, 10  # share and number of a fold's records in unseen weather from which it is warned of
+SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
 MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
 LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
@@ -82,19 +82,19 @@ class TrainingRange:
         )
 
 
-def warn_of_unseen(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
+def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
     """Warn of the fold that has most records in weather that the other folds, from 0, have not seen."""
-    values, worst, text = as_floats(weather), UNSEEN, ""
+    values, worst, text = as_floats(weather), SHARE_OUTSIDE, ""
     for fold in np.unique(folds[folds >= 0]):
         test = folds == fold
         known = TrainingRange.of(weather, ~test)
         excess = np.nan_to_num(known.excess(values[test]))
-        unseen = (excess > BEYOND).any(axis=1)
-        if unseen.mean() > worst and unseen.sum() >= LEAST_UNSEEN:
-            worst, column = unseen.mean(), int(excess.max(axis=0).argmax())
+        outside = (excess > BEYOND).any(axis=1)
+        if outside.mean() > worst and outside.sum() >= FEWEST_OUTSIDE:
+            worst, column = outside.mean(), int(excess.max(axis=0).argmax())
             seen = values[test, column]
             text = (
-                f"{unseen.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
+                f"{outside.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
                 f"the other folds have not seen: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
                 f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}: "
                 f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
@@ -267,7 +267,7 @@ class PredictionError:
         return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
 
 
-def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str:
+def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
     """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
     filled = deviations > 0
     sensors = [
@@ -280,7 +280,7 @@ def told_fills(deviations: Array, names: Sequence[Any], consequence: str) -> str
     return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
 
 
-def told_unpredicted(
+def unpredicted_text(
     unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach where none is"
 ) -> str:
     """Text of the warning that counts rows that cannot be predicted, for want of weather or as ``others`` says."""

@@ -103,16 +103,16 @@ def remembered(
         known = memory.cache(made, ignore=["make"])
         if not known.check_call_in_cache(kind, identity, make):
             known(kind, identity, make)
-        result, told = known(kind, identity, make)  # what is read has the same layout, and bits, each time
-    give_again(told)
+        result, caught = known(kind, identity, make)  # what is read has the same layout, and bits, each time
+    give_again(caught)
     return result
 
 
 def made(kind: str, identity: str, make: Callable[[], Any]) -> tuple[Any, list[WarningMessage]]:
     """A result, and the warnings that came with it."""
-    with recorded() as told:
+    with recorded() as caught:
         result = make()
-    return result, told
+    return result, caught
 
 
 NETWORKS: dict[str, dict[str, Any]] = {

@@ -178,7 +178,7 @@ class Identifiability(Bunch):
     recommended: list[str]
 
     def summary(self) -> str:
-        """How many parameters the modes can tell apart, and which, in a few sentences.
+        """How many parameters the modes can distinguish, and which, in a few sentences.
 
         Returns
         -------

@@ -128,16 +128,16 @@ def findings(result):
 def good_answer(number):
     """The result and the warnings of the valid call of an example, which only values that are not refused need."""
     example = registry.EXAMPLES[number]
-    result, error, told = answer(example, example.good)
+    result, error, warned = answer(example, example.good)
     assert error is None, f"the good example of {example.name} fails: {error!r}"
-    return result, told
+    return result, warned
 
 
 def verdict(number, argument, cause, value):
     """One of "legal", "refused", "warned", "silent", "unclear", and what was said."""
     example = registry.EXAMPLES[number]
     with np.errstate(all="ignore"):
-        result, error, told = answer(example, example.good | {argument: value})
+        result, error, warned = answer(example, example.good | {argument: value})
     if isinstance(error, TooLong):
         return "unclear", f"still running after {SECONDS} s"
     if error is not None:
@@ -150,7 +150,7 @@ def verdict(number, argument, cause, value):
     named = findings(result) - findings(good_result)
     if named:
         return "warned", f"findings: {sorted(named)}"
-    new = {text for text in told if not any(re.sub(r"\d", "", text) == re.sub(r"\d", "", o) for o in good_warnings)}
+    new = {text for text in warned if not any(re.sub(r"\d", "", text) == re.sub(r"\d", "", o) for o in good_warnings)}
     return ("warned", next(iter(new))) if new else ("silent", f"gave {result!r:.80}")
 
 

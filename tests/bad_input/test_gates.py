@@ -50,7 +50,7 @@ def compensator():
     return TemperatureCompensator(Ridge(), targets=MODES)
 
 
-def told(fit, *tables):
+def error_of(fit, *tables):
     """The text of the error of a fit."""
     with pytest.raises(ValueError, match=r".") as refused:
         fit(*tables)
@@ -67,7 +67,7 @@ def test_a_chain_lists_all_errors(names):
     for name in names:
         temperatures = OF_TEMPERATURES.get(name, lambda table: table)(temperatures)
         frequencies = OF_FREQUENCIES.get(name, lambda table: table)(frequencies)
-    text = told(chain().fit, temperatures, frequencies)
+    text = error_of(chain().fit, temperatures, frequencies)
     assert all(name in text for name in names)
 
 
@@ -82,7 +82,7 @@ def test_detectors_and_compensators_list_all_errors(estimator, names):
     for name in names:
         frequencies = OF_FREQUENCIES[name](frequencies)
     X = T.join(frequencies) if isinstance(estimator, TemperatureCompensator) else frequencies
-    text = told(estimator.fit, X)
+    text = error_of(estimator.fit, X)
     assert all(name in text for name in names)
 
 
@@ -91,7 +91,7 @@ def test_another_unit_is_refused_wherever_the_model_is_known(unit, factor):
     frequencies = 1 / F if factor is None else F * factor
     fitted = chain().fit(T, F)
     for fit in (chain().fit, lambda *new: identify_damage(fitted, *new), lambda *new: track_parameters(fitted, *new)):
-        assert unit in told(fit, T, frequencies)
+        assert unit in error_of(fit, T, frequencies)
 
 
 def test_records_of_any_quantity_are_legal_where_no_model_is():

@@ -373,7 +373,7 @@ def print_method(name, bridge, years, dirty, n_days):
     ]
     table = pd.DataFrame(rows, columns).T
     print(table.round(1).to_string())
-    said.print("of judging")
+    said.print("of evaluation")
     for before in (0, BEFORE):
         batches = Heard()
         stream = [years[damage, "as in training"][: n_days * PER_DAY] for damage in ("healthy", "side span 12 %")]

@@ -5,7 +5,7 @@
 
 Two-hourly records of the 28-bar truss under a synthetic climate. Its bars follow the air with delays of hours, its
 supports with one of days, and frost stiffens them. The detector learns the first year, with lags of 0, 6 and 24 hours,
-and judges the second: healthy, and with two kinds of damage. The exit code is 1 if a target is missed.
+and evaluates the second: healthy, and with two kinds of damage. The exit code is 1 if a target is missed.
 """
 
 import argparse
@@ -83,12 +83,12 @@ def by_day(residuals):
     return residuals.resample("1D").mean()
 
 
-def alarm_rates(residuals, judged):
+def alarm_rates(residuals, evaluated):
     """Alarms in percent, by record and by a day's mean."""
     rates = {}
     for kind, transform in (("record", lambda frame: frame), ("day", by_day)):
         detector = MahalanobisDetector(ASKED / 100).fit(transform(residuals))
-        for name, found in judged.items():
+        for name, found in evaluated.items():
             index = detector.damage_index(transform(found))
             rates[kind, name] = 100 * float((index > detector.threshold_).mean())
     return rates
@@ -111,9 +111,9 @@ def folds(seeds, regressors):
                 for whiten in (None, "local"):
                     learner = compensator(names, regressor, cv=cv, whiten=whiten)
                     residuals = learner.fit_transform(baseline)
-                    judged = {name: learner.transform(records) for name, records in states.items()}
+                    evaluated = {name: learner.transform(records) for name, records in states.items()}
                     key = regressor, whiten or "plain", f"{cv or 'default'}"
-                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, judged)))
+                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, evaluated)))
     found = mean_table(rows, "Alarms in year 2").xs("default", level=2)
     return int((found["record", "healthy"] > MOST_FALSE).sum())
 
@@ -128,12 +128,12 @@ def sensor(seeds, regressors):
                 learner = compensator(names, regressor, whiten=whiten)
                 residuals = learner.fit_transform(baseline)
                 for what in ("alive", "dead"):
-                    judged = {
+                    evaluated = {
                         name: learner.transform(records.assign(girder=np.nan) if what == "dead" else records)
                         for name, records in states.items()
                     }
                     key = regressor, whiten or "plain", what
-                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, judged)))
+                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, evaluated)))
     found = mean_table(rows, "Alarms in year 2 by the girder's thermometer").xs("dead", level=2)
     return int((found["record", "healthy"] > MOST_FALSE).sum())
 
@@ -146,23 +146,23 @@ def days(seeds, regressors):
     half = 180 * PER_DAY
     records = pd.concat([states["healthy"][:half], states["bottom 1 %"][half:]])
     expected = detector.damage_index(learner.transform(records))[2 * PER_DAY :]
-    alone, behind, told = [], [], {}
+    alone, behind, messages = [], [], {}
     for _, batch in records.iloc[2 * PER_DAY :].groupby(records.index[2 * PER_DAY :].floor("D")):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             alone.append(detector.damage_index(learner.transform(batch)))
         for warning in caught:
-            told.setdefault(str(warning.message)[:40], str(warning.message))
+            messages.setdefault(str(warning.message)[:40], str(warning.message))
         some = records.loc[batch.index[0] - pd.Timedelta("30h") : batch.index[-1]]
         behind.append(detector.damage_index(learner.transform(some))[-len(batch) :])
     alone, behind, limit = pd.concat(alone), pd.concat(behind), detector.threshold_
-    judged = alone.notna()
-    silent = judged & ~np.isclose(alone, expected, rtol=1e-9) | ~judged & (not told)
+    evaluated = alone.notna()
+    silent = evaluated & ~np.isclose(alone, expected, rtol=1e-9) | ~evaluated & (not messages)
     otherwise = (behind > limit) != (expected > limit)
     print(f"Year 2 in batches of a day, {regressors[0]}: {len(expected)} rows, {(expected > limit).sum()} in alarm\n")
-    print(f"alone: {(~judged).sum()} rows not evaluated, {silent.sum()} rows silently worse, at most 0")
+    print(f"alone: {(~evaluated).sum()} rows not evaluated, {silent.sum()} rows silently worse, at most 0")
     print(f"behind the 30 hours before: {otherwise.sum()} rows decided otherwise than in one pass, at most 0")
-    print("what is said of the first day:", *told.values(), sep="\n- ")
+    print("what is said of the first day:", *messages.values(), sep="\n- ")
     return int(silent.sum() + otherwise.sum())
 
 

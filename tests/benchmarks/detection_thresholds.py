@@ -149,7 +149,7 @@ def six_modes(random, n_records, heavy):
 
 
 def print_missing_modes(options):
-    """False alarms by pattern, and detection beside a detector that judges complete rows only."""
+    """False alarms by pattern, and detection beside a detector that evaluates complete rows only."""
     shift = np.array([2.0, 0, 0, 0, 0, 0])
     for name, heavy in (("normal", False), ("t distribution, 5 degrees of freedom", True)):
         random = np.random.default_rng(2)
@@ -161,14 +161,14 @@ def print_missing_modes(options):
         code = 2 ** np.arange(6)
         counts = np.bincount(~np.isnan(baseline) @ code, minlength=64)
         alarms = pd.Series(detector.damage_index(new) > detector.threshold_).groupby(~np.isnan(new) @ code)
-        judged = alarms.mean()[(counts >= 100)[alarms.mean().index]].drop(0, errors="ignore")
-        off = 100 * abs(judged - ASKED)
-        error = 100 * np.sqrt(ASKED * (1 - ASKED) / alarms.size()[judged.index])
+        rates = alarms.mean()[(counts >= 100)[alarms.mean().index]].drop(0, errors="ignore")
+        off = 100 * abs(rates - ASKED)
+        error = 100 * np.sqrt(ASKED * (1 - ASKED) / alarms.size()[rates.index])
         print(f"Half of the entries of six correlated modes missing, {name}")
-        print(f"  patterns with at least 100 of 10000 baseline rows: {len(judged)}")
-        print(f"  their false alarms, %: {100 * judged.min():.2f} to {100 * judged.max():.2f}, of all rows", end=" ")
+        print(f"  patterns with at least 100 of 10000 baseline rows: {len(rates)}")
+        print(f"  their false alarms, %: {100 * rates.min():.2f} to {100 * rates.max():.2f}, of all rows", end=" ")
         print(f"{100 * rate(detector, new):.2f}")
-        by_number = judged.groupby(judged.index.map(int.bit_count)).mean()
+        by_number = rates.groupby(rates.index.map(int.bit_count)).mean()
         print("  by number of modes that are there:", ", ".join(f"{n}: {100 * r:.2f}" for n, r in by_number.items()))
         print(f"  sampling error of a rate, new records alone, points: {error.min():.2f} to {error.max():.2f}")
         print(f"  largest difference from 2 %, at most 1 point: {off.max():.2f}")

@@ -3,13 +3,13 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_tuning.py --seeds 5
 
 The steel of a truss follows the air with inertia, and its frequencies, recorded every three hours, scatter more when it
-is cold. For each seed, a chain learns one healthy year, and 12 settings of a whitened detector are judged by
+is cold. For each seed, a chain learns one healthy year, and 12 settings of a whitened detector are compared by
 simulated records, healthy and damaged, in the weather of a second year. A third year, in which all scenarios are
-simulated with fresh noise and are also true, judges the winner, the setting that the search began with, and the best of
-the 12 by truth. Scores are the share of damaged records found at 2 % false alarms, mean over scenarios.
+simulated with fresh noise and are also true, evaluates the winner, the setting that the search began with, and the
+best of the 12 by truth. Scores are the share of damaged records found at 2 % false alarms, mean over scenarios.
 
 It fails if the mean score of the winners is more than 2 points below that of the best settings by truth, or differs by
-more than 5 points from what was promised by fresh simulation.
+more than 5 points from what fresh simulation predicted.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def one_seed(seed, n_repeats, n_jobs):
     search.fit(task.X, task.y)
 
     later, truth = true_year(third, [one.damage for one in SCENARIOS])
-    promised = task.confirm({"winner": search, "first": begun}, later, random_state=seed)
+    confirmed = task.confirm({"winner": search, "first": begun}, later, random_state=seed)
     true = {
         str(setting): true_score(task.refit(begun.set_params(**setting)), later, truth)
         for setting in ParameterGrid(GRID)
@@ -54,8 +54,8 @@ def one_seed(seed, n_repeats, n_jobs):
     rows = {}
     for name, setting in chosen.items():
         row = {"tuned": simulated[setting], "true": found[setting], "true false alarms": true[setting][1]}
-        if name in promised.index:
-            row |= promised.loc[name, ["fresh", "fresh_lowest", "fresh_highest", "optimism", "false_alarms"]].to_dict()
+        if name in confirmed.index:
+            row |= confirmed.loc[name, ["fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "false_alarms"]].to_dict()
         rows[name] = {key: 100 * value for key, value in row.items()} | {"setting": short(setting)}
     rank = pd.Series(simulated).corr(found, method="spearman")
     return pd.DataFrame.from_dict(rows, orient="index"), rank
@@ -78,7 +78,7 @@ def main():
         tables[seed], rank = one_seed(seed, options.repeats, options.jobs)
         ranks.append(rank)
     table = pd.concat(tables, names=["seed", "which"])
-    columns = ["setting", "tuned", "fresh", "fresh_lowest", "fresh_highest", "optimism", "true", "false_alarms"]
+    columns = ["setting", "tuned", "fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "true", "false_alarms"]
     columns.append("true false alarms")
     print("Damaged records found at 2 % false alarms, and false alarms by the own threshold, %\n")
     print(table[columns].round(1).to_string(na_rep=""), end="\n\n")
@@ -86,7 +86,7 @@ def main():
     print(means.loc[["first", "winner", "best"]].round(1).to_string(na_rep=""), end="\n\n")
     print(f"rank correlation of simulated and true scores of 12 settings, mean of the seeds: {np.mean(ranks):.3f}")
     lost, gap = means.loc["best", "true"] - means.loc["winner", "true"], abs(means.eval("fresh - true")["winner"])
-    inside = table.xs("winner", level="which").eval("fresh_lowest <= true <= fresh_highest").sum()
+    inside = table.xs("winner", level="which").eval("fresh_ci_low <= true <= fresh_ci_high").sum()
     print(f"winner less than the best by truth, points, at most 2: {lost:.2f}")
     print(f"winner, fresh simulation and truth differ by, points, at most 5: {gap:.2f}")
     print(f"seeds in which the truth lies within the bounds of the fresh score: {inside} of {options.seeds}")

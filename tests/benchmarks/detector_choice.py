@@ -162,7 +162,7 @@ class Truss:
 class KW51:
     """Synthetic hours of the bridge KW51 in winter, whose law the chain's model cannot follow exactly.
 
-    Of its modes, f3, f5 and f6 are judged, which are identified in most records.
+    Of its modes, f3, f5 and f6 are used, which are identified in most records.
     """
 
     targets = ("f3", "f5", "f6")
@@ -182,7 +182,7 @@ class KW51:
         self.assumed = self.coming = sweep(self.fem.model, severities, ["connections", "girders", "arch"])
 
     def records_of(self, T, F):
-        """Temperatures and judged modes side by side, where there is a temperature."""
+        """Temperatures and these modes side by side, where there is a temperature."""
         return T.join(F[list(self.targets)])[T.notna().all(axis=1)]
 
     def truth(self, scenario, seed):

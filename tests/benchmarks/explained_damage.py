@@ -2,10 +2,10 @@
 
     OMP_NUM_THREADS=1 SKTHERMO_DATA=folder python tests/benchmarks/explained_damage.py
 
-Every world is a campaign of one structure with a chain of its own that learns its healthy records: the truss by the
+Every campaign is of one structure, with a chain of its own that learns its healthy records: the truss by the
 thermo-mechanical law, the bridge KW51 (also with mode shapes), the building frame (which needs
 ``building_frame/ConcreteBuildingFrame.mat`` in the folder), and a cable-stayed footbridge. Noise is independent or
-correlated from record to record (0.5, 0.9), a third of the worlds have gaps in later records, a quarter outliers.
+correlated from record to record (0.5, 0.9), a third of the campaigns have gaps in later records, a quarter outliers.
 Each is asked about 90 later days without damage, with damage of one group, and of two. Designs: "right model",
 "wrong model" (every group 5 % too stiff or too soft, the footbridge's elements coarser than the truth), "shapes", and
 "ensemble" (the wrong model as a sample of calibrated ones).
@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from explained_structures import STRUCTURES, World, memory_of
+from explained_structures import STRUCTURES, Campaign, memory_of
 
 from skthermo.studies import identify_damage
 
@@ -35,9 +35,9 @@ DESIGNS = {
     "frame": ("right model", "wrong model"),
     "footbridge": ("right model", "wrong model", "ensemble"),
 }
-WORLDS = {"truss": 60, "KW51": 5, "frame": 5, "footbridge": 12}
+N_CAMPAIGNS = {"truss": 60, "KW51": 5, "frame": 5, "footbridge": 12}
 SHARE = {"right model": 1.0, "shapes": 1.0, "wrong model": 0.4, "ensemble": 0.1}  # of these
-N_HEALTHY = {"truss": 2, "KW51": 4, "frame": 4, "footbridge": 3}  # windows without damage of each world
+N_HEALTHY = {"truss": 2, "KW51": 4, "frame": 4, "footbridge": 3}  # windows without damage of each campaign
 N_MODELS = 6  # of an ensemble
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named
 NORMAL = 1.645  # standard errors of a band of 90 %, where there are no bands
@@ -47,7 +47,7 @@ SHOWN = ["right model", "shapes", "wrong model", "ensemble"]
 
 
 def truths(groups, seed, n_healthy):
-    """States of one world: none, one of 12, 12, 20 and 5 %, and two pairs; other groups in other worlds."""
+    """States of one campaign: none, one of 12, 12, 20 and 5 %, and two pairs; other groups in other campaigns."""
     n = len(groups)
     found = [{}] * n_healthy
     found += [{groups[(3 * seed + i) % n]: severity} for i, severity in enumerate((0.12, 0.12, 0.2, 0.05))]
@@ -110,56 +110,56 @@ def answered(found, truth, groups):
     return state, of_groups
 
 
-def asked(world, truth, number, design, models):
-    """One state of one world."""
-    T, F = world.later(truth, number)
+def asked(campaign, truth, number, design, models):
+    """One state of one campaign."""
+    T, F = campaign.later(truth, number)
     more = {}
     if design == "shapes":
         more = {
-            "shapes": world.structure.shapes(truth, 7000 + 100 * world.seed + number),
-            "dofs": world.structure.sensors,
+            "shapes": campaign.structure.shapes(truth, 7000 + 100 * campaign.seed + number),
+            "dofs": campaign.structure.sensors,
         }
     if models is not None:
         more = {"models": models}
-    return identify_damage(world.fem, T, F, list(world.structure.groups), random_state=number, **more)
+    return identify_damage(campaign.fem, T, F, list(campaign.structure.groups), random_state=number, **more)
 
 
 def measured(name, design, seeds, verbose):
-    """States and groups of all worlds of one design."""
+    """States and groups of all campaigns of one design."""
     structure, states, groups = STRUCTURES[name](), [], []
     spent = {"fit": 0.0, "identify": 0.0}
     for seed in seeds:
         start = time.process_time()
-        world = World(structure, seed, wrong=design in ("wrong model", "ensemble"))
-        models = sampled(world) if design == "ensemble" else None
+        campaign = Campaign(structure, seed, wrong=design in ("wrong model", "ensemble"))
+        models = sampled(campaign) if design == "ensemble" else None
         n_states = truths(structure.groups, seed, N_HEALTHY[name] if models is None else 1)
-        _ = world.fem
+        _ = campaign.fem
         spent["fit"] += time.process_time() - start
         for number, truth in enumerate(n_states):
             start = time.process_time()
-            state, of_groups = answered(asked(world, truth, number, design, models), truth, list(structure.groups))
+            state, of_groups = answered(asked(campaign, truth, number, design, models), truth, list(structure.groups))
             spent["identify"] += time.process_time() - start
             at = {"structure": name, "design": design, "correlation": memory_of(seed)}
             states.append(at | state)
             groups.append(of_groups.assign(**at))
             if verbose:
-                told = f"{state['said']} ({state['probability']:.2f}; the truth {state['true one']:.2f})"
-                print(f"{name}, {design}, {seed}: {state['truth']}: {told}", flush=True)
+                line = f"{state['said']} ({state['probability']:.2f}; the truth {state['true one']:.2f})"
+                print(f"{name}, {design}, {seed}: {state['truth']}: {line}", flush=True)
     print(
-        f"{name}, {design}: {len(seeds)} worlds, {len(states)} states; {spent['fit']:.0f} s for the chains, "
+        f"{name}, {design}: {len(seeds)} campaigns, {len(states)} states; {spent['fit']:.0f} s for the chains, "
         f"{spent['identify'] / len(states):.2f} s for a state",
         flush=True,
     )
     return pd.DataFrame(states), pd.concat(groups, ignore_index=True)
 
 
-def sampled(world):
+def sampled(campaign):
     """Calibrated models drawn from what the training records' mean leaves open."""
     from skthermo.updating import ModelUpdater
 
-    mean = world.records[1].mean().to_numpy()[np.newaxis]
-    updater = ModelUpdater(world.model).fit(mean, frequency_std=0.005)
-    return updater.sample_models(N_MODELS, random_state=world.seed)
+    mean = campaign.records[1].mean().to_numpy()[np.newaxis]
+    updater = ModelUpdater(campaign.model).fit(mean, frequency_std=0.005)
+    return updater.sample_models(N_MODELS, random_state=campaign.seed)
 
 
 def share(values):
@@ -261,11 +261,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--structures", nargs="+", default=list(DESIGNS), choices=list(DESIGNS))
     parser.add_argument("--designs", nargs="+", default=SHOWN, choices=SHOWN)
-    parser.add_argument("--worlds", type=int, help="number of worlds of each structure and design")
+    parser.add_argument("--campaigns", type=int, help="number of campaigns of each structure and design")
     parser.add_argument(
-        "--first", type=int, default=100, help="seed of the first world; those below 100 chose settings"
+        "--first", type=int, default=100, help="seed of the first campaign; those below 100 chose settings"
     )
-    parser.add_argument("--quick", action="store_true", help="a sixth of the worlds")
+    parser.add_argument("--quick", action="store_true", help="a sixth of the campaigns")
     parser.add_argument("--verbose", action="store_true", help="a line for each state")
     parser.add_argument("--z24", action="store_true", help="Z24 alone")
     options = parser.parse_args()
@@ -278,7 +278,7 @@ def main():
         for design in [one for one in DESIGNS[name] if one in options.designs]:
             if design == "ensemble" and "models" not in identify_damage.__kwdefaults__:
                 continue
-            number = options.worlds or max(round(SHARE[design] * WORLDS[name] / (6 if options.quick else 1)), 1)
+            number = options.campaigns or max(round(SHARE[design] * N_CAMPAIGNS[name] / (6 if options.quick else 1)), 1)
             seeds = range(options.first, options.first + number)
             every.append(measured(name, design, seeds, options.verbose))
     states, groups = (pd.concat(parts, ignore_index=True) for parts in zip(*every, strict=True))

@@ -47,12 +47,12 @@ def autoregression(n_records, n_modes, memory, random):
 
 
 def memory_of(seed):
-    """Correlation of neighbouring records: each structure has worlds of all three."""
+    """Correlation of neighbouring records: each structure has campaigns with all three."""
     return CORRELATIONS[seed % len(CORRELATIONS)]
 
 
 def spoiled(F, seed):
-    """Later records as they come: gaps in every third world, outliers in every fourth."""
+    """Later records as they come: gaps in every third campaign, outliers in every fourth."""
     random, values = np.random.RandomState(seed), F.copy()
     if seed % 3 == 1:
         values = values.mask(random.random_sample(values.shape) < 0.1)
@@ -63,7 +63,7 @@ def spoiled(F, seed):
 
 
 @dataclass
-class World:
+class Campaign:
     """One campaign: records that a chain learns, and later ones with damage."""
 
     structure: object

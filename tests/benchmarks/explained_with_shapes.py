@@ -66,7 +66,7 @@ def shapes(seed, case=None):
     return exact + SHAPE_NOISE * np.abs(exact).max(axis=0) * noise
 
 
-def judged(fem, case, seed, n_days):
+def evaluated(fem, case, seed, n_days):
     """Probability of the true explanation, errors of its amounts, and least errors, without and with shapes."""
     damage, mass = CASES[case]
     truth = damage | ({"ballast mass": mass} if mass else {})
@@ -97,7 +97,7 @@ def main():
     rows, precision = [], None
     for case in CASES:
         for seed in range(asked.seeds):
-            row, precision = judged(fem, case, seed, asked.days)
+            row, precision = evaluated(fem, case, seed, asked.days)
             rows.append(row)
     table = pd.DataFrame(rows)
     print(table.groupby("case", sort=False).mean().drop(columns="seed").round(2).to_string(), "\n")

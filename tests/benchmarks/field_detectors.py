@@ -4,7 +4,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/field_detectors.py --cases frost "frost, days left out" --seeds 2
 
 The truss day by day, with noise that is independent or has a correlation of 0.9 from day to day; its weather repeats
-("independent", "dependent", also after two years), is colder by 10 °C in the year that is judged, or the baseline ends
+("independent", "dependent", also after two years), is colder by 10 °C in the evaluated year, or the baseline ends
 after the first half of its year. "frost" has two-hourly records of a truss that freezes, in weather with a memory of
 days; "Z24" the bridge's measured ones, for which the variable SKTHERMO_DATA names the folder of data. Outlier detectors
 leave out blocks of five correlation times or, with "days left out", of days. The exit code is 1 if a detector raises

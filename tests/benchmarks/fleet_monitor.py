@@ -12,7 +12,7 @@ means by role of the thermometers now and 12 and 48 hours ago, for all regressio
 
 fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the frequencies
 fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
-             one that foretells the fleet's own bridges best after as many days. It does not know how uncertain it is.
+             one that predicts the fleet's own bridges best after as many days. It does not know how uncertain it is.
 ridge        of all temperatures, on the bridge's own records
 lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
 neighbours   distance to the 20th nearest of the raw frequencies of the baseline

@@ -76,16 +76,16 @@ class Frequencies:
         return X.to_numpy(), np.log(F.to_numpy())
 
     def fitted(self, mapper, start, days):
-        """Predictions of the judged year by a mapper that has seen the first days, and their intervals."""
+        """Predictions of the evaluated year by a mapper that has seen the first days, and their intervals."""
         X, records = self.year(start, days)
-        judged, later = self.judged
-        complete = judged.notna().all(axis=1).to_numpy()
+        evaluated, later = self.evaluated
+        complete = evaluated.notna().all(axis=1).to_numpy()
         centre = np.full(later.frequencies.shape, np.nan)
         spread = np.zeros_like(centre)
         if hasattr(mapper, "prior"):
             mapper.fit(X, records.frequencies)
-            centre[complete] = mapper.predict(judged[complete])
-            spread[complete] = np.sqrt(np.einsum("tii->ti", mapper.predict_covariance(judged[complete])))
+            centre[complete] = mapper.predict(evaluated[complete])
+            spread[complete] = np.sqrt(np.einsum("tii->ti", mapper.predict_covariance(evaluated[complete])))
             at = X.notna().all(axis=1).to_numpy()
             left = records.frequencies[at].to_numpy() - mapper.predict(X[at]).to_numpy()
             noise = 1.4826 * np.nanmedian(np.abs(left), axis=0) * np.sqrt(days / (days - 3))
@@ -94,18 +94,18 @@ class Frequencies:
         for i, mode in enumerate(records.frequencies):
             f = records.frequencies[mode]
             known = f.notna() & X.notna().all(axis=1)
-            centre[complete, i] = np.ravel(TemperatureMapper().fit(X[known], f[known]).predict(judged[complete]))
+            centre[complete, i] = np.ravel(TemperatureMapper().fit(X[known], f[known]).predict(evaluated[complete]))
         return centre, None
 
     @cached_property
-    def judged(self):
-        """Inputs and records of the judged year."""
+    def evaluated(self):
+        """Inputs and records of the evaluated year."""
         return self.year("2027-01-01")
 
     def by_logs(self, start, days, predict):
-        """Predictions of the judged year by a function of (X, logs, X judged) that predicts logs."""
+        """Predictions of the evaluated year by a function of (X, logs, X of that year) that predicts logs."""
         X, records = self.year(start, days)
-        return np.exp(predict(X.to_numpy(), np.log(records.frequencies.to_numpy()), self.judged[0].to_numpy()))
+        return np.exp(predict(X.to_numpy(), np.log(records.frequencies.to_numpy()), self.evaluated[0].to_numpy()))
 
 
 class Chain(Frequencies):
@@ -142,7 +142,7 @@ class Chain(Frequencies):
         return np.asarray(known.inputs), np.log(known.targets)
 
     def fitted(self, mapper, start, days):
-        records, later = self.bridge.records(days, start), self.judged[1]
+        records, later = self.bridge.records(days, start), self.evaluated[1]
         if hasattr(mapper, "prior"):
             chain = self.chain(mapper).fit(records.temperatures, records.frequencies)
         else:
@@ -153,7 +153,7 @@ class Chain(Frequencies):
     def by_logs(self, start, days, predict):
         chain = self.chain_alone(start, days)
         known = chain.records_
-        logs = predict(np.asarray(known.inputs), np.log(known.targets), self.judged[0].to_numpy())
+        logs = predict(np.asarray(known.inputs), np.log(known.targets), self.evaluated[0].to_numpy())
         complete = ~np.isnan(logs).any(axis=1)
         F = np.full((len(logs), len(self.bridge.noise)), np.nan)
         F[complete] = chain.aligner_.inverse_transform(self.bridge.model.frequencies(np.exp(logs[complete])))
@@ -251,7 +251,7 @@ class Competitors:
         return np.column_stack(found)
 
     def ways(self, name, start, days):
-        """A function of (X, logs, X judged) for each way."""
+        """A function of (X, logs, X of that year) for each way."""
         z = self.known(name)
         pooled = np.einsum("k,kio->io", z, self.pooled.reshape(len(z), -1, self.pooled.shape[1]))
 
@@ -272,9 +272,9 @@ def share_inside(ends, measured):
     return ((measured >= lower) & (measured <= upper))[known].mean()
 
 
-def judge(member, new, start, days, ways):
+def evaluate(member, new, start, days, ways):
     """Errors in percent, and shares in intervals, of all ways to predict one bridge."""
-    truth = member.judged[1]
+    truth = member.evaluated[1]
     clean, measured = truth.clean_frequencies.to_numpy(), truth.frequencies.to_numpy()
     found = {}
     for way, mapper in ways.items():
@@ -292,12 +292,12 @@ def known_of(bridge, fleet):
     return given | {"material": given["material"] if (fleet["material"] == given["material"]).any() else None}
 
 
-def campaign_rows(world, fleet, groups, days_asked, starts, newcomers=None):
+def campaign_rows(member_of, fleet, groups, days_asked, starts, newcomers=None):
     """A row for each new bridge, start, number of days and way; each bridge is new, or the newcomers are."""
-    members = {name: world(bridge) for name, bridge in fleet.items()}
+    members = {name: member_of(bridge) for name, bridge in fleet.items()}
     names, rows = list(members), []
     folds = [list(part) for part in np.array_split(names, groups)] if newcomers is None else [list(newcomers)]
-    strangers = {} if newcomers is None else {name: world(bridge) for name, bridge in newcomers.items()}
+    strangers = {} if newcomers is None else {name: member_of(bridge) for name, bridge in newcomers.items()}
     covariates = fleet.covariates if newcomers is None else pd.concat([fleet.covariates, newcomers.covariates])
     seconds = 0.0
     for fold in folds:
@@ -311,14 +311,14 @@ def campaign_rows(world, fleet, groups, days_asked, starts, newcomers=None):
         by_kind = {kind: Competitors(mates, covariates) for kind, mates in kinds.items()}
         for name in fold:
             member = strangers.get(name) or members[name]
-            year = judge(member, name, "2026-01-01", 365, {"own year": TemperatureMapper()})
+            year = evaluate(member, name, "2026-01-01", 365, {"own year": TemperatureMapper()})
             for label in starts:
                 start = STARTS[label]
                 for days in days_asked:
                     ways = {"alone": TemperatureMapper()}
                     ways |= by_kind[member.bridge.kind].ways(name, start, days)
                     ways |= {"prior": prior.mapper(covariates=known_of(member.bridge, covariates.loc[list(known)]))}
-                    found = judge(member, name, start, days, ways) + [row | {"days": days} for row in year]
+                    found = evaluate(member, name, start, days, ways) + [row | {"days": days} for row in year]
                     about = {
                         "start": label,
                         "kind": member.bridge.kind,
@@ -386,14 +386,14 @@ def main():
     parser.add_argument("--newcomers", type=int, default=15, help="bridges with laws of their own")
     parser.add_argument("--days", type=int, nargs="+", default=DAYS)
     parser.add_argument("--starts", nargs="+", choices=list(STARTS), default=list(STARTS))
-    parser.add_argument("--worlds", nargs="+", choices=["frequencies", "chains"], default=["frequencies", "chains"])
+    parser.add_argument("--members", nargs="+", choices=["frequencies", "chains"], default=["frequencies", "chains"])
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--quick", action="store_true", help="15 bridges, 60 days from winter, no fleet of atypical")
     options = parser.parse_args()
     if options.quick:
         options.bridges, options.groups, options.newcomers = 15, 3, 3
         options.days, options.starts = (60,), ["winter"]
-    warnings.simplefilter("ignore")  # few days and unseen weather are what this is about
+    warnings.simplefilter("ignore")  # few days, and extrapolation from them, are what this is about
     missed = []
     for seed in options.seeds:
         fleet = make_fleet(options.bridges, random_state=seed)
@@ -402,10 +402,10 @@ def main():
         strangers = type(strangers)(
             [type(b)(f"atypical {n}", b.kind, b.seed, b.atypical_law) for n, b in strangers.items()]
         )
-        for name in options.worlds:
-            world = {"frequencies": Frequencies, "chains": Chain}[name]
+        for name in options.members:
+            member_of = {"frequencies": Frequencies, "chains": Chain}[name]
             label = f"{name}, seed {seed}"
-            rows, seconds, prior = campaign_rows(world, fleet, options.groups, options.days, options.starts)
+            rows, seconds, prior = campaign_rows(member_of, fleet, options.groups, options.days, options.starts)
             shown(f"{label}: mean error, % ({len(fleet)} bridges, {options.groups} groups)", table(rows))
             shown(f"{label}: median error, %", table(rows, how="median"))
             shown(f"{label}: what the fleet costs (negative: gives)", losses(rows))
@@ -416,7 +416,7 @@ def main():
             print(prior.summary())
             print(f"a prior of {len(fleet) - len(fleet) // options.groups} bridges: {seconds / options.groups:.1f} s")
             missed += misses_of(label, rows)
-            rows, *_ = campaign_rows(world, fleet, 1, options.days, options.starts, strangers)
+            rows, *_ = campaign_rows(member_of, fleet, 1, options.days, options.starts, strangers)
             shown(f"{label}: new bridges with thermal laws of their own, mean error, %", table(rows))
             shown(f"{label}: what the fleet costs them", losses(rows))
             shown(f"{label}: the same by law", table(rows, by=("atypical_law", "days")))
@@ -424,7 +424,7 @@ def main():
             if options.quick:
                 continue
             groups = min(options.groups, 5)
-            rows, _, prior = campaign_rows(world, lawless, groups, options.days, options.starts)
+            rows, _, prior = campaign_rows(member_of, lawless, groups, options.days, options.starts)
             shown(f"{label}: a fleet of bridges with thermal laws of their own, mean error, %", table(rows))
             print(prior.summary(), flush=True)
             missed += losses_of(f"{label}, fleet of atypical", rows)

@@ -100,7 +100,7 @@ def main():
     if not (folder / "tower" / "tower.csv").is_file() or not (folder / "z24" / "z24_monitoring.csv").is_file():
         sys.exit(f"no tower/tower.csv or z24/z24_monitoring.csv in {folder}: pass the folder, or set SKTHERMO_DATA")
     n_bridges = 9 if options.quick else options.bridges
-    warnings.simplefilter("ignore")  # few days and unseen weather are what this is about
+    warnings.simplefilter("ignore")  # few days, and extrapolation from them, are what this is about
     real = {"tower": pair(*tower(folder)), "Z24": pair(*z24(folder)), "KW51 (synthetic)": pair(*kw51(folder))}
     for name, (X, F) in real.items():
         print(f"{name}: {len(X)} records of {F.shape[1]} modes, {X.min().item():.1f} to {X.max().item():.1f} C")

@@ -20,7 +20,7 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from explained_structures import STRUCTURES, World
+from explained_structures import STRUCTURES, Campaign
 
 from skthermo.studies import DamagePrior, identify_damage
 
@@ -32,26 +32,28 @@ LEVEL, TARGET = 0.05, (0.04, 0.07)
 ONE_CAUSE = DamagePrior(numbers=(0.5, 0.5))
 
 
-def healthy(world, memory):
+def healthy(campaign, memory):
     """The p value of each window."""
-    T, F = world.structure.records(365 * N_YEARS, {}, memory, 500_000 + world.seed)
+    T, F = campaign.structure.records(365 * N_YEARS, {}, memory, 500_000 + campaign.seed)
     for length in LENGTHS:
         starts = np.arange(0, len(T) - length + 1, length)
         for start in starts[:: max(len(starts) // MOST_WINDOWS, 1)]:
             rows = slice(start, start + length)
             found = identify_damage(
-                world.fem, T[rows], F[rows], [world.structure.groups[0]], prior=ONE_CAUSE, random_state=0
+                campaign.fem, T[rows], F[rows], [campaign.structure.groups[0]], prior=ONE_CAUSE, random_state=0
             )
             yield {"length": length, "p": found.p_value}
 
 
-def damaged(world, memory):
+def damaged(campaign, memory):
     """Whether damage is identified, and the p value of each window."""
-    groups = world.structure.groups
+    groups = campaign.structure.groups
     for number, severity in enumerate(SEVERITIES * 2):
-        group = groups[(world.seed + number) % len(groups)]
-        T, F = world.structure.records(DAMAGED_DAYS, {group: severity}, memory, 600_000 + 10 * world.seed + number)
-        found = identify_damage(world.fem, T, F, list(groups), random_state=0)
+        group = groups[(campaign.seed + number) % len(groups)]
+        T, F = campaign.structure.records(
+            DAMAGED_DAYS, {group: severity}, memory, 600_000 + 10 * campaign.seed + number
+        )
+        found = identify_damage(campaign.fem, T, F, list(groups), random_state=0)
         yield {"severity": severity, "identified": found.most_probable == (group,), "p": found.p_value}
 
 
@@ -80,10 +82,10 @@ def main():
     for name in options.structures:
         for memory in options.correlations:
             for seed in range(options.first, options.first + (4 if options.quick else options.seeds)):
-                world = World(STRUCTURES[name](), seed, memory=memory, is_plain=True, n_days=TRAINING_DAYS)
+                campaign = Campaign(STRUCTURES[name](), seed, memory=memory, is_plain=True, n_days=TRAINING_DAYS)
                 of_chain = {"structure": name, "correlation": memory, "seed": seed}
-                windows += [of_chain | one for one in healthy(world, memory)]
-                states += [] if options.healthy else [of_chain | one for one in damaged(world, memory)]
+                windows += [of_chain | one for one in healthy(campaign, memory)]
+                states += [] if options.healthy else [of_chain | one for one in damaged(campaign, memory)]
             done = pd.DataFrame(windows).query("structure == @name and correlation == @memory")
             print(shares(done, ["structure", "correlation", "length"]).round(1).to_string(), flush=True)
     windows = pd.DataFrame(windows)

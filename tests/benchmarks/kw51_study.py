@@ -40,7 +40,7 @@ LIMITS = {  # lowest and highest mean of the default recipe; false alarms of one
 }
 
 
-def judged(records, fitted, draws):
+def evaluated(records, fitted, draws):
     """The targets' figures of one campaign."""
     tables = [rates(*fitted.detection(seed=seed)) for seed in range(draws)]
     table = sum(tables) / draws
@@ -107,7 +107,7 @@ def main():
     for seed in range(options.first, options.first + options.seeds):
         records = Records.read(seed=seed)
         for name in options.recipes:
-            rows[name].append(judged(records, Fitted.by(records, RECIPES[name]), options.draws))
+            rows[name].append(evaluated(records, Fitted.by(records, RECIPES[name]), options.draws))
         healthy = make_kw51_campaign(retrofit=False, random_state=seed).frequencies
         gaps.append(with_gaps(records, healthy, options.share))
     for name, found in rows.items():

@@ -99,7 +99,7 @@ def case(places, random):
     return group, list(line[first : first + length]), random.uniform(*SEVERITIES)
 
 
-def judged(truth, fem, places, seed, n_cases):
+def evaluated(truth, fem, places, seed, n_cases):
     """One row a case."""
     random, rows = np.random.default_rng(seed), []
     for number in range(n_cases):
@@ -166,7 +166,7 @@ def main():
                     whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
                     healthy[which].append(whole.probability_of_damage)
                     places = {g: where for g, where in whole.places.items() if g not in whole.found.unobservable}
-                    found[which].append(judged(truth, fem, places, seed, options.cases))
+                    found[which].append(evaluated(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)
             if options.list:

@@ -96,7 +96,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--records", type=int, default=10_000)
     options = parser.parse_args()
-    warnings.simplefilter("ignore")  # on modes that frequency alone confuses
+    warnings.simplefilter("ignore")  # on modes that frequency alone does not distinguish
     records, true, reference = simulated_poles(options.records)
     for follow in (None, 200):
         start = time.perf_counter()

@@ -178,7 +178,7 @@ def after_intervention(detector, before, after, damaged, targets, days=DAYS):
 
 
 def printed(title, tables):
-    """Print means over seeds; number of days from which false alarms are at the promise."""
+    """Print means over seeds; number of days from which false alarms are at the target."""
     together = pd.concat(tables)
     mean = together.groupby("days").mean()
     spread = together.groupby("days")["false: prior"].agg(lambda values: values.quantile(0.9))

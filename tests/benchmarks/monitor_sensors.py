@@ -4,7 +4,7 @@
 
 A watch learns the baseline and sees the years after it, healthy and with injected faults: a thermometer that is dead,
 stuck, 3 degrees off or drifts by 1 degree a month, and two modes that are exchanged, in each column and at several
-dates. A fault is named rightly within a week if its column and kind are told by the end of its seventh day. A drift
+dates. A fault is named rightly within a week if its column and kind are reported by the end of its seventh day. A drift
 has to be named before it has come to 3 degrees, in 91 days; the day and its size then are printed, and in how many it
 is called a drift in the end, not an offset. Beside it stands the simple way: the mean departure of a week over three
 times the largest of the baseline. Then damage of 10 and 20 % in each group: what the watch takes for a fault. At last a
@@ -86,7 +86,7 @@ class Service:
             F[columns] = F[columns[::-1]].to_numpy()
         return T, F
 
-    def told(self, kind, columns, start):
+    def detection_time(self, kind, columns, start):
         """Days after which the fault was named, how many others were, and whether its kind was right in the end."""
         length = PATIENCE if kind == "drift" else 7
         T, F = self.with_fault(kind, columns, start, length)
@@ -106,7 +106,7 @@ class Service:
         return first, wrong, kind in named
 
 
-def simply_told(service, sensors, columns, start, kind):
+def time_by_weekly_mean(service, sensors, columns, start, kind):
     """Days after which the mean departure of a week names a thermometer; None if it does not within a week."""
     T = service.with_fault(kind, columns, start, 7)[0]
     before = service.T.loc[: T.index[0]].iloc[:-1]
@@ -123,7 +123,7 @@ def evaluate(service, starts, counts):
     T, F = service.T, service.F
     false = len(service.healthy.loc[service.healthy["kind"] != "dead"])
     print(f"{service.name}: {len(T.columns)} thermometers, {len(F.columns)} modes, {service.years:.1f} healthy years")
-    print(f"  falsely told: {dict(service.healthy['kind'].value_counts())}")
+    print(f"  falsely reported: {dict(service.healthy['kind'].value_counts())}")
     sensors = SensorRegression.of(service.baseline[0]) if len(T.columns) > 1 else None
     for kind in KINDS:
         if kind == "swapped":
@@ -131,13 +131,15 @@ def evaluate(service, starts, counts):
             cases = [list(order[place : place + 2]) for place in range(len(order) - 1)]
         else:
             cases = [[name] for name in T.columns]
-        found = [(service.told(kind, columns, start), columns, start) for columns in cases for start in starts]
+        found = [
+            (service.detection_time(kind, columns, start), columns, start) for columns in cases for start in starts
+        ]
         counts.setdefault((service.name, kind), []).extend(days for (days, *_), *_ in found)
         counts.setdefault((service.name, "wrong"), []).extend(wrong for (_, wrong, _), *_ in found)
         if kind == "drift":
             counts.setdefault((service.name, "called"), []).extend(right for (days, _, right), *_ in found if days)
         if kind in ("offset", "drift") and sensors is not None:
-            simple = [simply_told(service, sensors, columns, start, kind) for _, columns, start in found]
+            simple = [time_by_weekly_mean(service, sensors, columns, start, kind) for _, columns, start in found]
             counts.setdefault((service.name, f"{kind}, simply"), []).extend(simple)
     counts.setdefault((service.name, "false"), []).append((false, service.years))
     if sensors is not None:
@@ -196,12 +198,12 @@ def references(seeds):
         service = Service("reference", T, campaign.frequencies, 365 * 4, reference=["station"])
         false += len(service.healthy)
         for start in (50, 250, 450):
-            found = service.told("drift", ["T"], start)
+            found = service.detection_time("drift", ["T"], start)
             days.append(np.nan if found[0] is None else found[0])
             wrong, called = wrong + found[1], [*called, found[2]]
     share = np.mean(~np.isnan(days))
     print(f"one thermometer beside a weather station, {seeds} seeds of 2 years, truss, 4 a day")
-    print(f"  falsely told: {false} in {2 * seeds} years, target 0: {'MISSED' if false else 'met'}")
+    print(f"  falsely reported: {false} in {2 * seeds} years, target 0: {'MISSED' if false else 'met'}")
     verdict = f"target {NAMED:.0%}: {'met' if share >= NAMED else 'MISSED'}"
     print(f"  drifts of 1 degree a month: {share:.0%} of {len(days)} in {PATIENCE} days, {verdict}")
     print(f"  {np.nanmedian(days):.0f} days in the middle, {np.mean(called):.0%} called drift in the end")
@@ -217,7 +219,7 @@ def z24(folder):
 
 
 def taken_for_faults(seeds):
-    """Faults told because of damage of 10 and 20 % in each group, truss and KW51."""
+    """Faults reported because of damage of 10 and 20 % in each group, truss and KW51."""
     cases = {}
     for seed in range(seeds):
         for severity in (0.1, 0.2):
@@ -293,11 +295,11 @@ def print_naming(counts):
             if kind == "false" and years > 2:
                 missed += number / years > FALSE_A_YEAR
                 verdict = f", target {FALSE_A_YEAR:g}: {'met' if number / years <= FALSE_A_YEAR else 'MISSED'}"
-            print(f"{name:20} {kind:16} {number:.0f} tellings in {years:.1f} years{verdict}")
+            print(f"{name:20} {kind:16} {number:.0f} reports in {years:.1f} years{verdict}")
         elif kind == "wrong":
-            print(f"{name:20} other columns told with the fault: {np.sum(values):.0f} in {len(values)} injections")
+            print(f"{name:20} other columns reported with the fault: {np.sum(values):.0f} in {len(values)} injections")
         elif kind == "called":
-            print(f"{name:20} drifts called drifts in the end: {np.mean(values or [0]):.0%} of {len(values)} told")
+            print(f"{name:20} drifts called drifts in the end: {np.mean(values or [0]):.0%} of {len(values)} reported")
         else:
             days = np.array([np.nan if value is None else value for value in values])
             share = np.mean(~np.isnan(days))

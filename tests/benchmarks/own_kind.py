@@ -1,10 +1,10 @@
-"""Records that a chain simulates, judged by compensators of the chain's own kind and of others.
+"""Records that a chain simulates, evaluated by compensators of the chain's own kind and of others.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/own_kind.py
     OMP_NUM_THREADS=1 SKTHERMO_DATA=path/to/data python tests/benchmarks/own_kind.py --bridges Z24
 
 Chains whose temperature mapper is piecewise-linear, boosted trees or a network simulate the healthy and the damaged
-structure, and detectors judge: residuals of regressors of the same three kinds, of the chains themselves, and raw
+structure. Detectors evaluate residuals of regressors of the same three kinds, of the chains themselves, and raw
 frequencies. Beside them stand the same alarms on true records of the truss, or on those of Z24, with the chain
 of the baseline and assumed damage. The own kind's advantage is the change of its alarms in records of its own kind of
 chain, less that of other kinds of compensators there.
@@ -46,7 +46,7 @@ def kinds():
     return {name: TemperatureMapper(regressor, random_state=0) for name, regressor in regressors.items()}
 
 
-def judges(targets, chains, whiten, block=None):
+def detectors_of(targets, chains, whiten, block=None):
     """Detectors that learn the baseline, by name."""
     estimators = kinds() | {f"chain, {name}": chain for name, chain in chains.items()}
     raw = field_detectors(targets, block=block)
@@ -89,13 +89,13 @@ def z24_case(seed):
 
 
 def alarms(case, seed, n_repeats):
-    """Share of records in alarm, by judge, source and state."""
+    """Share of records in alarm, by detector, source and state."""
     chains, baseline, states, true = case(seed)
     on_truss = case is truss_case
     temperatures = list(next(iter(states.values()))[0])
     targets = [name for name in baseline if name not in temperatures]
     fitted = {name: chain.fit(baseline[temperatures], baseline[targets]) for name, chain in chains.items()}
-    detectors = judges(targets, chains, None if on_truss else "local", None if on_truss else "1D")
+    detectors = detectors_of(targets, chains, None if on_truss else "local", None if on_truss else "1D")
     for name, detector in detectors.items():
         detector.fit(baseline[targets] if name in RAW else baseline)
     rates = {}
@@ -109,12 +109,12 @@ def alarms(case, seed, n_repeats):
                     decisions = detector.predict(frame[targets] if name in RAW else frame)
                     rates.setdefault((name, source, state), []).append((decisions == -1).sum() / (decisions != 0).sum())
     return pd.Series({key: np.mean(found) for key, found in rates.items()}).rename_axis(
-        ["judge", "simulated by", "state"]
+        ["detector", "simulated by", "state"]
     )
 
 
 def by_measure(rates):
-    """False alarms, and the mean share of damaged records found, in percent: judges over sources."""
+    """False alarms, and the mean share of damaged records found, in percent: detectors over sources."""
     table = 100 * rates.unstack("state")
     found = table.drop(columns="healthy").mean(axis=1)
     return pd.concat({"false alarms": table["healthy"], "found": found}, axis=1).unstack("simulated by")

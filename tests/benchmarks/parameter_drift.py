@@ -5,7 +5,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py --quiet --ways tracked filtered --rates 0.01 0.04
 
 Groups take turns over the seeds. A chain learns from the first year; then all four years are followed. The simpler
-ways, and the filter of a monitor, which knows at each day only what came before and is judged after the first year:
+ways, and the filter of a monitor, which knows at each day only what came before and is evaluated after the first year:
 
 - filtered: `DriftFollower` without its delay, day by day; a drift is found where the end value of a group is beyond
   chance at 1 %.
@@ -16,7 +16,7 @@ ways, and the filter of a monitor, which knows at each day only what came before
   changes of all groups by least squares with the Jacobian; a drift is found where the trends of the modes together are
   beyond chance at 1 %.
 
-Printed are, in percent: drifts found; right groups named first, by themselves or in a set that cannot be told apart;
+Printed are, in percent: drifts found; right groups named first, by themselves or in a set that cannot be distinguished;
 end values within two standard errors, of the group that drifts and of all; end values whose error is below half a
 percent of the stiffness; days on which the band of 95 % holds the truth, over all groups; twice the standard error and
 the error of the end value of the group that drifts. With ``--quiet`` the drift begins after the first year (truss). The
@@ -115,7 +115,7 @@ def regression(fem, T, F):
     return *frames, found, {first}, both.index[0]
 
 
-def judged(rate, group, begin, result):
+def evaluated(rate, group, begin, result):
     """One run's figures."""
     estimates, errors, found, first, zero = result
     known = estimates.notna().all(axis=1) & errors.notna().all(axis=1)
@@ -155,7 +155,7 @@ def run(bridge, rate, seed, options):
     for name in options.ways:
         start = time.perf_counter()
         result = WAYS[name](fem, T, F)
-        figures = judged(rate, group, begin, result) | {"seconds": time.perf_counter() - start}
+        figures = evaluated(rate, group, begin, result) | {"seconds": time.perf_counter() - start}
         rows.append({"bridge": bridge.name, "rate, %": 100 * rate, "way": name, "group": group, "seed": seed} | figures)
     return rows
 
@@ -209,8 +209,8 @@ def main():
     print(f"\n{options.seeds} seeds, noise correlated by {options.correlation}{model}; in percent\n")
     print(means.round(2).to_string())
     missed = [] if options.quiet else list(misses(table))
-    judges = "tracked" in options.ways and not options.quiet
-    reached = "all targets reached" if judges else "no targets"
+    has_targets = "tracked" in options.ways and not options.quiet
+    reached = "all targets reached" if has_targets else "no targets"
     print("\n" + ("\n".join(f"missed: {line}" for line in missed) or reached))
     sys.exit(1 if missed else 0)
 

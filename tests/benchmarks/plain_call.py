@@ -329,7 +329,7 @@ def processor_limit(seconds):
         signal.setitimer(signal.ITIMER_PROF, 0)
 
 
-def judged(case, names, minutes):
+def evaluated(case, names, minutes):
     """Rows of errors by variant and state, over what all of them predict; NaN where one was stopped."""
     found, seconds = {}, {}
     for name in names:
@@ -404,7 +404,7 @@ def compare(options):
             print(f"{structure} is left out: SKTHERMO_DATA is not set\n")
             continue
         found = [
-            row for case in STRUCTURES[structure](options) for row in judged(case, options.variants, options.minutes)
+            row for case in STRUCTURES[structure](options) for row in evaluated(case, options.variants, options.minutes)
         ]
         for table, part in pd.DataFrame(found).groupby("table", sort=False):
             n_cases, share = part["case"].nunique(), 100 * part["predicted"].mean()
@@ -447,7 +447,7 @@ def compare_raw(options):
         cleaned = HampelFilter(targets=list(raw)).fit_transform(T.join(raw))[list(raw)]
         for records, F in {"without outliers": sound, "raw": raw, "cleaned": cleaned}.items():
             one = replace(case, F=F, computed={})
-            rows += [row | {"records": records} for row in judged(one, options.variants, options.minutes)]
+            rows += [row | {"records": records} for row in evaluated(one, options.variants, options.minutes)]
     frame = pd.DataFrame(rows)
     index = ["table", "variant", "state"]
     table = frame.pivot_table(index=index, columns="records", values="error", sort=False)

@@ -24,14 +24,14 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
 
-import z24_bench_recipes as bench
 import z24_damage_recipes as damage
+import z24_detector_recipes as comparison
 import z24_recipes as z24
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 EXPECTED_WARNINGS = (
     r"\d+ of \d+ rows have temperatures far outside",
-    "groups that these modes cannot tell apart",
+    "groups that these modes cannot distinguish",
     r"\d+ of 130 records could not be compared",
     "damage of these groups alone does not explain the shifts",
     r"\d+ of \d+ rows cannot be predicted and are NaN",
@@ -71,9 +71,11 @@ def targets_of_identification(bridge):
     """The damage that explains the shifts, and the rates that it lets one expect."""
     fem, found = damage.identify(bridge)
     unexplained = 100 * (found.shifts["measured"] - found.shifts["explained"])
-    some = {name: one for name, one in bench.detectors().items() if not name.startswith(("chain", "boosted"))}
-    table = bench.side_by_side(bench.bench(bridge, fem, found.scenario(bench.DAMAGED), some, n_repeats=40))
-    agreement = bench.agreement(table)
+    some = {name: one for name, one in comparison.detectors().items() if not name.startswith(("chain", "boosted"))}
+    table = comparison.side_by_side(
+        comparison.compare(bridge, fem, found.scenario(comparison.DAMAGED), some, n_repeats=40)
+    )
+    agreement = comparison.agreement(table)
     yield "unexplained shift, %, largest", unexplained.abs().max(), "< 1"
     yield "probability that the soil is damaged, %", 100 * found.table.loc["soil", "probability"], ">= 80"
     for state, correlation, inside in (("damage found", 0.95, 0.8), ("false alarms", 0.9, 0.7)):

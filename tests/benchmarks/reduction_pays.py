@@ -67,17 +67,17 @@ def main():
             full = seconds(lambda model=model, rows=theta[:n_full]: linearise(model, rows))[0] / n_full
             basis, reduced = seconds(lambda model=model: model.reduced(BOUNDS, random_state=0))
             fast = seconds(lambda reduced=reduced, theta=theta: linearise(reduced, theta))[0] / len(theta)
-            told = []
+            lines = []
             for n_rows in ROWS:
                 n_solves = SAMPLES + SOLVES_PER_ROW * n_rows
                 ways = {False: n_solves * full, True: basis + n_solves * fast}
                 choice = model.reduction_pays(n_solves)
                 ratio = ways[choice] / min(ways.values())
                 worst = max(worst, ratio)
-                told.append(f"{'reduced' if choice else 'full'} {ways[choice]:.3g} s (x {ratio:.2f})")
+                lines.append(f"{'reduced' if choice else 'full'} {ways[choice]:.3g} s (x {ratio:.2f})")
             print(
                 f"{kind} {model.n_dof:5d} dof, {n_parameters:2d} parameters: {1e3 * full:.3g} and {1e3 * fast:.3g} ms, "
-                f"{basis:.2f} s, {reduced.basis_size_} vectors: {', '.join(told)}",
+                f"{basis:.2f} s, {reduced.basis_size_} vectors: {', '.join(lines)}",
                 flush=True,
             )
     print(f"at {ROWS} rows; worst: {worst:.2f} times the better of the two")

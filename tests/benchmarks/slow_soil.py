@@ -1,6 +1,6 @@
 """A girder bridge whose soil follows the weather slowly, for benchmarks and tests; its truth is known.
 
-A concrete girder of four spans stands on soil springs below its piers. Soil temperature follows the air with a time
+A concrete girder of four spans rests on soil springs below its piers. Soil temperature follows the air with a time
 constant of 40 days, and soil stiffness follows soil temperature. Only the air and the steel of the railing are
 measured.
 """

@@ -136,7 +136,7 @@ def detector(name, columns):
     return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=columns), MahalanobisDetector())
 
 
-def promised(fem, T, F, real, models, options):
+def predicted(fem, T, F, real, models, options):
     """A study, and its bands by kind: (detector, state) -> (lowest, highest)."""
     scenarios = [Scenario("healthy"), *(Scenario(name, damage) for name, damage in real.states.items())]
     study = DetectabilityStudy(
@@ -145,7 +145,7 @@ def promised(fem, T, F, real, models, options):
         scenarios,
         uncertainty=PARTS if models else PARTS[:-1],
         models=models,
-        n_replicates=options.worlds,
+        n_replicates=options.replicates,
         random_state=real.seed,
     )
     study.run(T, T.join(F), confidence=CONFIDENCE)
@@ -160,8 +160,8 @@ def promised(fem, T, F, real, models, options):
     for key in keys:
         rates = np.nanmean(study.decisions_[*key, "simulated"] < 0, axis=1)
         bands["noise"][key] = np.quantile(rates, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-        bands["weather"][key] = of_first(options.worlds, 1).band(key, CONFIDENCE)
-        bands["weather, baseline"][key] = of_first(options.worlds, 2).band(key, CONFIDENCE)
+        bands["weather"][key] = of_first(options.replicates, 1).band(key, CONFIDENCE)
+        bands["weather, baseline"][key] = of_first(options.replicates, 2).band(key, CONFIDENCE)
         bands["default"][key] = of_first(DEFAULT_REPLICATES, 2).band(key, CONFIDENCE)
     if models:
         bands["all"] = {key: found.band(key, CONFIDENCE) for key in keys}
@@ -181,11 +181,11 @@ def realisation(kind, seed, options):
         own_models = [(False, model, None)]
         if not options.aligned:
             updater = ModelUpdater(model, bounds=0.6, prior=0.15).fit(F, frequency_std=DEVIATION * F.mean())
-            own_models.append((True, updater.model_, updater.sample_models(options.worlds, random_state=seed)))
+            own_models.append((True, updater.model_, updater.sample_models(options.replicates, random_state=seed)))
         for calibrated, own, models in own_models:
             if name == "right" and not (calibrated or options.aligned):
                 continue
-            study, kinds = promised(chain(own, real.noise, T, F), T, F, real, models, options)
+            study, kinds = predicted(chain(own, real.noise, T, F), T, F, real, models, options)
             if not truth:  # the detectors learn the same records whatever the model
                 for number, (state, damage) in enumerate({"healthy": {}, **real.states}.items()):
                     new_T, new_F = real.later(number, damage)
@@ -232,7 +232,7 @@ def main():
     parser.add_argument("--structures", nargs="*", default=["truss", "footbridge"], choices=["truss", "footbridge"])
     parser.add_argument("--realisations", type=int, default=20, help="of each structure (default 20)")
     parser.add_argument(
-        "--worlds", type=int, default=20, help="of each study, and models of each ensemble (default 20)"
+        "--replicates", type=int, default=20, help="of each study, and models of each ensemble (default 20)"
     )
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)

@@ -70,7 +70,7 @@ class SingleRecords:
         self.regression = TemperatureMapper().fit(self.baseline.temperatures, self.baseline.frequencies)
         self.detector = MahalanobisDetector(contamination=0.02, threshold="quantile").fit(self.baseline.frequencies)
         self.verification = self.campaign(n_years=len(HALVED))
-        self.unseen = self.campaign(n_years=1)
+        self.later = self.campaign(n_years=1)
 
     def campaign(self, n_years):
         """Measured modes of some years."""
@@ -116,10 +116,10 @@ class SingleRecords:
 
     def rates(self):
         """Share of records in alarm by scenario and source (Table 3), in percent."""
-        sources = self.sources(self.unseen)
+        sources = self.sources(self.later)
         found = {}
         for scenario in SCENARIOS:
-            records = self.records(sources, scenario.damage) | {"ratio": self.ratio(self.unseen, scenario.damage)}
+            records = self.records(sources, scenario.damage) | {"ratio": self.ratio(self.later, scenario.damage)}
             found[scenario.name] = {name: self.rate(values) for name, values in records.items()}
         return pd.DataFrame(found).T
 
@@ -128,8 +128,8 @@ class SingleRecords:
         return 100 * probability_of_detection(self.detector.damage_index(frame), self.detector.threshold_)
 
     def false_alarms(self, n_draws):
-        """PFA of the unseen healthy year in percent, mean of some draws: true, simulated in two ways, oracle."""
-        T, clean = self.unseen.temperatures, self.unseen.clean_frequencies.to_numpy()
+        """PFA of the later healthy year in percent, mean of some draws: true, simulated in two ways, oracle."""
+        T, clean = self.later.temperatures, self.later.clean_frequencies.to_numpy()
         fitted = self.model.frequencies(best_theta(self.model, clean))
         sources = {
             "true": lambda: self.noisy(clean),

@@ -258,8 +258,8 @@ def local_whitening(clock, quick):
     compensator = TemperatureCompensator(LinearRegression(), targets=[f"f{mode}" for mode in range(6)], whiten="local")
     with clock.work():
         learned = compensator.fit_transform(records)
-        judged = compensator.transform(records)
-    clock.keep(1e-7, learned=1 + np.abs(learned), judged=1 + np.abs(judged))
+        transformed = compensator.transform(records)
+    clock.keep(1e-7, learned=1 + np.abs(learned), transformed=1 + np.abs(transformed))
 
 
 def lags_of(clock, n_sensors, n_rows=8760):

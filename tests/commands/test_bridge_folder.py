@@ -12,7 +12,7 @@ import pytest
 import skthermo.reporting
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, made_bridge, run, write_day, write_pair
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, truss_records
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 SCHEMA = json.loads((files("skthermo.commands") / "output.schema.json").read_text(encoding="utf-8"))
@@ -67,7 +67,7 @@ def test_records_of_a_folder_are_taken_in_night_by_night_as_in_one_pass(bridge, 
         assert (bridge / "status.html").read_text() == load_monitor(bridge / "monitor.joblib").summary()
         transitions += one["transitions"]
     assert done.code == ALARM
-    assert_same_course(load_monitor(bridge / "monitor.joblib"), whole)
+    assert_same_history(load_monitor(bridge / "monitor.joblib"), whole)
     lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
     assert lines == transitions
     assert [one["id"] for one in lines] == list(range(1, len(lines) + 1))
@@ -163,7 +163,7 @@ def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, rec
     (kept,) = bridge.glob("monitor.replaced-*.joblib")
     assert kept.read_bytes() == before
     assert run("update", settings(bridge), "--now", now).code == ALARM  # of all records that the folder keeps
-    assert_same_course(load_monitor(bridge / "monitor.joblib"), seen)
+    assert_same_history(load_monitor(bridge / "monitor.joblib"), seen)
     lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
     assert len({one["fitted"] for one in lines}) in (1, 2)  # the second fit may be of the same second
 
@@ -179,7 +179,7 @@ def test_a_monitor_of_another_version_is_refused_by_name_and_fitted_anew(bridge,
     assert (refused.code, "0.0.1" in refused.err, "--replace" in refused.err) == (FAILED, True, True)
     assert run("fit", settings(bridge), "--replace").code == 0
     assert run("update", settings(bridge), "--now", now).code == HEALTHY
-    assert_same_course(load_monitor(bridge / "monitor.joblib"), expected)
+    assert_same_history(load_monitor(bridge / "monitor.joblib"), expected)
 
 
 def test_commands_that_an_engineer_uses(bridge, records):

@@ -18,7 +18,7 @@ from skthermo._io import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, made_bridge, run, write_day
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, truss_records
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 LAST = DAMAGED + 4  # the night in which an event opens
@@ -67,10 +67,10 @@ def assert_is_before_or_after(bridge, before, after):
     """The monitor is one of the two, and the transitions are no more than what it has saved."""
     monitor = load_monitor(bridge / "monitor.joblib")
     states = {load_monitor(one / "monitor.joblib").last_: one for one in (before, after)}
-    assert_same_course(monitor, load_monitor(states[monitor.last_] / "monitor.joblib"))
+    assert_same_history(monitor, load_monitor(states[monitor.last_] / "monitor.joblib"))
     saved = [one["id"] for one in monitor.transitions()]
-    told = (bridge / "transitions.jsonl").read_bytes() if (bridge / "transitions.jsonl").exists() else b""
-    whole = [json.loads(line)["id"] for line in told[: told.rfind(b"\n") + 1].splitlines()]
+    log = (bridge / "transitions.jsonl").read_bytes() if (bridge / "transitions.jsonl").exists() else b""
+    whole = [json.loads(line)["id"] for line in log[: log.rfind(b"\n") + 1].splitlines()]
     assert whole == saved[: len(whole)]
     return states[monitor.last_] == after
 

@@ -22,7 +22,7 @@ import skthermo.reporting
 from skthermo._io import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 
@@ -86,7 +86,7 @@ def test_records_are_read_to_the_last_bit(bridge, records):
     whole.update(records[FIRST + 10 : DAMAGED + 10])
     for start, stop in pairwise((FIRST + 10, FIRST + 11, DAMAGED + 3, DAMAGED + 10)):
         done = bridge("update", new=records[start:stop])
-    assert_same_course(load_monitor(done.file), whole)
+    assert_same_history(load_monitor(done.file), whole)
 
 
 def test_an_alarm(bridge, records):
@@ -136,9 +136,9 @@ def test_without_a_new_evaluation_nothing_is_healthy(bridge, records, new):
 
 def test_status_and_acknowledge(bridge):
     assert bridge("status").code == HEALTHY
-    told = bridge("status", state="alarm")
-    assert told.code == ALARM
-    assert "damage from" in told.out
+    status = bridge("status", state="alarm")
+    assert status.code == ALARM
+    assert "damage from" in status.out
     done = bridge("acknowledge", 1, "--harmless", "--note", "a heavy transport", state="alarm")
     assert (done.code, done.out.splitlines()[0]) == (0, "event 1 is acknowledged as harmless")
     event = load_monitor(done.file).events_.loc[1]
@@ -172,7 +172,7 @@ def test_what_is_no_record_is_named_with_its_line(bridge, text, message):
     done = bridge("update", new=text)
     assert done.code == FAILED
     assert message in done.err
-    assert_same_course(load_monitor(done.file), load_monitor(bridge("status").file))
+    assert_same_history(load_monitor(done.file), load_monitor(bridge("status").file))
 
 
 def test_other_columns_and_values_are_refused_and_nothing_is_changed(bridge, records):
@@ -199,7 +199,7 @@ def test_other_forms_of_files(bridge, records, tmp_path):
     assert (point.code, "with the decimal sign ','" in point.err) == (FAILED, True)
 
 
-def test_a_file_that_may_be_cut_off_is_told(bridge, records, tmp_path):
+def test_a_file_that_may_be_cut_off_is_reported(bridge, records, tmp_path):
     text = records[FIRST + 10 : FIRST + 12].to_csv(index_label="time").rstrip()
     done = bridge("update", "--now", records.index[FIRST + 11], new=text)
     assert done.code == HEALTHY
@@ -219,7 +219,7 @@ def test_stamps_with_offsets_come_in_the_time_zone_of_the_baseline(records, tmp_
     assert len({line[:25][-6:] for line in (tmp_path / "new.csv").read_text().splitlines()[1:]}) == 2  # offsets
     with contextlib.redirect_stdout(io.StringIO()):
         main(["update", str(file), str(tmp_path / "new.csv")])
-    assert_same_course(load_monitor(file), monitor)
+    assert_same_history(load_monitor(file), monitor)
     new.tz_localize(None).to_csv(tmp_path / "new.csv")
     with contextlib.redirect_stderr(io.StringIO()) as errors:
         assert main(["update", str(file), str(tmp_path / "new.csv")]) == ALARM  # which an error does not hide
@@ -269,7 +269,7 @@ def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeyp
     ((monitor, file), named), *others = shown
     assert (done.code, file, others) == (HEALTHY, tmp_path / "a.html", [])
     assert named == {"title": "Truss", "now": str(records.index[FIRST + 11])}
-    assert_same_course(monitor, load_monitor(done.file))
+    assert_same_history(monitor, load_monitor(done.file))
 
 
 def test_an_error_of_any_kind_has_its_own_exit_code(bridge, records, monkeypatch):
@@ -340,5 +340,5 @@ def test_a_kill_leaves_a_whole_state_that_goes_on_to_the_same_decisions(saved, r
     assert kills >= 3
     left = load_monitor(file)
     left.status_ = replace(left.status_, n_repeated=0)  # where the kill came after the state was saved
-    assert_same_course(left, undisturbed)
+    assert_same_history(left, undisturbed)
     assert not list(tmp_path.glob(".*.unfinished"))

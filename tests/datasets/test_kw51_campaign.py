@@ -80,7 +80,7 @@ def test_longer_weather_begins_as_a_shorter_one():
 
 @pytest.mark.nightly
 def test_truth_model_reproduces_the_clean_frequencies(campaign):
-    """Before, after and in the course of the retrofit, by the full model."""
+    """Before, after and during the retrofit, by the full model."""
     model, rows = campaign.model, np.random.RandomState(0).choice(5424, 20)
     clean, theta = campaign.clean_frequencies, campaign.theta
     assert_allclose(model.frequencies(theta.iloc[rows]), clean.iloc[rows], rtol=1e-5)

@@ -104,7 +104,7 @@ def test_all_stiffness_is_in_the_four_parameters():
     np.testing.assert_allclose(sensitivity(MODEL).sum(axis=1), 0.5, rtol=1e-6)
 
 
-def test_parameters_can_be_told_apart():
+def test_parameters_can_be_distinguished():
     slopes = sensitivity(MODEL).to_numpy()
     assert np.linalg.cond(slopes) < 15
     f1_against_f3 = dict(zip(MODEL.parameter_names, slopes[0] - slopes[2], strict=True))

@@ -115,17 +115,17 @@ def test_one_target_is_a_vector_for_estimators_that_want_one():
 
 
 @pytest.mark.filterwarnings("ignore:the 730 baseline records depend on each other")  # raw frequencies follow the season
-def test_out_of_fold_thresholds_keep_their_promise_and_in_sample_ones_do_not():
+def test_out_of_fold_thresholds_keep_the_false_alarm_rate_and_in_sample_ones_do_not():
     healthy, later, damaged = (
         make_truss_campaign(2, random_state=seed, damage=damage)
         for seed, damage in ((0, None), (1, None), (2, {"bottom": 0.2}))
     )
-    baseline, unseen, damaged = (c.temperatures.join(c.frequencies) for c in (healthy, later, damaged))
+    baseline, second_year, damaged = (c.temperatures.join(c.frequencies) for c in (healthy, later, damaged))
     detector = make_pipeline(compensator(KNeighborsRegressor(2)), MahalanobisDetector(0.02)).fit(baseline)
     fitted = detector[0]
     in_sample = MahalanobisDetector(0.02).fit(fitted.transform(baseline))
-    assert alarm_rate(detector, unseen) == pytest.approx(0.02, abs=0.012)  # two standard errors of 730 records
-    assert alarm_rate(in_sample, fitted.transform(unseen)) > 0.3
+    assert alarm_rate(detector, second_year) == pytest.approx(0.02, abs=0.012)  # two standard errors of 730 records
+    assert alarm_rate(in_sample, fitted.transform(second_year)) > 0.3
     raw = MahalanobisDetector(0.02).fit(baseline[MODES])
     assert alarm_rate(detector, damaged) > alarm_rate(raw, damaged[MODES]) > 0.9
 

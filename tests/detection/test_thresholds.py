@@ -175,7 +175,7 @@ def test_false_alarms_are_as_asked_where_records_remember_those_before(case):
     assert np.mean(rates["quantile"]) > 0.09
 
 
-def test_few_independent_records_are_told_of_with_their_number():
+def test_few_independent_records_are_reported_with_their_number():
     with pytest.warns(UserWarning, match="the 365 baseline records depend on each other in time and count as [123]. "):
         detector = MahalanobisDetector().fit(autoregressive(365, 0.9))
     assert 10 <= detector.n_independent_ < 40
@@ -281,7 +281,7 @@ def test_the_factor_grows_with_dependence_and_vanishes_with_records(n_records):
 
 
 @REMEMBERED
-def test_a_threshold_far_above_the_indices_of_its_baseline_is_told_with_what_it_still_sees():
+def test_a_threshold_far_above_the_indices_of_its_baseline_is_reported_with_what_it_still_detects():
     rows = autoregressive(120, 0.97, 3)
     with pytest.warns(FewRecordsWarning, match="far above"):
         MahalanobisDetector().fit(rows)

@@ -123,7 +123,7 @@ def test_a_mode_without_a_value_is_refused(rule):
 
 
 @each_rule
-def test_implausible_records_of_the_baseline_are_told_of_once_by_name(rule):
+def test_implausible_records_of_the_baseline_are_reported_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
     with pytest.warns(match="are implausible") as record:

@@ -21,7 +21,7 @@ from skthermo.studies import detection_task
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 from tests.drop_ins.recipes import run_recipe
 
-pytestmark = pytest.mark.filterwarnings("default")  # what other packages warn of is not ours to judge
+pytestmark = pytest.mark.filterwarnings("default")  # warnings of other packages are not tested
 PAGE = "drop_ins.rst"
 
 

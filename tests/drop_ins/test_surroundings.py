@@ -8,7 +8,7 @@ from skthermo.fem import sample
 from skthermo.metrics import mape
 from tests.drop_ins.recipes import run_recipe
 
-pytestmark = pytest.mark.filterwarnings("default")  # what other packages warn of is not ours to judge
+pytestmark = pytest.mark.filterwarnings("default")  # warnings of other packages are not tested
 PAGE = "drop_ins.rst"
 
 

@@ -113,7 +113,7 @@ def test_a_factor_common_to_all_columns_counts_little():
     assert -specific.score_samples(rows).mean() == pytest.approx(length, rel=0.05)
 
 
-def test_columns_that_wander_together_are_judged_by_what_keeps_them_together():
+def test_columns_that_wander_together_are_evaluated_by_what_keeps_them_together():
     random = np.random.default_rng(0)
     walk = random.normal(size=600).cumsum()
     noise = random.normal(size=600)

@@ -74,7 +74,7 @@ def test_single_records_meet_the_targets_of_the_benchmark(tables):
 def test_oracle_bounds_what_is_learned(tables):
     """No parameters fit the truth better in each row; the discrepancy follows what no parameters can."""
     one = SingleRecords(0)
-    truth, *fitted = (frequencies({}) for frequencies in one.sources(one.unseen).values())
+    truth, *fitted = (frequencies({}) for frequencies in one.sources(one.later).values())
     informed, oracle = (np.sqrt(np.mean((frequencies / truth - 1) ** 2)) for frequencies in fitted)
     assert oracle > 0.003
     assert informed < oracle

@@ -10,11 +10,11 @@ from skthermo.studies import sweep
 from tests.examples.frozen_bridge import SEVERITY, frozen_bridge
 from tests.examples.pages import recipes, run
 
-Z24, DAMAGE, BENCH = recipes("z24"), recipes("z24_damage"), recipes("z24_bench")
+Z24, DAMAGE, COMPARISON = recipes("z24"), recipes("z24_damage"), recipes("z24_detector")
 
 pytestmark = [
     pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows have temperatures far outside"),
-    pytest.mark.filterwarnings("ignore:groups that these modes cannot tell apart"),
+    pytest.mark.filterwarnings("ignore:groups that these modes cannot distinguish"),
     pytest.mark.filterwarnings(r"ignore:the \d+ baseline records depend on each other"),  # 240 of them
     pytest.mark.filterwarnings(r"ignore:\d+ independent baseline records are too few"),  # of windows, in ten days
 ]
@@ -32,7 +32,7 @@ def small_model():
 def _models_made_once():
     with pytest.MonkeyPatch.context() as patch:
         once = functools.cache(Z24.bridge_model)
-        for module in (Z24, DAMAGE, BENCH):
+        for module in (Z24, DAMAGE, COMPARISON):
             patch.setattr(module, "bridge_model", once)
         yield
 
@@ -48,21 +48,21 @@ def frozen(tmp_path_factory):
 @pytest.fixture(scope="module")
 def few():
     """Some of the field's detectors, that learn fast."""
-    return {name: detector for name, detector in BENCH.detectors().items() if name in FEW}
+    return {name: detector for name, detector in COMPARISON.detectors().items() if name in FEW}
 
 
 @pytest.fixture(scope="module")
-def judged(frozen, few):
+def study_results(frozen, few):
     """The damage that is identified, and what detectors say of it, simulated and measured."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(DAMAGE, "bridge_model", small_model)
         fem, found = DAMAGE.identify(frozen)
-    return found, BENCH.bench(frozen, fem, found.scenario(BENCH.DAMAGED), few, n_repeats=4)
+    return found, COMPARISON.compare(frozen, fem, found.scenario(COMPARISON.DAMAGED), few, n_repeats=4)
 
 
 @pytest.mark.nightly
-def test_the_damage_is_identified(judged):
-    found, _ = judged
+def test_the_damage_is_identified(study_results):
+    found, _ = study_results
     assert found.p_value < 0.01
     for group in ("piers", "soil"):
         assert found.severities[group] == pytest.approx(SEVERITY, abs=2 * found.standard_errors[group])
@@ -72,22 +72,22 @@ def test_the_damage_is_identified(judged):
 
 
 @pytest.mark.nightly
-def test_its_alarms_are_foretold(judged):
-    table = BENCH.side_by_side(judged[1])
+def test_its_alarms_are_predicted(study_results):
+    table = COMPARISON.side_by_side(study_results[1])
     assert list(table.index) == list(FEW)
     rates = table["damage found"]
     assert (rates["measured"].between(rates["ci_low"] - 5, rates["ci_high"] + 5)).all()
-    assert BENCH.agreement(table).loc["damage found", "rank correlation"] > 0.7
+    assert COMPARISON.agreement(table).loc["damage found", "rank correlation"] > 0.7
 
 
 @pytest.mark.nightly
-def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, judged):
+def test_measured_rates_are_those_of_the_study_by_both_labels(frozen, few, study_results):
     records = Z24.Records.of(frozen)
-    table = BENCH.measured_table(records, few)
-    n, first = len(records.damaged), BENCH.FIRST
+    table = COMPARISON.measured_table(records, few)
+    n, first = len(records.damaged), COMPARISON.FIRST
     parts = table["alarms in the first 12"] * first + table["found of the other 118"] * (n - first)
     assert (parts / n).tolist() == pytest.approx(table["found of 130"].tolist())
-    rates = BENCH.side_by_side(judged[1])
+    rates = COMPARISON.side_by_side(study_results[1])
     for state, column in (("false alarms", "false alarms"), ("damage found", "found of 130")):
         assert rates[state, "measured"].tolist() == pytest.approx(table[column].tolist())
 
@@ -119,14 +119,14 @@ def test_the_parameter_that_was_damaged_falls(frozen):
 
 @pytest.mark.nightly
 def test_a_choice_sees_training_rows_only(frozen, few, monkeypatch):
-    monkeypatch.setattr(BENCH, "bridge_model", small_model)
-    monkeypatch.setattr(BENCH, "sweep", lambda fem: sweep(fem, (0.1, 0.3), groups=["piers", "soil"]))
+    monkeypatch.setattr(COMPARISON, "bridge_model", small_model)
+    monkeypatch.setattr(COMPARISON, "sweep", lambda fem: sweep(fem, (0.1, 0.3), groups=["piers", "soil"]))
     some = {name: few[name] for name in FEW[1:4]}
     spoilt = copy(frozen)
     spoilt.T_damaged = spoilt.F_damaged = None
     spoilt.T, spoilt.F = frozen.T.copy(), frozen.F.copy()
     spoilt.T[frozen.n_train :], spoilt.F[frozen.n_train :] = 1e3, 1e3
-    chosen, same = (BENCH.choose(one, some, n_repeats=2).ranking()["pod"] for one in (frozen, spoilt))
+    chosen, same = (COMPARISON.choose(one, some, n_repeats=2).ranking()["pod"] for one in (frozen, spoilt))
     assert chosen.equals(same)
     assert chosen.index[0].startswith("piecewise-linear")
 

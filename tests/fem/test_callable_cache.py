@@ -159,7 +159,7 @@ def fails_at_the_eighth(theta):
     return three_modes(theta) if theta.ndim == 1 else [three_modes(row) for row in theta]
 
 
-def test_a_failing_row_is_nan_and_told_and_what_was_solved_stays(file):
+def test_a_failing_row_is_nan_and_reported_and_what_was_solved_stays(file):
     model = CallableModel(fails_at_the_eighth, NAMES, 3, cache=file)
     with pytest.warns(UserWarning, match=f"1 of 20 .*{THETA[7, 0]}.*ArithmeticError"):
         frequencies = model.frequencies(THETA)

@@ -79,7 +79,7 @@ def test_a_total_that_rounding_has_touched_is_still_the_total(tmp_path):
 
 @pytest.mark.parametrize("form", WRITERS)
 @pytest.mark.parametrize("name", ["K_0", "Ktot"])
-def test_a_total_of_any_name_is_told_by_its_values(tmp_path, form, name):
+def test_a_total_of_any_name_is_recognised_by_its_values(tmp_path, form, name):
     file = WRITERS[form](tmp_path, {name: TOTAL} | TERMS | {"M": M})
     with pytest.warns(UserWarning, match=rf"'{name}' is the sum of \['E_2', .* taken as the total.*total='{name}'"):
         assert_same(load_affine(file, n_modes=4), EXPECTED)

@@ -1,4 +1,4 @@
-"""A mechanism is told from a fine mesh."""
+"""A mechanism is distinguished from a fine mesh."""
 
 import numpy as np
 import pytest

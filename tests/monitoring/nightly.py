@@ -23,7 +23,7 @@ def fitted_monitor(records, regressor=None, **parameters):
     return Monitor(make_pipeline(compensator, WindowedAlarm("5D")), **parameters).fit(records[:FIRST])
 
 
-def assert_same_course(one, other):
+def assert_same_history(one, other):
     """Two monitors have said the same, to the last bit."""
     for name in ("evaluations_", "events_", "days_", "faults_", "records_", "baseline_"):
         pd.testing.assert_frame_equal(getattr(one, name), getattr(other, name), check_exact=True, check_freq=False)

@@ -1,4 +1,4 @@
-"""Softening told from stiffening."""
+"""Softening distinguished from stiffening."""
 
 import numpy as np
 import pandas as pd
@@ -56,7 +56,7 @@ def test_detectors_that_are_fused_tell_it_too(baseline):
     assert direction.of_rows(records(0.15, 3)).mean() > 0.9
 
 
-def test_only_rows_that_are_asked_for_and_have_a_mode_are_told(baseline, windows):
+def test_only_rows_that_are_asked_for_and_have_a_mode_are_evaluated(baseline, windows):
     later = records(0.2, 4)
     later.iloc[:30, 3:] = np.nan
     later.loc[later.index[40:80], ["f1", "f5"]] = np.nan

@@ -168,7 +168,7 @@ def test_half_a_year_gives_no_estimate_for_the_other_half():
     index = pd.Series(chi(np.random.default_rng(5), 182), stamps(182))
     with pytest.warns(UserWarning, match=r"no record of 153 days of the year \(17 July to 16 December\)"):
         estimate = estimate_false_alarms(index, 2.0)
-    assert "17 July" in estimate.unseen
+    assert "17 July" in estimate.missing_season
     assert "no estimate for 153 days" in str(estimate)
 
 

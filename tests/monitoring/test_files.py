@@ -19,7 +19,7 @@ from sklearn.linear_model import LinearRegression
 from skthermo.datasets import make_truss
 from skthermo.monitoring import load_monitor
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_course, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
 
 ENDINGS = ("joblib", "skops")
 each_form = pytest.mark.parametrize("ending", ENDINGS)
@@ -59,13 +59,13 @@ def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
     assert (monitor.state() == "alarm") is (stop > DAMAGED)
     monitor.save(path)
     loaded = load_monitor(path)
-    assert_same_course(loaded, monitor)
+    assert_same_history(loaded, monitor)
     batches = [records[stop : stop + 4].drop(records.index[late], errors="ignore"), records.iloc[late]]
     for batch in [*batches, records[stop + 2 : stop + 12]]:
         pd.testing.assert_frame_equal(loaded.update(batch), monitor.update(batch), check_exact=True)
     for one in (monitor, loaded) if stop > DAMAGED else ():
         one.acknowledge(1, harmless=False)
-    assert_same_course(loaded, monitor)
+    assert_same_history(loaded, monitor)
 
 
 @pytest.mark.parametrize("ending", ["skops"])
@@ -83,7 +83,7 @@ def test_drift_and_faulty_sensors_go_on_where_they_stopped(records, path):
     for one in (monitor, loaded):
         one.update(records[15:])
     pd.testing.assert_frame_equal(loaded.drift_, monitor.drift_, check_exact=True)
-    assert_same_course(loaded, monitor)
+    assert_same_history(loaded, monitor)
 
 
 @pytest.mark.parametrize("ending", ["skops"])
@@ -94,7 +94,7 @@ def test_a_time_zone_comes_back(records, path):
     monitor.save(path)
     loaded = load_monitor(path)
     assert str(loaded.last_.tz) == "Europe/Brussels"
-    assert_same_course(loaded, monitor)
+    assert_same_history(loaded, monitor)
 
 
 @each_form
@@ -132,7 +132,7 @@ def test_something_else_is_no_monitor(path, ending):
 def test_joblib_itself_reads_and_writes_such_files(monitor, tmp_path):
     monitor.save(tmp_path / "saved.joblib")
     joblib.dump(monitor, tmp_path / "dumped.joblib")
-    assert_same_course(joblib.load(tmp_path / "saved.joblib"), load_monitor(tmp_path / "dumped.joblib"))
+    assert_same_history(joblib.load(tmp_path / "saved.joblib"), load_monitor(tmp_path / "dumped.joblib"))
 
 
 def test_skops_itself_reads_such_files(monitor, tmp_path):
@@ -140,7 +140,7 @@ def test_skops_itself_reads_such_files(monitor, tmp_path):
     monitor.save(tmp_path / "saved.skops")
     types = io.get_untrusted_types(file=tmp_path / "saved.skops")
     assert all(name.startswith(("skthermo.", "sklearn.")) for name in types)
-    assert_same_course(io.load(tmp_path / "saved.skops", trusted=types), monitor)
+    assert_same_history(io.load(tmp_path / "saved.skops", trusted=types), monitor)
 
 
 @pytest.mark.parametrize(
@@ -175,11 +175,11 @@ def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_
         monitor.save(tmp_path / "bridge.skops")
     assert not list(tmp_path.iterdir())
     monitor.save(tmp_path / "bridge.joblib")
-    assert_same_course(load_monitor(tmp_path / "bridge.joblib"), monitor)
+    assert_same_history(load_monitor(tmp_path / "bridge.joblib"), monitor)
 
 
 @pytest.mark.parametrize(("program", "ending"), [("skthermo", "joblib"), ("scikit-learn", "skops")])
-def test_other_versions_are_told_each_time(monitor, path, program):
+def test_other_versions_are_reported_each_time(monitor, path, program):
     fitted = dict(monitor.versions_)
     monitor.versions_ = fitted | {program: "0.0.1"}
     monitor.save(path)

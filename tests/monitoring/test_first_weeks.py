@@ -54,7 +54,7 @@ def test_any_batches_give_the_decisions_of_one_pass(whiten):
 def test_a_record_in_unknown_weather_is_healthy_only_if_a_large_fall_would_be_seen_there():
     records = served(1)
     monitor, other = (monitor_of().fit(records[:WEEKS]) for _ in range(2))
-    share = monitor.active_.most_unseen
+    share = monitor.active_.fall_to_detect
     assert share == max(3 * monitor.smallest_changes_.common, 0.05)
     answers = monitor.update(records[WEEKS:])
     fallen = records.copy()
@@ -68,7 +68,7 @@ def test_a_record_in_unknown_weather_is_healthy_only_if_a_large_fall_would_be_se
 
 
 @pytest.mark.nightly
-def test_winter_weeks_keep_the_promise_of_a_year_and_find_damage():
+def test_winter_weeks_keep_the_false_alarm_rate_of_a_year_and_find_damage():
     events, unaware, found = [], [], []
     for seed in range(6):
         records, damaged = served(seed), served(seed, damage=0.1)

@@ -125,7 +125,7 @@ def last_of_each(parts):
     return answers[~answers.index.duplicated(keep="last")].sort_index()
 
 
-def assert_same_course(monitor, answers, after, parts):
+def assert_same_history(monitor, answers, after, parts):
     pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
     for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
@@ -138,7 +138,7 @@ def assert_same_course(monitor, answers, after, parts):
 @pytest.mark.parametrize("name", DETECTORS)
 @settings(SETTINGS)
 @given(data=st.data())
-def test_any_division_into_batches_gives_the_course_of_one_pass(name, data):
+def test_any_division_into_batches_gives_the_history_of_one_pass(name, data):
     monitor, answers, after = fitted(name)
     n = len(SERVICE)
     delays = data.draw(st.lists(st.integers(0, 10), min_size=n, max_size=n), "records until each comes")
@@ -149,7 +149,7 @@ def test_any_division_into_batches_gives_the_course_of_one_pass(name, data):
         again = data.draw(st.lists(st.sampled_from(list(batch)), max_size=3), "rows that are sent twice")
         n_repeated += len(again)
         parts.append(monitor.update(SERVICE.iloc[[*batch, *again]]))
-    assert_same_course(monitor, answers, after, parts)
+    assert_same_history(monitor, answers, after, parts)
     assert monitor.counts_["n_repeated"] == n_repeated
     assert monitor.counts_["n_too_late"] == 0
 
@@ -264,7 +264,7 @@ def test_a_baseline_without_records_is_refused():
         Monitor(MahalanobisDetector(), targets=MODES).fit(BASELINE[:0])
 
 
-def test_too_late_records_are_told_and_not_evaluated():
+def test_too_late_records_are_reported_and_not_evaluated():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[50:80])
     before = monitor.evaluations_

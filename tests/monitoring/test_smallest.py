@@ -1,4 +1,4 @@
-"""What a threshold still sees, and that no record is healthy in which even a large change would go unseen."""
+"""Changes that a threshold still detects; no record is healthy in which even a large change would be missed."""
 
 import itertools
 import warnings

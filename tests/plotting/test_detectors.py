@@ -90,7 +90,7 @@ def test_groups_are_headings():
         DetectorsDisplay.from_predictions(BOTH, groups={"other": "raw"})
 
 
-def test_failures_and_records_that_are_not_evaluated_are_told():
+def test_failures_and_records_that_are_not_evaluated_are_reported():
     results = pd.concat([BOTH, FAILED], ignore_index=True)
     results.loc[(results["detector"] == "linear") & (results["source"] == "reference"), "n_not_evaluated"] = 50
     display = DetectorsDisplay.from_predictions(results)
@@ -214,7 +214,7 @@ def made_study():
     )
 
 
-def test_labelled_scores_are_of_judged_records_from_the_onset_on():
+def test_labelled_scores_are_of_evaluated_records_from_the_onset_on():
     given = made_study()
     study = DetectabilityStudy(None, None, [])
     study.findings_ = StudyFindings(

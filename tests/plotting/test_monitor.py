@@ -23,7 +23,7 @@ def drawn_rows(display):
     return sum(int(np.isfinite(line.get_ydata()).sum()) for line in display.points_)
 
 
-def test_days_without_a_judged_record_are_ticks_and_counted():
+def test_days_without_an_evaluated_record_are_ticks_and_counted():
     monitor = FakeMonitor(freq="12h", n_days=80, n_not_evaluated=6)
     monitor.days_ = monitor.days_.drop(monitor.days_.index[10:14])  # four days without any record
     display = MonitorDisplay.from_estimator(monitor)
@@ -91,7 +91,7 @@ def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis()
     last = display.event_spans_[2]
     assert last.get_x() + last.get_width() == display.ax_.get_xlim()[1]
     hatches = {span.get_hatch() for span in display.event_spans_}
-    assert len(hatches) == 3  # told apart without colour
+    assert len(hatches) == 3  # distinguished without colour
 
 
 def test_drift_in_percent_and_bars_of_failed_sensors():

@@ -85,9 +85,9 @@ def test_rows_without_stamps_count_rows():
 
 def test_records_after_an_outage_say_that_they_have_no_past():
     means = ExponentialMeans(["1D"]).fit(T[:100])
-    with pytest.warns(FewRecordsWarning, match="20 of 20") as told:
+    with pytest.warns(FewRecordsWarning, match="20 of 20") as given:
         means.transform(T[300:320])
-    assert told[0].message.kind == "no records for means"
+    assert given[0].message.kind == "no records for means"
     means.transform(T[100:120])
     means.transform(T[:30])  # begin as the records of fit do
 

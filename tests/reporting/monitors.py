@@ -75,7 +75,13 @@ class FakeMonitor:
         self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}
         rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
         self.false_alarm_estimate_ = SimpleNamespace(
-            rule=rule, expected=false_alarms_per_year, lowest=0, highest=3, n_years=2.0, method="by hand", unseen=""
+            rule=rule,
+            expected=false_alarms_per_year,
+            lowest=0,
+            highest=3,
+            n_years=2.0,
+            method="by hand",
+            missing_season="",
         )
         self.watch_per_year, self.watch_threshold_ = watch_per_year, None if watch_per_year is None else 2.5
         self.smallest_changes_ = SmallestChanges(0.01, {"f1": 0.02, "f2": 0.03}, True, pd.Timedelta("3D"))

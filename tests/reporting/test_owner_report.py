@@ -300,11 +300,11 @@ def test_what_does_not_fit_is_named(study, tmp_path, place, options, message):
 
 
 def test_it_leads_with_the_smallest_damage_and_how_soon_it_is_detected(study, page):
-    waits, told = study.time_to_detection(), study.time_to_detection(smallest=True)
+    waits, smallest = study.time_to_detection(), study.time_to_detection(smallest=True)
     order = ("The structure as it is now", "Smallest damage", "False alarms", "Time to detection", "Alarm within a day")
     places = [page.text.index(text) for text in order]
     assert places == sorted(places)
-    for text in told["text"]:
+    for text in smallest["text"]:
         assert text in page.text
     for _, row in waits.iterrows():
         assert f"{share_text(row['7D'])} ({bounds_text(row['7D ci_low'], row['7D ci_high'])})" in page.cells

@@ -86,7 +86,7 @@ def test_same_seed_same_bits(fem, task):
     assert (other.X[MODES][365:] != task.X[MODES][365:]).to_numpy().mean() > 0.95
 
 
-def test_splits_train_on_the_baseline_and_judge_all_scenarios_of_different_repeats(fem):
+def test_splits_train_on_the_baseline_and_evaluate_all_scenarios_of_different_repeats(fem):
     task = task_of(fem, n_repeats=5, n_splits=3)
     assert len(task.cv) == 3
     repeats = []
@@ -150,7 +150,7 @@ def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
             np.testing.assert_array_equal(found[start : start + 120], detector.decision_function(alone))
 
 
-def test_rows_are_judged_in_order_of_time(task):
+def test_rows_are_evaluated_in_order_of_time(task):
     detector = task.refit(with_memory("5D"))
     test = task.cv[0][1]
     shuffled = np.random.default_rng(0).permutation(test)
@@ -237,7 +237,7 @@ def test_a_search_finds_what_each_setting_scores(task):
         make_pipeline(StandardScaler(), IsolationForest(n_estimators=20, random_state=0)),
     ],
 )
-def test_other_detectors_are_judged_too(fem, detector):
+def test_other_detectors_are_evaluated_too(fem, detector):
     task = task_of(fem, columns=MODES)
     assert list(task.X) == MODES
     with warnings.catch_warnings():
@@ -273,7 +273,7 @@ def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     assert best[-1].threshold_ == expected[-1].threshold_ != search.best_estimator_[-1].threshold_
 
 
-def test_confirmation_judges_fresh_noise_and_weather(fem):
+def test_confirmation_evaluates_fresh_noise_and_weather(fem):
     task = task_of(fem, columns=MODES, n_repeats=3, n_splits=1)
     grid = {"window": [1, 7]}
     search = GridSearchCV(WindowedAlarm(1), grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
@@ -340,7 +340,7 @@ def test_what_is_wrong_is_said(fem, options, message):
         task_of(fem, **options)
 
 
-def test_a_scorer_refuses_other_rows_and_what_it_cannot_judge(fem, task):
+def test_a_scorer_refuses_other_rows_and_what_it_cannot_evaluate(fem, task):
     detector = task.refit(with_memory("5D"))
     with pytest.raises(ValueError, match="365 of 365 rows are no simulated records"):
         task.scoring(detector, SIDE_BY_SIDE, np.ones(365))

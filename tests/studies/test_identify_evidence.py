@@ -166,7 +166,7 @@ def test_probabilities_do_not_depend_on_order_or_units(problem):
         assert probability == pytest.approx(expected[causes], rel=1e-3, abs=1e-5)
 
 
-def test_an_unseen_cause_keeps_its_prior_probability():
+def test_an_unobservable_cause_keeps_its_prior_probability():
     slopes = np.array([[1.0, 0.0], [0.5, 0.0], [-0.3, 0.0]])
     posterior = posterior_of(scale_of(linear(slopes), 0.2 * slopes[:, 0], 1e-4 * np.eye(3), names="ab"))
     one, two = (ONLY.numbers[number] for number in (1, 2))

@@ -73,7 +73,7 @@ def test_what_is_most_probable_what_else_could_be_and_whether_anything_has_chang
     assert records == "Compared: 60 records; with 365 training records."
 
 
-def test_what_only_adds_to_the_most_probable_explanation_is_told_in_short():
+def test_what_only_adds_to_the_most_probable_explanation_is_reported_in_short():
     more = {
         "deck": (0.8, {"deck": (0.12, 0.012)}),
         "deck + piers": (0.05, {"deck": (0.11, 0.012), "piers": (0.014, 0.003)}),
@@ -120,8 +120,8 @@ def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
 
 def test_silence_is_never_healthy():
     found = CASES["healthy"]
-    first, others, unnoticed, unseen, *_ = said(found)
-    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with that of the unseen group
+    first, others, unnoticed, unobservable, *_ = said(found)
+    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with the unobservable one's
     assert others.startswith(
         "It could also be: something else than damage of these groups (3 %); a loss of 2 % in deck"
     )
@@ -130,7 +130,7 @@ def test_silence_is_never_healthy():
         f"A loss of stiffness of up to {100 * bounds['deck']:.2g} % in deck and {100 * bounds['piers']:.2g} % in piers "
         "could have gone unnoticed."
     )
-    assert unseen == "Damage in vertical cannot be seen in these modes: nothing is known of it."
+    assert unobservable == "Damage in vertical cannot be seen in these modes: nothing is known of it."
     doubtful = identified(HEALTHY, unobservable=["vertical"], p_value=0.01)
     assert "Yet a healthy structure shows such shifts with a probability of only 1 %." in said(doubtful)
 
@@ -184,7 +184,7 @@ def test_strengthening_that_was_sought_is_not_named_as_a_cause():
     assert "strengthening" not in sought.summary()
 
 
-def test_what_the_most_probable_explanation_leaves_is_told():
+def test_what_the_most_probable_explanation_leaves_is_reported():
     found = identified(CLEAR, misfit_p_value=0.004, shifts=shifts([-0.02, -0.001, -0.012, 0.0], -0.001))
     (misfit,) = (line for line in said(found) if "unexplained" in line)
     assert misfit == (
@@ -224,7 +224,7 @@ def test_probabilities_have_no_more_digits_than_they_deserve(probability, text):
     assert chance_text(1.0) == f"above 99.9{SPACE}%"
 
 
-def test_records_that_were_left_out_or_scatter_widely_are_told():
+def test_records_that_were_left_out_or_scatter_widely_are_reported():
     left_out = {"without a frequency": 12, "in foreign weather": 3}
     records = ComparedRecords(90, left_out, 75.0, 365, 365.0, {"f3": 2.4})
     found = identified(CLEAR, records=records)

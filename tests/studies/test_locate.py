@@ -174,7 +174,7 @@ def by_frequencies(calibrated, bridge, of_damaged_deck):
     return locate_damage(calibrated, bridge, T, F, random_state=0)
 
 
-def test_mirrored_places_are_not_told_apart_by_frequencies(by_frequencies):
+def test_mirrored_places_are_not_distinguished_by_frequencies(by_frequencies):
     located = by_frequencies
     deck = located.table[located.table["group"] == "deck"]
     assert deck["probability"].to_numpy() == pytest.approx(deck["probability"].to_numpy()[::-1], abs=0.02)

@@ -298,7 +298,7 @@ def test_what_cannot_be_ranked_is_an_error(fem, study):
             single.ranking()
 
 
-def judged(random, names, pods, n_repeats=10, n_records=50, share=0.02):
+def evaluated(random, names, pods, n_repeats=10, n_records=50, share=0.02):
     """Records of detectors that find damage with these probabilities, and their rows in the results."""
     scenarios = {"healthy": Scenario("healthy"), "damaged": Scenario("damaged", {"deck": 0.1})}
     shape, index = (n_repeats, n_records), pd.Series(np.zeros(n_records))
@@ -315,7 +315,7 @@ def test_the_best_is_seldom_called_clearly_behind():
     random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
     n = 40
     for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
-        records, rows = judged(random, names, [0.5] * 6)
+        records, rows = evaluated(random, names, [0.5] * 6)
         table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
         wrong += table["significantly_worse"][random.choice(names)]
     assert wrong <= binom.ppf(0.999, n, 0.05)
@@ -323,7 +323,7 @@ def test_the_best_is_seldom_called_clearly_behind():
 
 def test_what_is_clearly_worse_is_called_so():
     random = np.random.default_rng(0)
-    records, rows = judged(random, ["good", "bad"], [0.6, 0.3])
+    records, rows = evaluated(random, ["good", "bad"], [0.6, 0.3])
     table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
     assert table["significantly_worse"].to_dict() == {"good": False, "bad": True}
     assert table.loc["bad", "pod_deficit_ci_low"] < 0.3 < table.loc["bad", "pod_deficit_ci_high"]

@@ -88,7 +88,7 @@ def test_years_are_matched_by_season():
         other_years([np.zeros((3, 1)), np.zeros((2, 1))])
 
 
-def test_repeats_do_not_depend_on_the_worlds(fem, study):
+def test_repeats_do_not_depend_on_the_replicates(fem, study):
     alone = study_of(fem, "noise")
     results = alone.run(WEATHER)
     left = study.results_.drop(columns=["pi_low", "pi_high"])
@@ -103,7 +103,7 @@ def test_repeats_do_not_depend_on_the_worlds(fem, study):
 
 
 @pytest.mark.nightly
-def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
+def test_replicates_do_not_depend_on_the_number_of_jobs(fem):
     study = study_of(fem, ("noise", "baseline", "weather"))
     twin = clone(study).set_params(n_jobs=2)
     results = study.run(WEATHER)
@@ -112,7 +112,7 @@ def test_worlds_do_not_depend_on_the_number_of_jobs(fem):
     pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(twin)).uncertainty_, study.uncertainty_)
 
 
-def test_a_world_is_drawn_from_its_seed_alone(fem):
+def test_a_replicate_is_drawn_from_its_seed_alone(fem):
     few, many = (Replicates.of(fem, ("baseline", "weather"), WEATHER, None, number, [1, 2]) for number in (2, 4))
     for number in (0, 1):
         for (part, chain, T), (again, other, T_again) in zip(
@@ -201,7 +201,7 @@ def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(p
     assert np.mean(replicates.single(key)) == pytest.approx(centre, abs=0.005)
 
 
-def test_all_worlds_alike_have_no_spread():
+def test_all_replicates_alike_have_no_spread():
     found = Spread.of(np.full((5, 3), 0.25))
     assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
 
@@ -218,11 +218,11 @@ def test_bands_of_a_study(study):
     curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.replicates])
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
     assert curve.a90_band[0] < curve.a90_band[1]
-    told = study.summary()
-    assert "Bands of 95% hold noise, the weather, the training records and the model." in told
+    summary = study.summary()
+    assert "Bands of 95% hold noise, the weather, the training records and the model." in summary
     damaged = study.results_.set_index("scenario").drop("healthy")
     widest = (damaged["pi_high"] - damaged["pi_low"]).idxmax()
-    assert f"A measured campaign of {widest!r} should show" in told
+    assert f"A measured campaign of {widest!r} should show" in summary
 
 
 def test_models_that_cannot_be_drawn(monkeypatch, fem):
@@ -247,7 +247,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
         ({"models": MODELS[:1]}, "models came, but uncertainty is 'noise'; expected 'model' among it, 'auto' or 'all'"),
     ],
 )
-def test_wrong_worlds_are_refused(fem, options, message):
+def test_wrong_options_are_refused(fem, options, message):
     with pytest.raises(ValueError, match=message):
         study_of(fem, **({"uncertainty": "noise"} | options)).run(WEATHER)
 
@@ -263,7 +263,7 @@ class Failing(Scenario):
         return super()._changes(T, repeat)
 
 
-def test_worlds_that_fail_are_counted(fem, monkeypatch):
+def test_replicates_that_fail_are_counted(fem, monkeypatch):
     years = [WEATHER, WEATHER + 0.1, WEATHER + 0.2, WEATHER + 0.3]
     study = DetectabilityStudy(
         fem,
@@ -282,7 +282,7 @@ def test_worlds_that_fail_are_counted(fem, monkeypatch):
         study.run(years)
 
 
-def test_uncertain_damage_differs_from_world_to_world(fem):
+def test_uncertain_damage_differs_from_replicate_to_replicate(fem):
     uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
     options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_replicates": 2, "random_state": 0}
     study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], **options)

@@ -1,4 +1,4 @@
-"""Several detectors in one study, which all judge the same simulated records."""
+"""Several detectors in one study, which all evaluate the same simulated records."""
 
 import warnings
 from collections import Counter
@@ -43,7 +43,7 @@ def detectors():
 
 
 class Trouble(OutlierMixin, BaseEstimator):
-    """Fails in ``fit``, from the given call of ``decision_function`` on, or judges nothing."""
+    """Fails in ``fit``, from the given call of ``decision_function`` on, or evaluates nothing."""
 
     def __init__(self, fails=None, first=0):
         self.fails = fails
@@ -60,7 +60,7 @@ class Trouble(OutlierMixin, BaseEstimator):
 
     def decision_function(self, X):
         self.n_calls_ += 1
-        if self.fails == "judge" and self.n_calls_ > self.first:
+        if self.fails == "predict" and self.n_calls_ > self.first:
             raise RuntimeError("out of order")
         return np.full(len(X), np.nan)
 
@@ -225,11 +225,11 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     ("trouble", "message"),
     [
         (Trouble("fit"), "KeyError: 'no such column'"),
-        (Trouble("judge"), "RuntimeError: out of order"),
-        (Trouble("judge", 5), "RuntimeError: out of order"),
+        (Trouble("predict"), "RuntimeError: out of order"),
+        (Trouble("predict", 5), "RuntimeError: out of order"),
         (Trouble(), "ValueError: none of 365 records of scenario 'healthy'"),
     ],
-    ids=["in fit", "in the first repeat", "in a later repeat", "judges nothing"],
+    ids=["in fit", "in the first repeat", "in a later repeat", "evaluates nothing"],
 )
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_a_detector_that_fails_is_a_row_with_its_error(fem, study, trouble, message, n_jobs):
@@ -280,7 +280,7 @@ def test_what_to_add_asks_for_a_detector_of_several(fem):
 
 
 class Doubtful(MahalanobisDetector):
-    """Has doubts about its baseline and about every record that it judges."""
+    """Has doubts about its baseline and about every record that it evaluates."""
 
     def fit(self, X, y=None):
         warnings.warn("no convergence in 7 steps", ConvergenceWarning, stacklevel=2)
@@ -296,16 +296,16 @@ def test_one_warning_for_one_cause_names_the_detectors(fem):
     study = study_of(fem, some, SCENARIOS)
     with pytest.warns(UserWarning, match=r"odd|convergence") as caught:
         study.run(WEATHER)
-    fit, judged = caught
+    fit, evaluated = caught
     assert fit.category is ConvergenceWarning
     assert str(fit.message) == (
         "no convergence in 7 steps (detectors 'first', 'second'; and 1 times more in the fits of the detectors)"
     )
-    assert str(judged.message) == (
+    assert str(evaluated.message) == (
         "365 odd records (detectors 'first', 'second'; and 5 times more in the simulations of this study)"
     )
-    assert judged.filename == __file__
-    assert study.warnings_ == [str(judged.message)]
+    assert evaluated.filename == __file__
+    assert study.warnings_ == [str(evaluated.message)]
     with pytest.warns(UserWarning, match=r"^365 odd records \(and 2 times more|convergence") as caught:
         study.set_params(detectors=Doubtful()).run(WEATHER)
     assert str(caught[0].message) == "no convergence in 7 steps"

@@ -259,7 +259,7 @@ def test_without_a_slope_damage_is_bracketed(fem, severities, group, bracket):
 
 
 @pytest.mark.nightly
-def test_records_that_cannot_be_judged_do_not_count():
+def test_records_that_cannot_be_evaluated_do_not_count():
     frequencies = YEAR.frequencies.copy()
     frequencies.iloc[::3, :3] = np.nan
     frequencies.iloc[::5] = np.nan

@@ -18,7 +18,7 @@ from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper
 
 
-def judged(decisions, index=None, scenario=None):
+def evaluated(decisions, index=None, scenario=None):
     index = pd.date_range("2030-01-01", periods=decisions.shape[1], freq="D") if index is None else index
     scenario = scenario or Scenario("a tenth", {"bottom": 0.1})
     return EvaluatedRecords("detector", scenario, "simulated", pd.Series(0.0, index), decisions)
@@ -51,7 +51,7 @@ def study(fem):
 
 @pytest.mark.parametrize("rate", [0.02, 0.1, 0.4])
 def test_independent_records_follow_the_geometric_law(rate):
-    waits = Waits.of(judged(decisions_with(rate, shape=(300, 400))))
+    waits = Waits.of(evaluated(decisions_with(rate, shape=(300, 400))))
     for number in (1, 7, 30):
         found, lowest, highest = waits.found(number, 0.999)
         assert lowest <= 1 - (1 - rate) ** number <= highest
@@ -65,7 +65,7 @@ def test_independent_records_follow_the_geometric_law(rate):
 @given(st.integers(0, 10**6), st.integers(2, 40), st.floats(0.02, 0.9))
 def test_waits_are_those_of_a_count_from_each_onset(seed, n_records, rate):
     alarms = np.random.default_rng(seed).random((2, n_records)) < rate
-    found = Waits.of(judged(np.where(alarms, -1.0, 1.0))).steps
+    found = Waits.of(evaluated(np.where(alarms, -1.0, 1.0))).steps
     for repeat in range(2):
         for onset in range(n_records):
             following = np.roll(alarms[repeat], -onset)
@@ -74,7 +74,7 @@ def test_waits_are_those_of_a_count_from_each_onset(seed, n_records, rate):
 
 
 def test_dependence_makes_waits_longer_and_bounds_wider():
-    single, lasting = (Waits.of(judged(decisions_with(0.1, memory))) for memory in (0.0, 0.95))
+    single, lasting = (Waits.of(evaluated(decisions_with(0.1, memory))) for memory in (0.0, 0.95))
     assert lasting.found(7, 0.95)[0] < single.found(7, 0.95)[0] - 0.1
     assert lasting.within(0.5) > 1.5 * single.within(0.5)
     widths = [np.ptp(one.found(7, 0.95)[1:]) for one in (lasting, single)]
@@ -83,26 +83,26 @@ def test_dependence_makes_waits_longer_and_bounds_wider():
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_bounds_hold_the_long_run(memory):
-    truth = Waits.of(judged(decisions_with(0.1, memory, (2000, 400), seed=99))).found(7, 0.9)[0]
-    bounds = [Waits.of(judged(decisions_with(0.1, memory, (5, 200), seed))).found(7, 0.9)[1:] for seed in range(100)]
+    truth = Waits.of(evaluated(decisions_with(0.1, memory, (2000, 400), seed=99))).found(7, 0.9)[0]
+    bounds = [Waits.of(evaluated(decisions_with(0.1, memory, (5, 200), seed))).found(7, 0.9)[1:] for seed in range(100)]
     assert np.mean([lowest <= truth <= highest for lowest, highest in bounds]) >= 0.83
 
 
 def test_records_that_are_not_evaluated_delay():
     decisions = decisions_with(0.2, shape=(300, 400))
-    every = Waits.of(judged(decisions))
+    every = Waits.of(evaluated(decisions))
     decisions[:, ::2] = np.nan
-    second = Waits.of(judged(decisions))
+    second = Waits.of(evaluated(decisions))
     assert second.share_not_evaluated == 0.5
     assert second.found(10, 0.95)[0] == pytest.approx(every.found(5, 0.95)[0], abs=0.02)
-    assert np.isinf(Waits.of(judged(np.full((2, 50), np.nan))).steps).all()
+    assert np.isinf(Waits.of(evaluated(np.full((2, 50), np.nan))).steps).all()
 
 
 def test_stamps_that_are_absent_delay_as_an_outage_does():
     stamps = pd.date_range("2030-01-01", periods=390, freq="h")
     decisions, kept = decisions_with(0.2, shape=(20, 390)), np.arange(390) % 40 < 30
-    absent = Waits.of(judged(decisions[:, kept], stamps[kept]))
-    empty = Waits.of(judged(np.where(kept, decisions, np.nan), stamps))
+    absent = Waits.of(evaluated(decisions[:, kept], stamps[kept]))
+    empty = Waits.of(evaluated(np.where(kept, decisions, np.nan), stamps))
     assert absent.clock.length == pd.Timedelta("1h")
     np.testing.assert_array_equal(absent.steps, empty.steps)
     assert absent.clock.count(pd.Timedelta("1D")) == 24
@@ -112,7 +112,7 @@ def test_clocks_that_are_not_exact_and_records_out_of_order_change_nothing():
     stamps = pd.date_range("2030-01-01", periods=100, freq="D")
     decisions, shuffled = decisions_with(0.2, shape=(3, 100)), np.random.default_rng(0).permutation(100)
     late = stamps + pd.to_timedelta(np.random.default_rng(1).uniform(0, 600, 100), "s")
-    expected, found = Waits.of(judged(decisions)), Waits.of(judged(decisions[:, shuffled], late[shuffled]))
+    expected, found = Waits.of(evaluated(decisions)), Waits.of(evaluated(decisions[:, shuffled], late[shuffled]))
     np.testing.assert_array_equal(found.steps, expected.steps)
     assert [found.clock.count(pd.Timedelta(days=days)) for days in (1, 7, 30)] == [1, 7, 30]
 
@@ -174,7 +174,7 @@ def test_rows_without_stamps_are_counted():
         study.time_to_detection(["7D"])
 
 
-def test_the_smallest_damage_that_is_soon_found_is_told_in_words(study):
+def test_the_smallest_damage_that_is_soon_found_is_described_in_words(study):
     every = study.time_to_detection(detector="single").set_index("scenario")
     healthy, certain = every.loc["healthy"], every.loc["bottom 60 %"]
     assert f"within 7 days in {round(100 * healthy['7D'])}" in healthy["text"]
@@ -185,8 +185,8 @@ def test_the_smallest_damage_that_is_soon_found_is_told_in_words(study):
     soon = study.time_to_detection(detector="single", smallest=True).set_index("scenario")
     assert list(soon.index) == ["healthy", "crack"]
     assert every.loc["bottom 6 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
-    told = study.time_to_detection(detector=study.ranking().index[0], smallest=True)
-    sentences = [f"{row['scenario']!r} {row['text']}." for _, row in told.iterrows()]
+    smallest = study.time_to_detection(detector=study.ranking().index[0], smallest=True)
+    sentences = [f"{row['scenario']!r} {row['text']}." for _, row in smallest.iterrows()]
     assert "\n".join(sentences) in study.summary()
 
 

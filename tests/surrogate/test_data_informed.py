@@ -30,7 +30,7 @@ YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_st
 FITTED = fitted()
 
 
-def test_predicts_unseen_temperatures_to_a_fraction_of_the_noise():
+def test_predicts_other_temperatures_to_a_fraction_of_the_noise():
     assert mape(LATER.clean_frequencies, FITTED.predict(LATER.temperatures)).max() < 1.0
     assert FITTED.score(LATER.temperatures, LATER.clean_frequencies) > 0.9
 

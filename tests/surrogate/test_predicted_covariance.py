@@ -121,7 +121,7 @@ def test_intervals_after_thirty_days_hold_a_later_year():
     assert np.mean(np.array(held) < 0.7) < 0.2
 
 
-def test_rows_in_weather_of_the_fleet_are_told_and_those_beyond_it_are_warned_of():
+def test_rows_in_weather_of_the_fleet_are_counted_and_those_beyond_it_are_warned_of():
     fem, T, _ = fitted()
     table, own = fem.extrapolation_distance(T), (T[:30].min(), T[:30].max())
     seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)

@@ -105,9 +105,9 @@ def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted(
     count = found.full_solves.sum()
     with pytest.warns(UserWarning, match="12 rows") as said:
         reduced.transform(F)
-    (told,) = (text for text in map(str, (warning.message for warning in said)) if "reduced model" in text)
-    assert told.startswith("the parameters of 3 of 12 rows, row 4 the first, are outside the box")
-    assert f"the full one was solved {count} times" in told
+    (text,) = (one for one in map(str, (warning.message for warning in said)) if "reduced model" in one)
+    assert text.startswith("the parameters of 3 of 12 rows, row 4 the first, are outside the box")
+    assert f"the full one was solved {count} times" in text
 
 
 @pytest.mark.nightly
@@ -116,8 +116,8 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     with pytest.warns(UserWarning, match="(?s).*") as said:
         fem = chain().fit(T, F)
     texts = [str(warning.message) for warning in said]
-    (told,) = (text for text in texts if text.startswith("no reduced model is accurate to 1e-05"))
-    assert "after 4 rounds" in told
+    (text,) = (one for one in texts if one.startswith("no reduced model is accurate to 1e-05"))
+    assert "after 4 rounds" in text
     found = fem.inverse_.invert(F)
     assert fem.report_.n_by_full_model == np.count_nonzero(found.full_solves) > 0
     assert fem.report_.n_full_solves == found.full_solves.sum()

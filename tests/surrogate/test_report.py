@@ -235,7 +235,7 @@ class TestForeignWeather:
             assert len(outside) == 1
             assert "expected degrees Celsius" in outside[0]
 
-    def test_applicability_is_in_units_of_the_training_range(self, fitted):
+    def test_extrapolation_distance_is_in_units_of_the_training_range(self, fitted):
         width = T.max() - T.min()
         weather = pd.DataFrame([T.max() + 0.5 * width, T.min(), T.mean(), T.min() - 2 * width], columns=T.columns)
         table = fitted.extrapolation_distance(weather)
@@ -244,7 +244,7 @@ class TestForeignWeather:
         expected = ((inside < 0.7) | (inside > 1.3)).any(axis=1)
         assert table["outside_bounds"].iloc[1:3].tolist() == expected.tolist()
 
-    def test_applicability_sees_lags_and_gaps(self):
+    def test_extrapolation_distance_accounts_for_lags_and_gaps(self):
         lagged = chain(mapper=make_pipeline(LagFeatures([0, 2]), TemperatureMapper(Ridge()))).fit(T, F)
         weather = LATER.copy()
         weather.index = weather.index + pd.Timedelta(days=365)
@@ -295,8 +295,8 @@ def test_offsets_that_an_aligner_hides_are_named_unless_weather_or_a_common_fact
         fem = aligned(wrong)
     assert len([w for w in given if "hides" in str(w.message)]) == 1
     assert fem.report_.has_hidden_offsets
-    told = next(str(w.message) for w in given if "hides" in str(w.message))
-    assert told[1:] in repr(fem.report_)
+    text = next(str(w.message) for w in given if "hides" in str(w.message))
+    assert text[1:] in repr(fem.report_)
     np.testing.assert_allclose(fem.report_.hidden_offsets, fem.report_.offsets, atol=1e-9)
     calibrated = ModelUpdater(wrong, bounds=0.5, prior=0.3).fit(F, frequency_std=0.005 * F.mean()).model_
     assert not aligned(calibrated).report_.has_hidden_offsets

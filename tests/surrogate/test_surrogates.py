@@ -25,7 +25,7 @@ T = pd.DataFrame({"T1": np.linspace(-10, 40, 60), "T2": np.cos(np.arange(60))})
 THETA = pd.DataFrame({"E": np.exp(-0.004 * T["T1"]), "k": 1 + 0.1 * T["T2"]})
 
 
-def test_inverse_recovers_the_parameters_of_unseen_simulations():
+def test_inverse_recovers_the_parameters_of_other_simulations():
     inverse = InverseSurrogate(TRUSS, QUADRATIC, bounds=0.2, random_state=0).fit()
     errors = np.abs(inverse.transform(HELD_OUT.frequencies) / HELD_OUT.theta - 1)
     assert errors.mean() < 0.005

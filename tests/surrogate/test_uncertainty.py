@@ -367,7 +367,7 @@ def without(sensor):
     return LATER.temperatures.assign(**{sensor: np.nan})
 
 
-def test_a_missing_temperature_is_what_the_other_sensors_foretell():
+def test_a_missing_temperature_is_what_the_other_sensors_predict():
     wanted = LinearRegression().fit(T[["T1", "T3"]], T["T2"])
     complete = LATER.temperatures.assign(T2=wanted.predict(LATER.temperatures[["T1", "T3"]]))
     with pytest.warns(UserWarning, match=r"the other sensors: 'T2' in 365 of 365 rows \(standard dev"):

@@ -89,7 +89,7 @@ def test_gradients_of_the_objective_equal_central_differences(model):
 
 
 @pytest.mark.parametrize("n_dofs", [2, 9])
-def test_covariance_from_shapes_is_what_identifiability_promises(n_dofs):
+def test_covariance_from_shapes_is_what_identifiability_predicts(n_dofs):
     """With frequencies so noisy that almost all is known from the shapes."""
     noise, shape_noise, dofs = 0.2, 1e-4, np.arange(3, 3 + n_dofs)
     frequencies, shapes = measured(TRUSS, TRUTH, dofs)
@@ -124,7 +124,7 @@ def test_complex_shapes_of_random_phase_are_made_real():
 
 
 @pytest.mark.filterwarnings(r"ignore:\[.b., .c.\] hardly move the measured modes")
-def test_a_prior_holds_what_cannot_be_told():
+def test_a_prior_holds_what_cannot_be_identified():
     model = AffineModel(
         {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}, np.eye(2), n_modes=2
     )

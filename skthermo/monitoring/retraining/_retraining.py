@@ -22,7 +22,7 @@ from skthermo.monitoring._smallest import WEEK, blocks_of
 from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
 from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree
 
-MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun unseen
+MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
 FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors
 
 Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]

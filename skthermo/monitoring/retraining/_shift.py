@@ -96,7 +96,7 @@ def _piecewise_linear(targets: list[Any]) -> TemperatureCompensator:
 
 @dataclass(frozen=True)
 class LevelShift:
-    """A change of frequencies along a course in time, from 0 to 1, that weather does not explain.
+    """A change of frequencies that follows a profile in time, from 0 to 1, and that weather does not explain.
 
     ``change`` and ``standard_error`` are those of `WeatherFree` by mode; ``size`` is the length of the change in
     standard deviations of single records, ``p_value`` the probability of one as large if nothing has changed (NaN with
@@ -127,14 +127,14 @@ class LevelShift:
         return bool((self.standard_error / self.scatter).median() > HIDDEN)
 
     @classmethod
-    def along(cls, courses: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[LevelShift]:
-        """The change along each course, beside what the weather explains of it and of the frequencies.
+    def along(cls, profiles: dict[str, Array], free: WeatherFree, weather: pd.DataFrame) -> list[LevelShift]:
+        """The change along each profile, beside what the weather explains of it and of the frequencies.
 
-        Residuals are regressed on what weather does not tell of the course, so that a season that only one period has
-        is not taken for a change. Standard errors are those of blocks of time, which may depend within.
+        Residuals are regressed on the part of the profile that weather does not explain, so that a season that only one
+        period has is not taken for a change. Standard errors are those of blocks of time, which may depend within.
         """
-        left = _beside(weather, courses)
-        return [cls._of(what, one, free) for what, one in zip(courses, left.T, strict=True)]
+        left = _beside(weather, profiles)
+        return [cls._of(what, one, free) for what, one in zip(profiles, left.T, strict=True)]
 
     @classmethod
     def _of(cls, what: str, left: Array, free: WeatherFree) -> LevelShift:
@@ -179,11 +179,11 @@ class ShiftsTried:
         times = weather.index
         new = times[times >= since]
         days = new[np.unique(np.linspace(0, 0.85 * (len(new) - 1), N_STEPS).astype(int))]
-        courses = {f"from {day:%Y-%m-%d} on": (times >= day).astype(float) for day in days}
+        profiles = {f"from {day:%Y-%m-%d} on": (times >= day).astype(float) for day in days}
         for what, first in (("steadily over the new records", since), ("steadily over all records", times[0])):
-            course = np.asarray((times - first) / (times[-1] - first), dtype=float)
-            courses[what] = np.maximum(course, 0.0)
-        return cls(tuple(LevelShift.along(courses, free, weather)))
+            profile = np.asarray((times - first) / (times[-1] - first), dtype=float)
+            profiles[what] = np.maximum(profile, 0.0)
+        return cls(tuple(LevelShift.along(profiles, free, weather)))
 
     @property
     def step(self) -> LevelShift:
@@ -230,10 +230,10 @@ def _p_value(change: Array, covariance: Array, n_independent: float) -> float:
     return float(f_law.sf(squared * freedom / (n_modes * (n_independent - 1)), n_modes, freedom))
 
 
-def _beside(weather: pd.DataFrame, courses: dict[str, Array]) -> Array:
-    """What weather does not tell of courses in time, each record predicted by others, (n_records, n_courses)."""
-    together = pd.DataFrame(courses, weather.index)
+def _beside(weather: pd.DataFrame, profiles: dict[str, Array]) -> Array:
+    """What weather does not explain of profiles in time, each record predicted by others, (n_records, n_profiles)."""
+    together = pd.DataFrame(profiles, weather.index)
     if not len(weather.columns):
         return (together - together.mean()).to_numpy()
     with without_warnings():
-        return np.asarray(_piecewise_linear(list(courses)).fit_transform(weather.join(1 + together)))
+        return np.asarray(_piecewise_linear(list(profiles)).fit_transform(weather.join(1 + together)))

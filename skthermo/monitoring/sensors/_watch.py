@@ -291,8 +291,8 @@ class SensorWatch:
         out = self._left_out(faults)
         lasting = faults.notes(names, self.zone)
         notes = ["; ".join(lasting)] * len(given)
-        unseen = np.isnan(given[:, n_sensors:]) & held & ~out[n_sensors:]
-        for row in np.flatnonzero((far & ~out).any(axis=1) | unseen.any(axis=1)):
+        went_missing = np.isnan(given[:, n_sensors:]) & held & ~out[n_sensors:]
+        for row in np.flatnonzero((far & ~out).any(axis=1) | went_missing.any(axis=1)):
             parts = [
                 f"{names[k]} is {_quantity(given[row, k], self.units[k])}"
                 + (
@@ -304,7 +304,8 @@ class SensorWatch:
                 for k in np.flatnonzero(far[row] & ~out)
             ]
             parts += [
-                f"{names[n_sensors + k]} was implausible before it went missing" for k in np.flatnonzero(unseen[row])
+                f"{names[n_sensors + k]} was implausible before it went missing"
+                for k in np.flatnonzero(went_missing[row])
             ]
             notes[row] = "; ".join([*parts, *lasting])
         return notes

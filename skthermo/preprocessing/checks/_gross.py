@@ -91,8 +91,8 @@ class CleanedRecords:
             reading.sort(records._index_of(reading))
             reading.set_infinite_aside()
         records.findings += records._rows()
-        confused = _confused(*tables, in_hertz=unit == "Hz") if len(tables) == 2 else []
-        for reading in tables if not confused and records.n_rows > 1 else []:
+        exchanged = _exchanged(*tables, in_hertz=unit == "Hz") if len(tables) == 2 else []
+        for reading in tables if not exchanged and records.n_rows > 1 else []:
             if reading.what == "temperatures":
                 look_at_temperatures(reading)
             else:
@@ -100,8 +100,8 @@ class CleanedRecords:
                 if model is not None and unit == "Hz":
                     check_model(model)
                     _compare_with_model(reading, model)
-        records.findings += [found for reading in records.readings for found in reading.findings] + confused
-        records.belong_together = len(tables) == 2 and not confused and records._have_same_rows()
+        records.findings += [found for reading in records.readings for found in reading.findings] + exchanged
+        records.belong_together = len(tables) == 2 and not exchanged and records._have_same_rows()
         return records
 
     @property
@@ -187,7 +187,7 @@ def _different_rows(first: Reading, second: Reading) -> Finding:
     return Finding("different rows", "", len(differ), first.given_index[row], first.given_index[differ[-1]], detail)
 
 
-def _confused(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
+def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
     """Columns that stand in both tables, or temperatures that are frequencies and frequencies that are none."""
     modes = {content: name for name, content in contents_of(F)}
     shared = [(name, modes[content]) for name, content in contents_of(T) if content in modes]

@@ -29,7 +29,7 @@ FAILURES = {
 """What failed, in an owner's words, by the stage of the error."""
 MONTH = 31  # days of which the table says how many were evaluated
 
-SIGNIFICANT, OPEN, UNEXPLAINED, RAISED, WORN, SILENT, BROKEN, UNSEEN, DRIFTING, WELL = range(10)
+SIGNIFICANT, OPEN, UNEXPLAINED, RAISED, WORN, SILENT, BROKEN, WITHOUT_MONITOR, DRIFTING, WELL = range(10)
 """Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
 that would be significant, has ended and was not explained; a raised index; much stiffness lost; not evaluated; not
 fitted; without a monitor; a drift beyond its error; healthy."""

@@ -25,8 +25,8 @@ from skthermo.reporting.fleet._bridge import (
     SILENT,
     UNEXPLAINED,
     UNKNOWN_STATES,
-    UNSEEN,
     UNWATCHED,
+    WITHOUT_MONITOR,
     Bridge,
 )
 from skthermo.reporting.fleet._files import folder_of, link, page_names
@@ -146,7 +146,7 @@ class PageWriter:
             why = "The file of its model cannot be read" if without_chain else error or "No reason is given"
             return Bridge(name, FAILED, BROKEN, why=f"{why}.", n_warnings=n_warnings), None
         why = f"{error or 'Its model was fitted only'}."
-        return Bridge(name, UNWATCHED, UNSEEN, why=why, n_warnings=n_warnings), chain
+        return Bridge(name, UNWATCHED, WITHOUT_MONITOR, why=why, n_warnings=n_warnings), chain
 
 
 def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, written: str) -> list[Section]:

@@ -462,8 +462,8 @@ def false_alarms(standing: Standing) -> Section:
     if monitor.watch_threshold_ is not None:
         often = counted_number(monitor.watch_per_year, "time")
         sentences.append(f"A structure that stays healthy reaches the lower level of a watch {often} a year by chance.")
-    if unseen := getattr(estimate, "unseen", ""):
-        sentences.append(f"Nothing is known of {unseen}: the baseline has no records of that time of year.")
+    if missing_season := getattr(estimate, "missing_season", ""):
+        sentences.append(f"Nothing is known of {missing_season}: the baseline has no records of that time of year.")
     sentences.append("This says nothing of damage that is missed: a study of detectability answers that.")
     rows = [
         ["Threshold, above which an event begins", significant(monitor.threshold_, 4)],

@@ -190,8 +190,8 @@ def in_words(table: pd.DataFrame, limit: float) -> str:
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
         lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
-    unseen = ranked.loc[ranked["not_evaluated"] > 0, "not_evaluated"]
-    shares = [f"{name!r} {share:.1%}" for name, share in unseen.items()]
+    not_evaluated = ranked.loc[ranked["not_evaluated"] > 0, "not_evaluated"]
+    shares = [f"{name!r} {share:.1%}" for name, share in not_evaluated.items()]
     lines += [f"Records that are not evaluated, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
     lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
     return "\n".join(lines)

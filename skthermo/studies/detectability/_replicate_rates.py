@@ -267,8 +267,8 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
     if len(width) and (detector, width.idxmax()) in parts.index:
         widest = rows.loc[width.idxmax()]
         shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
-        told = shares[shares >= SMALL].sort_values(ascending=False)
-        causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in told.items()])
+        large = shares[shares >= SMALL].sort_values(ascending=False)
+        causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in large.items()])
         band = f"{widest['pi_low']:.1%} to {widest['pi_high']:.1%}"
         lines.append(
             f"A measured campaign of {widest.name!r} should show {band} of its records in alarm, the widest band."

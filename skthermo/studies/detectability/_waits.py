@@ -183,7 +183,7 @@ def waits_table(
         row["reliable"] = waits.clock.time(waits.within(level))
         row["reliable highest"] = waits.clock.time(waits.surely_within(level, confidence))
         row["not_evaluated"] = waits.share_not_evaluated
-        text = false_alarms_told(waits, numbers) if scenario.is_healthy else waits_told(waits, false, level)
+        text = false_alarms_text(waits, numbers) if scenario.is_healthy else waits_text(waits, false, level)
         rows.append(row | {"text": text})
     table = pd.DataFrame(rows)
     if is_stamped:
@@ -191,18 +191,18 @@ def waits_table(
     return table
 
 
-def false_alarms_told(waits: Waits, numbers: Sequence[int]) -> str:
+def false_alarms_text(waits: Waits, numbers: Sequence[int]) -> str:
     """In how many of a hundred cases the healthy structure raises an alarm within some times."""
     chances = [(number, waits.found(number, 0.5)[0]) for number in numbers]
-    told = [f"within {waits.clock.text(number)} in {_cases(chance)}" for number, chance in chances if chance == chance]
-    return f"raises a false alarm {', '.join(told)} of 100 cases" if told else "has too few records for these times"
+    texts = [f"within {waits.clock.text(number)} in {_cases(chance)}" for number, chance in chances if chance == chance]
+    return f"raises a false alarm {', '.join(texts)} of 100 cases" if texts else "has too few records for these times"
 
 
 def _cases(chance: float) -> str:
     return f"{round(100 * chance)}" if chance >= 0.005 else "fewer than 1"
 
 
-def waits_told(waits: Waits, false: Waits | None, level: float) -> str:
+def waits_text(waits: Waits, false: Waits | None, level: float) -> str:
     """How soon alarms come, beside those of the healthy structure in the same time."""
     clock, number = waits.clock, waits.within(level)
     cases = f"{100 * level:g} of 100 cases"

@@ -253,8 +253,8 @@ def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
 def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
     """Causes that are likely over all explanations together, unless they are those of the first and sure."""
     table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unobservable)]
-    told_first = {amounts[0].cause for amounts in first.changes}
-    if told_first.issuperset(table.index) and (table["probability"] >= SURE).all():
+    in_first = {amounts[0].cause for amounts in first.changes}
+    if in_first.issuperset(table.index) and (table["probability"] >= SURE).all():
         return
     named = []
     for cause, row in table.sort_values("probability", ascending=False, kind="stable").head(MOST_NAMED).iterrows():

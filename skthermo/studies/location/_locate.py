@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._effects import read_groups
-from skthermo._estimators.warnings import told_around, warn_user, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo._tables.arrays import as_random_state
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
@@ -128,7 +128,7 @@ def locate_damage(
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
-    with told_around(OF_WHOLE_GROUPS):
+    with reported_by_caller(OF_WHOLE_GROUPS):
         found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
     with without_warnings():  # identify_damage has given them
         seen = observe(fem, T, F, noise)

@@ -193,8 +193,8 @@ class LocatedDamage:
         return visible_sets(self.explained, self.found.unobservable)
 
     def _answer(self) -> Iterator[str]:
-        is_told = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unobservable)
-        probable = self.groups[is_told]
+        is_named = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unobservable)
+        probable = self.groups[is_named]
         if probable.empty:
             yield (
                 f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "

@@ -135,7 +135,7 @@ PARTS = ("noise", "weather", "baseline", "model")
 
 ALL, AUTO = "all", "auto"
 N_DRAWS = 2  # draws of the noise in each replicate, to separate its share from that of what else varies
-LEAST_WORLDS = 2
+FEWEST_REPLICATES = 2
 LARGEST_SEED = np.iinfo(np.int32).max
 
 
@@ -161,9 +161,9 @@ class Replicates:
         records."""
         asked = checked_parts(uncertainty, with_models=models is not None)
         years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
-        if positive_integer(number, "n_replicates") < LEAST_WORLDS:
+        if positive_integer(number, "n_replicates") < FEWEST_REPLICATES:
             raise ValueError(
-                f"n_replicates is {number}; expected at least {LEAST_WORLDS}, 10 or more for bands of 90 %"
+                f"n_replicates is {number}; expected at least {FEWEST_REPLICATES}, 10 or more for bands of 90 %"
             )
         random = np.random.RandomState(seed)
         seeds = random.randint(LARGEST_SEED, size=number + 1)

@@ -55,9 +55,9 @@ from skthermo._validation import (
     inputs_of_last_step,
     last_step,
     offers,
+    rows_from_fleet,
     seed_parts,
     seeded,
-    told_by_fleet,
     validate_data,
 )
 from skthermo.exceptions import UnevaluatedRowsWarning
@@ -791,7 +791,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         excess = excess.assign(outside_bounds=outside)
         if offers(self.mapper_, "from_fleet"):
-            return excess.assign(from_fleet=told_by_fleet(self.mapper_, weather.filled))
+            return excess.assign(from_fleet=rows_from_fleet(self.mapper_, weather.filled))
         return excess
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:

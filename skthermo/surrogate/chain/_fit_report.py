@@ -123,7 +123,7 @@ MOST_INPUTS = 3  # of the mapper, of which the fleet's weather is listed
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 ROWS_PER_PARAMETER = 10  # below which a warning is given
 WORSE_THAN_MEAN = 1.2  # ratio of the chain's error to that of the training mean from which a warning is given
-UNSEEN = 0.1  # percent of a frequency below which single records from ambient vibration show nothing
+RESOLUTION = 0.1  # percent of a frequency, below which single records from ambient vibration show no change
 LARGE_OFFSET = 15.0  # difference in percent between a measured mode and the model's above which a warning is given
 SMALL_OFFSET = 5.0  # percent by which a mode may differ from the model's without being taken for another one
 LEFT_BY_CALIBRATION = 0.3  # percent by which a calibrated model was found to miss mean frequencies
@@ -143,7 +143,7 @@ LARGE_DISCREPANCY, SMALL_DISCREPANCY = 1.0, 0.5
 given: on the truss and nine bridges it is up to 0.35 of that effect, with models that are 2 to 5 % off."""
 
 MANY_OUTLIERS = 0.05  # share of the frequencies above which a warning is given
-TOLD_OFFSET = 0.3  # smallest offset in percent that the warning names
+SMALLEST_OFFSET = 0.3  # smallest offset in percent that the warning names
 CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squared offsets to this share or less
 
 
@@ -294,10 +294,10 @@ class FitReport(SavesFrames):
         """The inputs that the fleet has seen farthest beyond these records."""
         own = self.fleet["highest"] - self.fleet["lowest"]
         farther = (self.fleet["fleet highest"] - self.fleet["fleet lowest"]) / own.where(own > 0, 1.0)
-        told = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:MOST_INPUTS]]
+        widest = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:MOST_INPUTS]]
         return ", ".join(
             f"{name!r} from {lowest:.3g} to {highest:.3g}, here {own_lowest:.3g} to {own_highest:.3g}"
-            for name, own_lowest, own_highest, lowest, highest in told.itertuples()
+            for name, own_lowest, own_highest, lowest, highest in widest.itertuples()
         )
 
     def _modes(self) -> pd.DataFrame:
@@ -375,10 +375,10 @@ class FitReport(SavesFrames):
     def _hidden(self) -> Iterator[SkthermoWarning]:
         if not self.has_hidden_offsets:
             return
-        large = self.hidden_offsets[self.hidden_offsets.abs() >= TOLD_OFFSET]
-        told = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+        large = self.hidden_offsets[self.hidden_offsets.abs() >= SMALLEST_OFFSET]
+        offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
         yield ModelWarning(
-            f"the aligner hides offsets between measurement and model that weather does not explain ({told}): "
+            f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}): "
             "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
             "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
             "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
@@ -400,13 +400,13 @@ class FitReport(SavesFrames):
             return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
-        told = ", ".join(
+        modes = ", ".join(
             f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
         )
-        if told:
+        if modes:
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {told}: predictions rely on the discrepancy, and "
-                "simulated damage on a model that is not calibrated; expected a model updated to these records "
+                f"the FE model cannot follow what the weather does to {modes}: predictions rely on the discrepancy, "
+                "and simulated damage on a model that is not calibrated; expected a model updated to these records "
                 "(ModelUpdater), or parameters that this weather changes",
                 "large discrepancy",
             )
@@ -414,7 +414,7 @@ class FitReport(SavesFrames):
     def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
         if self.round_trip is None:
             return
-        shares = self.round_trip.abs() / self.scatter.clip(lower=UNSEEN)
+        shares = self.round_trip.abs() / self.scatter.clip(lower=RESOLUTION)
         if not (shares > 1).any():
             return
         worst = shares.idxmax()

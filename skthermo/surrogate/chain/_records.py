@@ -35,7 +35,7 @@ from skthermo._validation import fit_weighted, last_step, offers, predicted_cova
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
-from skthermo.residuals.weather import SensorRegression, warn_of_unseen
+from skthermo.residuals.weather import SensorRegression, warn_of_unseen_weather
 from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
 
 MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
@@ -149,7 +149,7 @@ class TrainingRecords(SavesFrames):
                 found = reach_of(fitted, inputs[test])
                 beyond[test] = 0.0 if found is None else found[0].excess(found[1]).mean(axis=1)
         if not states:
-            warn_of_unseen(records, fold_of, "standard deviations, intervals and noise are guesses there")
+            warn_of_unseen_weather(records, fold_of, "standard deviations, intervals and noise are guesses there")
         modelled = frequencies_of(predicted)
         expected = np.full_like(modelled, np.nan)
         for fold in range(fold_of.max() + 1):

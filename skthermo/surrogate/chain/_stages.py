@@ -41,7 +41,7 @@ from skthermo._validation import (
     offers,
     predicted_covariance,
     reach_of,
-    told_by_fleet,
+    rows_from_fleet,
     warn_of_fleet,
 )
 from skthermo.exceptions import (
@@ -54,7 +54,7 @@ from skthermo.exceptions import (
     WeatherWarning,
 )
 from skthermo.fem import FEModel, shape_components
-from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, told_fills, told_unpredicted
+from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse import InverseSurrogate, ShapeInputs, unconverged
@@ -412,10 +412,10 @@ class ThermalModel(SavesFrames):
         """Warnings about what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
         consequence = "standard deviations and intervals of predictions are widened by what that costs"
-        message = told_fills(weather.deviations, column_names(filled, "T"), consequence)
+        message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
         if message:
             yield RecordsWarning(message, "filled temperatures")
-        message = told_unpredicted(unknown, as_floats(filled))
+        message = unpredicted_text(unknown, as_floats(filled))
         if message:
             yield UnevaluatedRowsWarning(message, "rows that cannot be predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
@@ -423,7 +423,7 @@ class ThermalModel(SavesFrames):
         if message:
             yield WeatherWarning(message, "weather outside the training range")
         consequence = "standard deviations and intervals say how uncertain that is"
-        warn_of_fleet(told_by_fleet(self.mapper, filled), consequence)
+        warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
         message = self.sensors.warning(weather.given)
         if message:
             yield RecordsWarning(message, "sensor apart from others")

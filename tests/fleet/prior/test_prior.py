@@ -139,7 +139,7 @@ def test_families_join_names_and_none_is_never_pooled():
     assert mapper.pooling_probability_[None] == 0.0
 
 
-def test_a_covariate_foretells_what_it_moves():
+def test_a_covariate_predicts_what_it_moves():
     spans = np.linspace(20, 60, 12)
     laws = [LAW * span / 40 for span in spans]
     bridges = {i: records(i, law=law)[:2] for i, law in enumerate(laws)}

@@ -153,7 +153,7 @@ def test_without_drift_none_is_claimed(healthy):
     assert ((bands["ci_low"] < 1) & (bands["ci_high"] > 1)).all()
 
 
-def test_one_year_is_told_with_wide_bands(ageing):
+def test_one_year_is_reported_with_wide_bands(ageing):
     campaign, fem = ageing
     T, F = campaign.temperatures[:365], campaign.frequencies[:365]
     found = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
@@ -204,7 +204,7 @@ def test_days_and_modes_may_be_missing(ageing, history):
     assert table["ci_low"].iloc[-1] < 1 - 0.02 * 7 * (len(found.days) - 1) / 365 < table["ci_high"].iloc[-1]
 
 
-def test_filled_temperatures_are_told_once(healthy):
+def test_filled_temperatures_are_reported_once(healthy):
     campaign, fem = healthy
     T, F = campaign.temperatures.copy(), campaign.frequencies
     T.iloc[30:50, 0] = np.nan

@@ -1,15 +1,16 @@
 """Does simulation rank detectors as real damage does? The field's detectors on the Z24 bridge, simulated and measured.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/z24_bench.py [DATA]
+    OMP_NUM_THREADS=1 python tests/benchmarks/z24_detectors.py [DATA]
 
 DATA is the file or folder of Z24, by default the folder that SKTHERMO_DATA names. Detectors learn the first four fifths
 of the healthy records. Rates of alarms on the last fifth and on the records after damage began stand beside those that
 the FE model simulates in the same weather: (a) by a chain of all healthy records, with the damage that was identified,
 drawn with its uncertainty; (b) by a chain of the detectors' own baseline, with an assumed damage of the soil of 18 %.
-The band holds 95 % of simulated campaigns: noise is in it and, in (a), uncertain severities; another baseline or an
+The band covers 95 % of simulated campaigns: it includes noise and, in (a), uncertain severities; another baseline or an
 error of the model is not. Then simulation chooses a detector from the baseline alone, by damage of every group, and the
-choice is judged by the measured records. The exit code is 1 if a target is missed, as two are: the chain of (b) has to
-go on into weather that is warmer than all that it learned, and the choice is between detectors that are nearly equal.
+choice is checked against the measured records. The exit code is 1 if a target is missed, as two are: the chain of (b)
+has to go on into weather that is warmer than all that it learned, and the choice is between detectors that are nearly
+equal.
 """
 
 import argparse
@@ -22,8 +23,8 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
 
-import z24_bench_recipes as z24_bench
 import z24_damage_recipes as z24_damage
+import z24_detector_recipes as comparison
 import z24_recipes as z24
 
 TARGETS = {  # rank correlation, share in the band
@@ -47,10 +48,10 @@ SHOWN = [
 
 def print_agreement(name, results):
     """Rates of all detectors, and how well they agree; the number of missed targets."""
-    table = z24_bench.side_by_side(results)
+    table = comparison.side_by_side(results)
     print(table.round(1).to_string(), end="\n\n")
     missed = 0
-    for state, row in z24_bench.agreement(table).iterrows():
+    for state, row in comparison.agreement(table).iterrows():
         for what, value, target in zip(("rank correlation", "in the band"), row, TARGETS[name, state], strict=False):
             verdict = "" if target is None else f", target {target}: {'met' if value >= target else 'MISSED'}"
             missed += target is not None and value < target
@@ -62,7 +63,7 @@ def print_agreement(name, results):
 
 
 def print_choice(study, measured):
-    """The ranking, what those that are not clearly behind find on measured records, and whether the first does."""
+    """The ranking, what those that are not significantly worse find on measured records, and whether the first does."""
     ranking = study.ranking(max_false_alarms=LIMIT)
     equal = study.ranking(max_false_alarms=LIMIT, by="pod_at_equal_pfa").index[0]
     print((ranking[SHOWN].astype(float)).round(3).to_string(), end="\n\n")
@@ -73,7 +74,7 @@ def print_choice(study, measured):
     print(f"chosen: {first}; measured: {false[first]:.1f} % false alarms, {found[first]:.1f} % found; target at most")
     print(f"{MOST_FALSE:g} and at least {LEAST_FOUND:g} %: {'met' if met else 'MISSED'}")
     others = [f"{name} {false[name]:.1f} / {found[name]:.1f}" for name in tied if name != first]
-    print(f"not clearly behind, measured false alarms / found, %: {', '.join(others) or 'none'}")
+    print(f"not significantly worse, measured false alarms / found, %: {', '.join(others) or 'none'}")
     print(f"first at equal false alarms: {equal} {false[equal]:.1f} / {found[equal]:.1f}\n", flush=True)
     return not met
 
@@ -86,22 +87,22 @@ def main():
     warnings.filterwarnings("ignore")  # of weather outside the baseline's, of short baselines; the pages explain them
     bridge, began = z24.Bridge(z24.find(options.data and Path(options.data))), time.perf_counter()
     with tempfile.TemporaryDirectory() as memory:
-        candidates = z24_bench.detectors(memory)
+        candidates = comparison.detectors(memory)
         print("(a) chain of all healthy records, identified damage\n")
         fem, found = z24_damage.identify(bridge)
-        results = z24_bench.bench(bridge, fem, found.scenario(z24_bench.DAMAGED), candidates, options.repeats)
+        results = comparison.compare(bridge, fem, found.scenario(comparison.DAMAGED), candidates, options.repeats)
         missed, measured = print_agreement("a", results)
         print("(b) chain of the first four fifths, soil -18 %\n")
-        results = z24_bench.bench_of_a_warning(bridge, candidates=candidates, n_repeats=options.repeats)
+        results = comparison.compare_before_damage(bridge, candidates=candidates, n_repeats=options.repeats)
         missed += print_agreement("b", results)[0]
         print("The assumed damage by the chain of all healthy records, which knows the warm weather\n")
-        scenario = z24_bench.Scenario(z24_bench.DAMAGED, z24_bench.ASSUMED)
-        results = z24_bench.bench(bridge, fem, scenario, candidates, options.repeats)
-        print(z24_bench.agreement(z24_bench.side_by_side(results)).round(3).to_string(), end="\n\n", flush=True)
+        scenario = comparison.Scenario(comparison.DAMAGED, comparison.ASSUMED)
+        results = comparison.compare(bridge, fem, scenario, candidates, options.repeats)
+        print(comparison.agreement(comparison.side_by_side(results)).round(3).to_string(), end="\n\n", flush=True)
         print("Choice, in the last quarter of the baseline's weather, of detectors that have learned the others\n")
-        missed += print_choice(z24_bench.choose(bridge, candidates), measured)
+        missed += print_choice(comparison.choose(bridge, candidates), measured)
         print("For comparison: the weather that the detectors have learned\n")
-        print_choice(z24_bench.choose(bridge, candidates, ahead=False), measured)
+        print_choice(comparison.choose(bridge, candidates, ahead=False), measured)
     print(f"{missed} targets missed; {time.perf_counter() - began:.0f} s")
     return 1 if missed else 0
 

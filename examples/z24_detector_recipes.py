@@ -59,7 +59,7 @@ def short_baselines(records, candidates, shares=(0.4, 0.5, 0.6, 0.8)):
     return pd.DataFrame(rows).sort_index(axis=1, ascending=[False, True])
 
 
-def bench(bridge, fem, damage, candidates=None, n_repeats=40):
+def compare(bridge, fem, damage, candidates=None, n_repeats=40):
     """Rates of alarms that a chain simulates beside the measured ones: later healthy records, and the damaged month."""
     records, later = Records.of(bridge), bridge.split()[2]
     results = []
@@ -74,10 +74,10 @@ def bench(bridge, fem, damage, candidates=None, n_repeats=40):
     return pd.concat(results, ignore_index=True)
 
 
-def bench_of_a_warning(bridge, **options):
-    """The bench of a chain that has learned the baseline alone, and an assumed damage, as before the first alarm."""
+def compare_before_damage(bridge, **options):
+    """The same for a chain that has learned the baseline alone and an assumed damage, as before the first alarm."""
     fem = chain(bridge_model()).fit(*bridge.split()[:2])
-    return bench(bridge, fem, Scenario(DAMAGED, ASSUMED), **options)
+    return compare(bridge, fem, Scenario(DAMAGED, ASSUMED), **options)
 
 
 def side_by_side(results):
