@@ -199,7 +199,7 @@ class TestRows:
         assert any(f"{(alarms == 0).sum()} of 73 rows cannot be predicted" in text for text in texts)
 
     def test_several_detectors_tell_it_once(self):
-        parts = [("lines", detector(LinearRegression())), ("ridge", detector(Ridge())), ("chain", detector(chain()))]
+        parts = [(f"ridge {alpha}", detector(Ridge(alpha))) for alpha in (0, 1, 2)]
         fused, _ = said(FusedDetector(parts, 0.1).fit, X)
         for holed, message in (
             (without([3], list(T)), "1 without any temperature"),

@@ -186,6 +186,7 @@ def test_calculix(job):
         np.testing.assert_allclose(ours, np.float64(found[:4]), rtol=5e-7)
 
 
+@pytest.mark.nightly
 def test_calculix_by_hand(job):
     folder = job / "bridge"
     folder.mkdir()

@@ -91,6 +91,7 @@ def test_one_row_for_each_detector_and_scenario(study):
         )
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("name", list(detectors()))
 def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
     alone = study_of(fem, detectors()[name], SCENARIOS, n_repeats=3)

@@ -194,6 +194,7 @@ class TestWarningsOfFit:
         with pytest.warns(UserWarning, match=r"of 365 rows give parameters far outside .* trained in 0.95 to 1.05"):
             chain(inverse=narrow).fit(T, F)
 
+    @pytest.mark.one_case
     @pytest.mark.parametrize("noise", [0.0, 0.01])
     def test_clean_campaigns_give_no_warning(self, noise):
         year = make_truss_campaign(noise=noise, random_state=3)
