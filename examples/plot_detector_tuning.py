@@ -24,7 +24,7 @@ from tuning_recipes import GRID, LIMIT, detector, fitted_chain, true_score, true
 from skthermo.studies import detection_task, sweep
 
 options = command_line().parse_args()
-warnings.filterwarnings("ignore", message=".*far outside the bounds")  # some of the coldest records, by their noise
+warnings.filterwarnings("ignore", message=".*outside-prior")  # some of the coldest records, by their noise
 
 # %%
 # A baseline

@@ -203,7 +203,7 @@ PredictionDisplay.from_predictions(F, history, temperature=T["T2"])
 # What if the records are wrong?
 # ------------------------------
 # Typical mistakes, made on purpose in the first 400 records. Every one is named by a warning or refused with an error,
-# and correct records cause neither. :doc:`/guide/troubleshooting` says what to do about each.
+# and correct records cause neither. :doc:`/guide/warnings` says what to do about each.
 
 T, F = T[:400], F[:400]
 swapped = F.rename(columns={"f2": "f3", "f3": "f2"})[list(F)]

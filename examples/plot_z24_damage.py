@@ -32,7 +32,7 @@ from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
 from skthermo.surrogate import TemperatureMapper
 
 bridge, folder = read_arguments()
-warnings.filterwarnings("ignore", r"\d+ of \d+ rows have temperatures far outside")
+warnings.filterwarnings("ignore", ".*outside-training-weather")
 records = Records.of(bridge)
 
 # %%

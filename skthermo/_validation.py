@@ -461,5 +461,5 @@ def warn_of_fleet(rows: NDArray[np.bool_], consequence: str) -> None:
             f"{rows.sum()} of {len(rows)} rows are in weather that the training records have not seen, and rely on "
             f"what the fleet has shown there: {consequence}",
             WeatherWarning,
-            "rows that rely on the fleet",
+            "rows-from-fleet",
         )

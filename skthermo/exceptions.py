@@ -1,4 +1,4 @@
-"""Kinds of warnings, which Python's own filters distinguish."""
+"""Categories of warnings, for Python's filters."""
 
 __all__ = [
     "FewRecordsWarning",
@@ -19,7 +19,8 @@ class SkthermoWarning(UserWarning):
     message : str, default=""
         Text of the warning.
     kind : str, default=""
-        A few words that name what the warning is about, such as "few rows".
+        Code of what the warning is about, such as "few-rows". The text ends with it in brackets; the guide's page on
+        warnings has an entry of this name.
 
     Examples
     --------
@@ -32,6 +33,9 @@ class SkthermoWarning(UserWarning):
     def __init__(self, message: str = "", kind: str = ""):
         super().__init__(message)
         self.kind = kind
+
+    def __str__(self) -> str:
+        return f"{super().__str__()} [{self.kind}]" if self.kind else super().__str__()
 
 
 class RecordsWarning(SkthermoWarning):

@@ -207,6 +207,14 @@ def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit
     assert loaded.stdout.split() == ["[]", "[]"]
 
 
+def test_a_job_with_a_monitor_loads_no_chain_no_study_and_no_fleet():
+    unwanted = ("scipy.io", *(f"skthermo.{room}" for room in ("surrogate", "studies", "fleet", "updating", "datasets")))
+    code = "import sys, skthermo.commands.main, skthermo.reporting; "
+    code += f"print([m for m in {unwanted} if m in sys.modules])"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert loaded.stdout.split() == ["[]"]
+
+
 def test_a_missing_extra_is_named():
     assert import_optional("json", extra="plot").dumps([1]) == "[1]"
     with pytest.raises(ImportError, match="'no_such_module'"):

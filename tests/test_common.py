@@ -49,16 +49,15 @@ from skthermo.updating import ModelUpdater
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
 
 pytestmark = [  # scikit-learn checks detectors on 20 to 50 rows
-    pytest.mark.filterwarnings(f"ignore:.* {cause}")
+    pytest.mark.filterwarnings(f"ignore:.*{cause}")
     for cause in (
-        "independent baseline (records|windows) are too few",
-        "depend on each other in time and count as",
-        "far above the",
-        "look like degrees Fahrenheit",
-        "are implausible: ",  # of normal values about 100, those above, as temperatures
-        "explain nothing of the frequencies",
-        "change at once by what the weather does not explain",
-        r"rows are not evaluated \(predict gives 0\), the first row 0.*. their windows",
+        "few-baseline-records",
+        "high-threshold",
+        "fahrenheit",
+        "implausible-values",  # of normal values about 100, those above, as temperatures
+        "no-thermal-effect",
+        "sudden-change",
+        "windows.*not-evaluated",
     )
 ]
 
@@ -138,7 +137,7 @@ def shown(estimator):
     return " ".join(repr(estimator).split())
 
 
-@pytest.mark.filterwarnings("ignore:lags reach")  # before rows that are not those of fit
+@pytest.mark.filterwarnings("ignore:.*no-earlier-records")  # before rows that are not those of fit
 @pytest.mark.parametrize(
     "estimator", [*ESTIMATORS, *(pytest.param(one, marks=pytest.mark.nightly) for one in OTHER_SETTINGS)], ids=shown
 )
@@ -260,7 +259,7 @@ def test_every_estimator_is_listed():
     assert estimators == {type(estimator) for estimator in listed}
 
 
-@pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
+@pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
 def test_fitted_state_has_a_trailing_underscore():
     cases = [(estimator, fitted(estimator, RECORDS)) for estimator in TRANSFORMERS_AND_DETECTORS]
     cases += [(estimator, fitted(estimator, *data)) for estimator, data in BOUND]
@@ -275,7 +274,7 @@ def test_fitted_state_has_a_trailing_underscore():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
-@pytest.mark.filterwarnings(r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside")
+@pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
 def test_metadata_routing_changes_no_result():
     def results(estimator, data):
         fit = fitted(estimator, *data)
@@ -314,7 +313,7 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
-@pytest.mark.filterwarnings("ignore:1 of 60 rows cannot be predicted")
+@pytest.mark.filterwarnings("ignore:1 of 60.*not-predicted")
 @pytest.mark.parametrize("estimator", TRANSFORMERS_AND_DETECTORS, ids=lambda estimator: type(estimator).__name__)
 def test_fitted_estimators_are_pickled(estimator):
     fitted = pickle.loads(pickle.dumps(estimator)).fit(RECORDS)

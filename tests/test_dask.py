@@ -20,8 +20,8 @@ from tests.fem.frames import FRAME
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
 pytestmark = pytest.mark.filterwarnings(
     "default",  # Dask's own warnings are not tested
-    r"ignore:\d+ of \d+ rows (give parameters|have temperatures) far outside",
-    "ignore:modes change their order",
+    "ignore:.*(outside-prior|outside-training-weather)",
+    "ignore:.*modes-cross",
 )
 
 TRUSS = make_truss()

@@ -23,8 +23,8 @@ ROOMS = [name for name in PACKAGES if importlib.import_module(f"skthermo.{name}"
 README, HOME = ROOT / "README.md", ROOT / "docs" / "index.rst"
 LONG = {  # pages whose code takes seconds
     "accuracy_kw51.rst", "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "many_bridges.rst",
-    "method.rst", "models.rst", "preparing_records.rst", "records_theory.rst", "report.rst", "studies.rst",
-    "three_steps.rst", "validation.rst",
+    "method.rst", "models.rst", "preparing_records.rst", "rank_detectors.rst", "records_theory.rst", "report.rst",
+    "studies.rst", "three_steps.rst", "validation.rst",
 }  # fmt: skip
 
 
@@ -52,7 +52,7 @@ def run_code(page):
     return namespace
 
 
-@pytest.mark.filterwarnings("ignore:.*see fleet.warnings")  # what is doubtful about a fleet's bridges, counted
+@pytest.mark.filterwarnings("ignore:.*bridges-warned")  # what is doubtful about a fleet's bridges, counted
 @by_page(lambda page: page not in (README, HOME) and python_blocks(page))
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_code_runs_from_top_to_bottom(page):

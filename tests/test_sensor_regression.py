@@ -123,4 +123,4 @@ def test_compensator_and_chain_warn_of_a_sensor_that_departs():
     for evaluate in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
         with pytest.warns(RecordsWarning, match=f"'{name}'") as caught:
             evaluate()
-        assert sum(warning.message.kind == "sensor apart from others" for warning in caught) == 1
+        assert sum(warning.message.kind == "sensor-disagrees" for warning in caught) == 1

@@ -98,7 +98,7 @@ def counted_warnings() -> Iterator[Counter[tuple[str, str]]]:
             yield counts
         finally:
             kinds = (getattr(one.message, "kind", one.category.__name__) for one in caught)
-            counts.update(zip(kinds, (str(one.message) for one in caught), strict=True))
+            counts.update(zip(kinds, (_text_of(one) for one in caught), strict=True))
 
 
 def _may_filter() -> bool:
@@ -204,20 +204,26 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
         detectors = dict.fromkeys(repr(one.message.detector) for one in same if hasattr(one.message, "detector"))
         notes = [f"detectors {', '.join(detectors)}"] if detectors else []
         notes += [f"and {len(same) - 1} times more {where}"] if len(same) > 1 and where else []
-        texts.append(f"{same[0].message} ({'; '.join(notes)})" if notes else str(same[0].message))
-        _again(same[0], texts[-1])
+        if notes:
+            vars(same[0])["message"].args = (f"{_text_of(same[0])} ({'; '.join(notes)})",)
+        texts.append(str(same[0].message))
+    give_again(same[0] for same in alike.values())
 
 
 def give_again(caught: Iterable[warnings.WarningMessage]) -> None:
     """Give warnings that were recorded, those for users at the user's line of now."""
     for one in caught:
-        _again(one, str(one.message))
+        _again(one)
 
 
-def _again(caught: warnings.WarningMessage, text: str) -> None:
+def _text_of(caught: warnings.WarningMessage) -> str:
+    """What a warning says, without the code of its kind."""
+    return caught.message.args[0] if isinstance(caught.message, SkthermoWarning) else str(caught.message)
+
+
+def _again(caught: warnings.WarningMessage) -> None:
     warning: Any = caught.message
-    warning.args = (text,)
     if isinstance(warning, SkthermoWarning) or caught.category is UserWarning:
-        _give(warning, f"again: {text}")
+        _give(warning, f"again: {warning}")
     else:
         warnings.warn_explicit(warning, caught.category, caught.filename, caught.lineno)

@@ -17,7 +17,6 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 import scipy.sparse
 
-from skthermo._io._child import read
 from skthermo._io._text_matrices import Labelled
 from skthermo._tables.arrays import Label, Matrix
 
@@ -72,6 +71,8 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
     """Run the child; how it ended."""
     name = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not name.startswith(("python", "pypy")):  # a program that embeds Python
+        from skthermo._io._child import read  # with SciPy's readers, which only the child needs otherwise
+
         for file, form in json.loads(job)["files"]:
             pickle.dump(read(file, form), output)
         return "failed"

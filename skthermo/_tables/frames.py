@@ -154,7 +154,7 @@ def warn_of_markers(X: ArrayLike) -> None:
             f"{marked.sum()} of {marked.size} values look as if they stood for missing ones, the first "
             f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
             RecordsWarning,
-            "markers",
+            "placeholders",
         )
 
 

@@ -221,7 +221,7 @@ def update(bridge: Bridge, done: Done, files: Sequence[Path] = ()) -> None:
         monitor, taken = bridge.load(), Taken.read(bridge.taken_file)
         before = monitor.counts_
         new = _given(bridge, files, monitor, done) if files else _found(bridge, taken, monitor, done)
-        with reported_by_caller({"records not evaluated"}):  # said below, with all reasons
+        with reported_by_caller({"not-evaluated"}):  # said below, with all reasons
             evaluated, handed = _taken_in(monitor, new, bridge, done)
         if len(evaluated):
             monitor.save(bridge.monitor_file)

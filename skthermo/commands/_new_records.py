@@ -184,6 +184,6 @@ def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> t
             f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}; "
             f"{len(whole)} records have all columns",
             RecordsWarning,
-            "stamps of files",
+            "unmatched-stamps",
         )
     return _once(whole).sort_index(), [list(table) for table in tables]

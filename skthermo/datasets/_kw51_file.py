@@ -119,7 +119,7 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
             f"{file} has the MD5 checksum {md5}; expected {PUBLISHED_MD5}, that of the published trackedmodes.zip: its "
             "content may differ from what was published",
             RecordsWarning,
-            "another KW51 file",
+            "other-kw51-file",
         )
     return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
 
@@ -155,7 +155,7 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
             f"{file}: field 'env' has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, "
             f"column {channels[column]!r}: {env[row, column]:g}; expected measured values, or NaN",
             RecordsWarning,
-            "stand-ins",
+            "placeholders",
         )
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):

@@ -21,7 +21,7 @@ from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.preprocessing import gross_errors
 
-OF_ORDER = {"repeated stamps", "unsorted stamps"}  # which only what looks at earlier records depends on
+OF_ORDER = {"repeated-stamps", "unsorted-stamps"}  # which only what looks at earlier records depends on
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -280,5 +280,5 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
             f"{self._cause(X, rows)}",
             UnevaluatedRowsWarning,
-            "rows not evaluated",
+            "not-evaluated",
         )

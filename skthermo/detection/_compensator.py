@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.model_selection import BaseCrossValidator
 
+from skthermo._estimators.answers import answer_once
 from skthermo._estimators.warnings import (
     explain_rows,
     explained_rows,
@@ -407,23 +408,27 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Frequencies and weather of new records, residuals in Hz, errors of predictions, rows without a prediction."""
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
+        predict = partial(self._predicted, temperatures)
+        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
+
+    def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
+        """Weather of new records, predictions in Hz, their errors, and the rows without any."""
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
         outside = reach.warning(inputs)
         if outside:
-            warn_user(outside, WeatherWarning, "weather outside the training range")
+            warn_user(outside, WeatherWarning, "outside-training-weather")
         warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
         apart = self.sensors_.warning(temperatures)
         if apart:
-            warn_user(apart, RecordsWarning, "sensor apart from others")
+            warn_user(apart, RecordsWarning, "sensor-disagrees")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
-        residuals = as_floats(frequencies) - predicted
         fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
-        errors = self.regression_.errors(filled).plus(fills, len(residuals))
-        return frequencies, weather, residuals, errors, unknown
+        return weather, predicted, self.regression_.errors(filled).plus(fills, len(predicted)), unknown
 
     def _split(self, X: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies of new records, with a warning of values that are none."""
@@ -435,7 +440,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         try:
             check_temperatures(named.drop(columns=names[self.targets_]))
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error), RecordsWarning, "temperatures")
+            warn_user(str(error), RecordsWarning, "implausible-temperatures")
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:
@@ -529,7 +534,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
             "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
             FewRecordsWarning,
-            "lags without stamps",
+            "lags-without-stamps",
         )
         return "contiguous"
 
@@ -540,7 +545,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     consequence = "the spread of residuals is widened by what that costs"
     message = filled_text(deviations, column_names(temperatures, "x"), consequence)
     if message:
-        warn_user(message, RecordsWarning, "filled temperatures")
+        warn_user(message, RecordsWarning, "filled-temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -550,7 +555,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     others = "of which the estimator predicts nothing, as where lags reach to no record"
     message = unpredicted_text(unknown & ~explained_rows(predicted), weather, others)
     if message:
-        warn_user(message, UnevaluatedRowsWarning, "rows that cannot be predicted")
+        warn_user(message, UnevaluatedRowsWarning, "not-predicted")
     return unknown
 
 

@@ -34,11 +34,11 @@ from skthermo.residuals.folds import Folds
 from skthermo.residuals.weather import PredictionError, TrainingRange
 
 REPORTED = (
-    "filled temperatures",
-    "rows that cannot be predicted",
-    "weather outside the training range",
-    "sensor apart from others",
-    "rows that rely on the fleet",
+    "filled-temperatures",
+    "not-predicted",
+    "outside-training-weather",
+    "sensor-disagrees",
+    "rows-from-fleet",
 )  # kinds of warnings that the compensator gives
 
 

@@ -17,7 +17,7 @@ from skthermo.detection._windows import Windows
 from skthermo.residuals.gaussian import Gaussian, check_invertible
 
 CLIPPED = 1.5  # standard deviations within a window beyond which a record moves the mean of the window no more
-OF_COLUMNS = "implausible values", "isolated level", "equal columns", "few values"  # kinds of findings
+OF_COLUMNS = "implausible-values", "isolated-level", "equal-columns", "few-values"  # kinds of findings
 SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
 
 

@@ -42,7 +42,7 @@ def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
         warn_user(
             f"the score is of {known.sum()} of {len(known)} rows: the others have no value",
             UnevaluatedRowsWarning,
-            "rows with a likelihood",
+            "rows-not-scored",
         )
     return float(densities[known].sum() / present.sum()) if known.any() else float("nan")
 

@@ -225,7 +225,7 @@ def _most_likely(F: Array, names: Sequence[str] | None) -> EmpiricalCovariance:
             f"{modes_text(pair, names)} are never there together ({(~together).sum() // 2} pairs): their correlation "
             "is a guess",
             FewRecordsWarning,
-            "modes never together",
+            "modes-never-together",
         )
     learned = Gaussian.of(F)
     scale = check_invertible(learned.covariance, F, names=names)

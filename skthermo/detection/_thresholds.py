@@ -69,7 +69,7 @@ def conformal_threshold(
             f"{contamination:.2g}: the threshold is the largest index, which later ones exceed at a rate of about "
             f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
             FewRecordsWarning,
-            "few records for a threshold",
+            "few-baseline-records",
         )
     elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
         warn_user(
@@ -77,7 +77,7 @@ def conformal_threshold(
             f"independent ones: false alarms are {contamination:.2g} of the records on the mean over such baselines, "
             f"but may be far more or fewer after this one; expected {FEWEST_INDEPENDENT} independent ones or more",
             FewRecordsWarning,
-            "few records for a threshold",
+            "few-baseline-records",
         )
     return threshold
 
@@ -95,5 +95,5 @@ def warn_of_blindness(own: Array, threshold: float, contamination: float, seen_a
             f"far from all others{seen_at(threshold)}; expected a longer baseline, or one without outliers "
             "(threshold='quantile' takes the lower one, with more false alarms)",
             FewRecordsWarning,
-            "few records for a sensitive threshold",
+            "high-threshold",
         )

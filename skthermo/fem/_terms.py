@@ -34,7 +34,7 @@ def warn_of_failures(theta: Array, solved: Array) -> None:
             f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
             f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
             ModelWarning,
-            "no solution",
+            "no-solution",
         )
 
 

@@ -150,7 +150,7 @@ def fit_fleet(
             "had evaluated and their events; files ending in .replaced hold these: expected Fleet(folder) to go on "
             "with them as they were",
             SkthermoWarning,
-            "monitors that begin again",
+            "monitors-restarted",
         )
     return fleet
 

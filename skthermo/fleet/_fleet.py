@@ -480,7 +480,7 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
             f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}; "
             "expected none: see fleet.errors",
             SkthermoWarning,
-            "bridges that failed",
+            "bridges-failed",
         )
     warned = fleet.warnings
     warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
@@ -488,5 +488,5 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
         warn_user(
             f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}; see fleet.warnings",
             SkthermoWarning,
-            "warnings of bridges",
+            "bridges-warned",
         )

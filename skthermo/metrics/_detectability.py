@@ -215,6 +215,6 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
             f"{len(index) - len(present)} of {len(index)} records are not evaluated, their damage index is NaN: the "
             f"rate is that of the other {len(present)}",
             UnevaluatedRowsWarning,
-            "records not evaluated",
+            "not-evaluated",
         )
     return float((present > limit).mean()) if present.size else float("nan")

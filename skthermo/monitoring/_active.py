@@ -266,7 +266,7 @@ class ActiveDetector(SavesFrames):
                 f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
                 "another detector, or more false alarms a year",
                 ResultWarning,
-                "blind detector",
+                "blind-detector",
             )
 
     def _check_memory(self) -> None:

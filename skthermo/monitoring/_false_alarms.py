@@ -337,7 +337,7 @@ def _warn_of_baseline(
             f"the baseline has no record of {missing_season}: the number of false alarms a year is that of the other "
             "seasons, and there is no estimate for these; expected a whole year",
             WeatherWarning,
-            "seasons without baseline",
+            "missing-seasons",
         )
     if asked < FAR:
         warn_user(
@@ -346,7 +346,7 @@ def _warn_of_baseline(
             f"{asked:.2g} events are asked for in its time. {'' if seen is None else f'Now {seen}. '}Expected {FAR} or "
             "more events in its time: a longer baseline or more alarms a year",
             FewRecordsWarning,
-            "threshold beyond the baseline",
+            "extrapolated-threshold",
         )
     elif seen is not None and seen.is_large:
         warn_user(
@@ -354,7 +354,7 @@ def _warn_of_baseline(
             f"alarm from {100 * LARGE:g} % of all responses on: more records in a window, less scatter, or more alarms "
             "a year",
             ResultWarning,
-            "large changes not detected",
+            "undetected-changes",
         )
     if tail.has_outlier(DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
@@ -364,7 +364,7 @@ def _warn_of_baseline(
             f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
             "without records of a fault or of another state",
             RecordsWarning,
-            "excursion of the baseline",
+            "baseline-excursion",
         )
 
 

@@ -117,7 +117,7 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
             f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}: its decisions "
             "may differ from those of the monitor that was fitted",
             SkthermoWarning,
-            "versions of a monitor",
+            "other-versions",
         )
     return monitor
 

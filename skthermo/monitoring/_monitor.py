@@ -325,7 +325,7 @@ class Monitor(SavesFrames, Estimator):
                 f"{n_markers} of {baseline.size} values of the baseline stand for missing ones, such as -999, and "
                 "are taken as missing; expected NaN there",
                 RecordsWarning,
-                "markers",
+                "placeholders",
             )
         _refuse_meaningless(trained, self.targets_, self.units_)
         trained, columns = trained[inputs], inputs if compensators else self.targets_
@@ -984,5 +984,5 @@ def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
         f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
         f"{more}",
         UnevaluatedRowsWarning,
-        "records not evaluated",
+        "not-evaluated",
     )

@@ -18,7 +18,7 @@ from skthermo._validation import with_nan
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
 TIMES_LONGEST, TIMES_USUAL = 2, 10  # the same in longest and usual steps of the baseline, if those are longer
-OF_TRAINING = frozenset({"no rows", "missing column", "constant"})  # gross errors that do no harm to a few records
+OF_TRAINING = frozenset({"no-rows", "missing-column", "constant"})  # gross errors that do no harm to a few records
 CONFIRMED = 10  # records after a jump that confirm each other
 
 

@@ -168,7 +168,7 @@ class LagFeatures(PastFeatures):
                 f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
                 f"{reach} rows before, too, or a frame on a DatetimeIndex",
                 FewRecordsWarning,
-                "padded lags",
+                "no-earlier-records",
             )
         return is_warned & (np.arange(n_rows) < reach)
 
@@ -182,7 +182,7 @@ class LagFeatures(PastFeatures):
                 f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
                 f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
                 FewRecordsWarning,
-                "no records for lags",
+                "no-earlier-records",
             )
         return is_warned & unknown
 

@@ -224,7 +224,7 @@ class ExponentialMeans(PastFeatures):
             f"records since {X.index.min() if is_timed else 'the first row'}; give those of {REACH} times {reach} "
             "before, too",
             FewRecordsWarning,
-            "no records for means",
+            "no-earlier-records",
         )
         return lacking
 

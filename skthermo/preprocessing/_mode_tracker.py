@@ -386,7 +386,7 @@ def warn_of_doubts(
             f"{n_without} of {len(poles.record)} poles have a frequency but no shape: zero, or NaN at all sensors but "
             "one; they are left over",
             UnevaluatedRowsWarning,
-            "poles without shape",
+            "poles-without-shape",
         )
 
 
@@ -419,7 +419,7 @@ def _warn_of_losses(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names:
             )
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
-        warn_user("; ".join(problems[:3]) + more, UnevaluatedRowsWarning, "modes not found")
+        warn_user("; ".join(problems[:3]) + more, UnevaluatedRowsWarning, "modes-not-found")
 
 
 def _warn_of_other_shapes(
@@ -445,5 +445,5 @@ def _warn_of_other_shapes(
             "; ".join(problems[:3]) + f"{more}: expected the sensors of the reference in their order, with their signs "
             "and gains, or a lower min_mac for noisy shapes",
             RecordsWarning,
-            "modes of other shapes",
+            "other-shapes",
         )

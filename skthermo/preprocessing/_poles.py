@@ -203,7 +203,7 @@ class ReferenceModes(NamedTuple):
                 f"a frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift "
                 "or more sensors",
                 RecordsWarning,
-                "indistinguishable modes",
+                "similar-modes",
             )
 
 

@@ -24,14 +24,15 @@ from skthermo.plotting import (
     PredictionDisplay,
     StructureDisplay,
 )
-from skthermo.reporting._findings import Finding
 from skthermo.reporting._html import Html, image
 from skthermo.reporting._readable import Values, readable
-from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from skthermo.reporting._findings import Finding
+    from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
 
 
 class HasFigure(Protocol):

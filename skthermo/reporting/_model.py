@@ -134,8 +134,8 @@ def _doubts(report: FitReport) -> list[str]:
     """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
     if report.findings is not None:
-        doubts += [f"{message}." for message in report.findings.warnings()]
-    doubts += [f"{message}." for message in report.warnings()]
+        doubts += [f"{warning.args[0]}." for warning in report.findings.warnings()]
+    doubts += [f"{warning.args[0]}." for warning in report.warnings()]
     for name, deviation in report.deviations.items():
         if not deviation < LARGE_DEVIATION:
             doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")

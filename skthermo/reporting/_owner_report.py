@@ -4,26 +4,21 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
 from skthermo._io import write_when_complete
 from skthermo._tables.arrays import check_path, check_size
-from skthermo._tables.text import counted
 from skthermo.fem import Structure
-from skthermo.fleet import Fleet
-from skthermo.monitoring import Monitor
-from skthermo.reporting._answer import answer, found_and_missed
-from skthermo.reporting._choice import Choice
-from skthermo.reporting._findings import findings_of
-from skthermo.reporting._html import Html, Section, page, paragraphs
-from skthermo.reporting._identified import identified_damage
-from skthermo.reporting._model import monitored, quality
-from skthermo.reporting._settings import parameters, settings
-from skthermo.reporting.fleet import fleet_page
+from skthermo.reporting._html import page, paragraphs
 from skthermo.reporting.service import Standing, monitor_page
-from skthermo.studies import DetectabilityStudy, IdentifiedDamage
+
+if TYPE_CHECKING:  # jobs write the page on a monitor every night: studies and fleets are imported for their own pages
+    from skthermo.fleet import Fleet
+    from skthermo.monitoring import Monitor
+    from skthermo.studies import DetectabilityStudy, IdentifiedDamage
 
 KINDS = {
     "Fleet": ("chains", "monitors", "discoveries"),
@@ -143,14 +138,15 @@ def owner_report(
         raise NotFittedError("the monitor is not fitted yet; expected a call of fit before")
     if kind == "DetectabilityStudy" and not hasattr(subject, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
-    for name, value, expected in (
-        ("identified", identified, IdentifiedDamage),
-        ("title", title, str),
-        ("structure", structure, Structure),
-    ):
-        if value is not None and not isinstance(value, expected):
-            raise ValueError(f"{name} is {value!r:.200}; expected a {expected.__name__}")
-    given = {"identified": identified, "structure": structure, "detector": detector, "now": now}
+    types = {"title": str, "structure": Structure}
+    if identified is not None:
+        from skthermo.reporting._identified import IdentifiedDamage, identified_damage
+
+        types["identified"] = IdentifiedDamage
+    given = {"identified": identified, "title": title, "structure": structure, "detector": detector, "now": now}
+    for name, expected in types.items():
+        if given[name] is not None and not isinstance(given[name], expected):
+            raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
     for name, kinds in ONLY_FOR.items():
         if given[name] is not None and kind not in kinds:
             raise ValueError(f"{name} given for a {type(subject).__name__}; expected only for a {' or a '.join(kinds)}")
@@ -165,54 +161,18 @@ def owner_report(
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
     heading = HEADINGS[kind] if title is None else title
     if kind == "Fleet":
+        from skthermo.reporting.fleet import fleet_page
+
         check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)
     elif kind == "Monitor":
         introduction, sections = monitor_page(Standing.of(subject, now, limit))
         sections[-1:-1] = [] if identified is None else [identified_damage(identified)]
     else:
+        from skthermo.reporting._study import study_page
+
         introduction, sections = study_page(subject, identified, structure, detector, max_false_alarms)
     written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
     ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
     write_when_complete(file, page(heading, introduction, sections, ending))
     return file
-
-
-def study_page(
-    study: DetectabilityStudy,
-    identified: IdentifiedDamage | None,
-    structure: Structure | None,
-    detector: str | None,
-    max_false_alarms: float,
-) -> tuple[Html, list[Section]]:
-    """What stands above the sections, and these."""
-    choice = None
-    n_states = counted(study.results_["scenario"].nunique(), "state")
-    said = [f"The alarm system was tested by simulation, in {n_states} of the structure."]
-    if study.results_["detector"].nunique() > 1:
-        choice = Choice.of(study, detector, max_false_alarms)
-        n_systems = counted(len(choice.ranking), "alarm system")
-        said = [f"{n_systems} were tested by simulation, in {n_states} of the structure.", choice.sentence()]
-        study = choice.only()
-    elif detector is not None:
-        study.detector_name(detector)
-    findings = findings_of(study)
-    parts = {"model": study.fem, "alarm system": study.detectors_[study.detector_name()], "study": study}
-    warned = [*getattr(study, "warnings_", [])]
-    warned += [f"Identified damage: {text}" for text in ([] if identified is None else identified.warnings())]
-    caption = "Settings of the model, of the alarm system and of the study."
-    sections = [
-        answer(study, findings, [] if identified is None else identified.answer()),
-        None if choice is None else choice.section(),
-        monitored(study, structure, [found.family for found in findings]),
-        quality(study),
-        found_and_missed(study, findings),
-        None if identified is None else identified_damage(identified),
-        settings(
-            "For the engineer who repeats this study.",
-            caption,
-            parameters(parts, but=("study: fem", "study: detectors", "study: scenarios")),
-            warned,
-        ),
-    ]
-    return paragraphs(*said), [one for one in sections if one is not None]

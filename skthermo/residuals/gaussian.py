@@ -108,25 +108,40 @@ class Gaussian:
 def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:
     """Centred rows in standard deviations and uncorrelated, each by one of several covariances."""
     present = ~np.isnan(centred)
-    (roots, _), case = _whitenings_of(covariances, which, present)
-    filled = np.nan_to_num(centred)
-    white = filled @ roots[0] if len(roots) == 1 else np.einsum("ij,ijk->ik", filled, roots[case])
-    return np.where(present, white, np.nan)
+    return whitenings_of(covariances, which, present).white(centred)
 
 
 def log_determinants(covariances: Array, which: NDArray[np.intp], present: Mask) -> Array:
     """Logarithms of the determinants of one of several covariances for each row, in the modes that it has."""
-    (_, logarithms), case = _whitenings_of(covariances, which, present)
-    return logarithms[case]
+    return whitenings_of(covariances, which, present).log_determinants
 
 
-def _whitenings_of(
-    covariances: Array, which: NDArray[np.intp], present: Mask
-) -> tuple[tuple[Array, Array], NDArray[np.intp]]:
-    """The `whitenings` of each pair of a covariance and a mask that rows have, and the pair of each row."""
+@dataclass(frozen=True)
+class Whitenings:
+    """The `whitenings` of the pairs of a covariance and a mask that rows have, and the pair of each row."""
+
+    roots: Array
+    logarithms: Array
+    pair: NDArray[np.intp]
+
+    def white(self, centred: Array) -> Array:
+        """Centred rows in standard deviations and uncorrelated."""
+        filled = np.nan_to_num(centred)
+        many = len(self.roots) > 1
+        white = np.einsum("ij,ijk->ik", filled, self.roots[self.pair]) if many else filled @ self.roots[0]
+        return np.where(np.isnan(centred), np.nan, white)
+
+    @property
+    def log_determinants(self) -> Array:
+        """Of the covariance of each row, in the modes that it has."""
+        return self.logarithms[self.pair]
+
+
+def whitenings_of(covariances: Array, which: NDArray[np.intp], present: Mask) -> Whitenings:
+    """The whitenings of rows, each with one of several covariances and a mask of the modes that it has."""
     masks, pattern = patterns(present)
-    cases, case = np.unique(which * len(masks) + pattern, return_inverse=True)
-    return whitenings(covariances[cases // len(masks)], masks[cases % len(masks)]), case
+    cases, pair = np.unique(which * len(masks) + pattern, return_inverse=True)
+    return Whitenings(*whitenings(covariances[cases // len(masks)], masks[cases % len(masks)]), pair)
 
 
 def precisions(covariance: Array, masks: Mask) -> Array:
@@ -255,7 +270,7 @@ def _settled(step: Callable[[Array], Array], n_rows: int, n_modes: int) -> tuple
             f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
             "part of it nearly undetermined",
             ResultWarning,
-            "covariance with gaps",
+            "covariance-with-gaps",
         )
     return state[0], state[1:]
 

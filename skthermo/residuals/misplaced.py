@@ -49,13 +49,13 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
             f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and together "
             "with them; expected all modes among the targets, and only temperatures beside them, since a mode that "
             "predicts the others hides damage",
-            "modes among temperatures",
+            "modes-among-temperatures",
         )
     if is_temperature.any():
         yield RecordsWarning(
             f"the targets {F.named(is_temperature)} behave like temperatures: they are nearly equal to others, and "
             "vary by far more than the modes; expected only frequencies among the targets",
-            "temperatures among modes",
+            "temperatures-among-modes",
         )
 
 

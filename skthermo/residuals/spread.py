@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.answers import answer_once
 from skthermo._tables.arrays import Array, patterns, spread_evenly
 from skthermo.residuals.extrapolation import Extrapolation
 from skthermo.residuals.gaussian import (
     Gaussian,
+    Whitenings,
     check_invertible,
-    log_determinants,
     no_smaller,
-    whiten_by,
     whitenings,
+    whitenings_of,
 )
 from skthermo.residuals.local_covariance import CANDIDATES, NEAR_IN_TIME, History, Smoothing, whitened
 from skthermo.residuals.weather import (
@@ -146,15 +147,15 @@ class Spread:
     def whiten(self, weather: Array, residuals: Array, errors: PredictionError | None = None) -> Array:
         """Residuals of new records in standard deviations and uncorrelated, wider where predictions have errors."""
         white = np.empty_like(residuals)
-        for rows, covariances, which in self._in_parts(weather, errors):
-            white[rows] = whiten_by(covariances, which, residuals[rows] - self.overall.mean)
+        for rows, roots in self._in_parts(weather, ~np.isnan(residuals), errors):
+            white[rows] = roots.white(residuals[rows] - self.overall.mean)
         return white
 
     def log_volumes(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
         """Logarithms of the factors by which `whiten` changes the volume of each row's values."""
         volumes = np.zeros(len(residuals))
-        for rows, covariances, which in self._in_parts(weather, errors):
-            volumes[rows] = -0.5 * log_determinants(covariances, which, ~np.isnan(residuals[rows]))
+        for rows, roots in self._in_parts(weather, ~np.isnan(residuals), errors):
+            volumes[rows] = -0.5 * roots.log_determinants
         return volumes
 
     def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
@@ -174,19 +175,21 @@ class Spread:
         return again
 
     def _in_parts(
-        self, weather: Array, errors: PredictionError | None
-    ) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
-        """Some rows after others, covariances, and which of these each row has: memory is bounded."""
-        same = self.by_weather is None and self.extrapolation is None
+        self, weather: Array, present: NDArray[np.bool_], errors: PredictionError | None
+    ) -> Iterator[tuple[slice, Whitenings]]:
+        """Some rows after others, with their whitenings: memory is bounded."""
         errors = errors or PredictionError.none()
         for rows in parts(len(weather), 2 * self.overall.covariance.size):
-            first, stop = np.searchsorted(errors.rows, [rows.start, rows.stop])
-            if same and first == stop:
-                yield rows, self.overall.covariance[np.newaxis], np.zeros(rows.stop - rows.start, dtype=np.intp)
-                continue
-            covariances = self.covariances(weather[rows])
-            covariances[errors.rows[first:stop] - rows.start] += errors.covariances[first:stop]
-            yield rows, covariances, np.arange(len(covariances))
+            some = weather[rows], present[rows], errors.of_part(rows)
+            size = self.overall.covariance.size * len(some[0])
+            yield rows, answer_once(self, some, size, partial(self._whitenings, *some))
+
+    def _whitenings(self, weather: Array, present: NDArray[np.bool_], errors: PredictionError) -> Whitenings:
+        if self.by_weather is None and self.extrapolation is None and not len(errors.rows):
+            return whitenings_of(self.overall.covariance[np.newaxis], np.zeros(len(weather), dtype=np.intp), present)
+        covariances = self.covariances(weather)
+        covariances[errors.rows] += errors.covariances
+        return whitenings_of(covariances, np.arange(len(covariances)), present)
 
 
 def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:

@@ -100,7 +100,7 @@ def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: s
                 f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
             )
     if text:
-        warn_user(text, WeatherWarning, "weather of folds")
+        warn_user(text, WeatherWarning, "weather-of-one-fold")
 
 
 @dataclass(frozen=True)
@@ -249,6 +249,11 @@ class PredictionError:
     def none(cls) -> PredictionError:
         """That of predictions of which no error is known."""
         return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
+
+    def of_part(self, rows: slice) -> PredictionError:
+        """That of some rows of a table, counted from the first of them."""
+        first, stop = np.searchsorted(self.rows, [rows.start, rows.stop])
+        return PredictionError(self.rows[first:stop] - rows.start, self.covariances[first:stop])
 
     def of_all(self, n_rows: int, n_modes: int) -> Array:
         """The covariance of each row of a table, zero where nothing is known."""

@@ -180,7 +180,7 @@ class Simulator:
                     f"{error}; all rows are solved by the full model, which takes long: expected a model updated to "
                     "the records",
                     ModelWarning,
-                    "no reduced model",
+                    "no-reduced-model",
                 )
             return cls(model, reason=NO_BASIS, usual=usual)
 
@@ -323,7 +323,7 @@ class Simulator:
                     f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
                     "the full one: the weather is outside that of the training rows",
                     ModelWarning,
-                    "outside the reduced model",
+                    "outside-reduced-model",
                 )
             frequencies[outside] = evaluate(self.model, theta[outside], n_jobs=n_jobs)
         return frequencies

@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, seem_rad_per_s
+from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, ModalModel, share_reordered
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 
@@ -50,53 +51,70 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
     return table.astype({"optimum": int})
 
 
-def unfinished(outcome: Outcome, residuals: Residuals) -> str:
+def unfinished(outcome: Outcome, residuals: Residuals) -> ModelWarning:
     """The warning about a best start that has not converged."""
     failed = f", {outcome.n_failed} of them without modes" if outcome.n_failed else ""
     weights = residuals.measured.shape_weights[residuals.weighted]
     heavier = f", shape weights of {SMALL_WEIGHT} or more" if (weights < SMALL_WEIGHT).any() else ""
-    return (
-        f"the best start has not converged in {outcome.n_evaluations} evaluations{failed}, and theta_ may not be the "
-        f"optimum: expected a higher max_iter{heavier}, or bounds within which the model has modes"
+    return ModelWarning(
+        f"the best start has not converged in {outcome.n_evaluations} evaluations{failed}. theta_ may not be the "
+        f"optimum. Raise max_iter{heavier}, or narrow bounds to where the model has modes",
+        "not-converged",
     )
 
 
-def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[str]:
+def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[ModelWarning]:
     """Warnings about measured modes that are not the modes in the updated model's columns of the same number."""
     names = np.array(measured.names)
     if not (measured.dofs.size and hasattr(model, "local_modes")):
         swapped = names[_swapped(model, theta)[measured.columns]]
         if swapped.size:
-            yield (
-                f"modes {swapped.tolist()} swap places between the nominal model and the optimum, and a sorted column "
-                "fits another mode's frequency: expected a model with track=True, or shapes"
+            yield ModelWarning(
+                f"modes {swapped.tolist()} change their order between the nominal model and the optimum. Frequencies "
+                "of other modes are fitted to theirs. Use a model with track=True, or give shapes",
+                "modes-cross",
             )
         return
     modes = paired_modes(model, measured, theta)
     unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
     if unlike.size:
-        yield f"no mode of the optimum has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC})"
+        yield ModelWarning(
+            f"no mode of the updated model has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC}). Check "
+            "the order and signs of the sensors (dofs), or leave these shapes out",
+            "foreign-shapes",
+        )
     columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
     other = names[modes.ranks != columns[measured.columns]]
     if other.size:
-        yield (
-            f"modes {other.tolist()} are by their shapes other modes of the optimum than the columns of model_ with "
-            "their numbers: expected measured modes in the model's order, or track=True where modes swap"
+        yield ModelWarning(
+            f"modes {other.tolist()} have the shapes of other modes of the updated model than those in their columns. "
+            "Put the measured modes in the model's order, or use track=True where modes change their order",
+            "mode-order",
         )
 
 
-def doubtful_parameters(names: Sequence[str], theta: Array, bounds: Array, covariance: Array | None) -> Iterator[str]:
+def doubtful_parameters(
+    names: Sequence[str], theta: Array, bounds: Array, covariance: Array | None
+) -> Iterator[ModelWarning]:
     """Warnings about parameters at their bounds and, without a prior, those that the modes do not determine."""
     at_bound = at_bounds(theta, bounds)
     if at_bound.any():
         listed = ", ".join(f"{names[i]!r} ({theta[i]:.3g})" for i in np.flatnonzero(at_bound))
-        yield f"the optimum lies at the bounds of {listed}: expected wider bounds, or another model"
+        yield ModelWarning(
+            f"the optimum lies at the bounds of {listed}. The best value may be outside. Widen bounds, or correct what "
+            "the model lacks",
+            "at-bounds",
+        )
     if covariance is not None:
         deviations = np.sqrt(np.diagonal(covariance))
         undetermined = ~(deviations < LARGE_DEVIATION * np.nanmin(deviations))
         if undetermined.any() and not undetermined.all():
             listed = [names[i] for i in np.flatnonzero(undetermined)]
-            yield f"{listed} hardly move the measured modes and are not determined: leave them out, or give a prior"
+            yield ModelWarning(
+                f"the parameters {listed} hardly move the measured modes and are not determined. Leave them out, or "
+                "give a prior",
+                "undetermined-parameters",
+            )
 
 
 def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
@@ -104,21 +122,24 @@ def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
     return np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
 
 
-def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[str]:
+def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[ModelWarning]:
     """Warnings about frequencies of the updated model that noise cannot explain."""
     far = table["error_after"].abs() > LARGE_ERROR
     if far.any():
         units = " (rad/s instead of Hz?)" if seem_rad_per_s(table["measured"] / table["after"]) else ""
-        yield (
-            f"the updated model misses {table.index[far].tolist()} by more than {LARGE_ERROR:g} %{units}: expected "
-            "frequencies in Hz, in the order of the model's modes"
+        yield ModelWarning(
+            f"the updated model misses the frequencies {table.index[far].tolist()} by more than {LARGE_ERROR:g} "
+            f"%{units}. Give frequencies in Hz, in the order of the model's modes, or correct the model",
+            "poor-fit",
         )
     elif not np.array_equal(measured.deviations, measured.frequencies, equal_nan=True):
         residuals = np.abs(table["after"].to_numpy() - measured.frequencies) / measured.deviations
         if (beyond := residuals > NOISE_LIMIT).any():
-            yield (
-                f"the updated model misses {table.index[beyond].tolist()} by up to {np.nanmax(residuals):.0f} standard "
-                "deviations of frequency_std: noise does not explain that, and covariance_ is too small"
+            yield ModelWarning(
+                f"the updated model misses the frequencies {table.index[beyond].tolist()} by up to "
+                f"{np.nanmax(residuals):.0f} times frequency_std (expected at most {NOISE_LIMIT:g}): covariance_ is "
+                "too small. Give a larger frequency_std, or correct the model",
+                "poor-fit",
             )
 
 

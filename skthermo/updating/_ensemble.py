@@ -128,7 +128,7 @@ class Ensemble:
             yield ModelWarning(
                 f"the search has not converged for {unfinished} of {n} drawn models, which may not be likely ones: "
                 "expected a higher max_iter, or bounds within which the model has modes",
-                "unfinished draws",
+                "not-converged",
             )
         at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
         if (at_bound > MOST_AT_BOUND * n).any():
@@ -137,14 +137,14 @@ class Ensemble:
             yield ModelWarning(
                 f"drawn models lie at the bounds of {listed}, and are less different than what is not known: expected "
                 "wider bounds, or a narrower prior",
-                "draws at bounds",
+                "at-bounds",
             )
         mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
         if mismatched:
             yield ModelWarning(
                 f"modes swap places in {mismatched} of {n} drawn models, and a measured mode is fitted with "
                 "another one: expected a model with track=True, or shapes",
-                "draws with swapped modes",
+                "modes-cross",
             )
 
     def warn_of(self, multipliers: Sequence[Array]) -> None:

@@ -106,7 +106,7 @@ def _real_shapes(shapes: NDArray) -> Array:
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
         "shape's length, is dropped",
         RecordsWarning,
-        "complex shapes",
+        "complex-shapes",
     )
     return np.where(np.isnan(shapes), np.nan, turned.real)
 

@@ -38,7 +38,7 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
-from skthermo.exceptions import FewRecordsWarning, ModelWarning
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (
     doubtful_frequencies,
@@ -254,7 +254,7 @@ class ModelUpdater(Estimator):
                 f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
                 "equally well; expected fewer parameters, shapes, or a prior",
                 FewRecordsWarning,
-                "few residuals",
+                "underdetermined",
             )
         model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
         residuals = Residuals(model, measured, prior)
@@ -280,8 +280,7 @@ class ModelUpdater(Estimator):
             doubts += doubtful_frequencies(measured, self.table_)
         else:
             doubts.append(unfinished(best, residuals))
-        for message in doubts:
-            warn_user(message, ModelWarning, f"doubtful optimum: {message}")
+        warn_each(doubts)
         if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
             self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
         return self

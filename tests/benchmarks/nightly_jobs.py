@@ -131,7 +131,9 @@ def differences(left, right):
 def cost(settings, now):
     """CPU seconds and megabytes of a call in a process of its own."""
     code = (
-        "import resource, sys\n"
+        "import gc, resource, sys\n"
+        "from skthermo.__main__ import MANY\n"
+        "gc.set_threshold(MANY)\n"
         "def used(): return resource.getrusage(resource.RUSAGE_SELF)\n"
         "from skthermo.commands.main import main\n"
         "imported = used().ru_utime + used().ru_stime\n"

@@ -25,7 +25,7 @@ from skthermo.preprocessing import HampelFilter, check_records, checks
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
 
-ALSO = {"no rows", "few rows", "unsorted stamps"}
+ALSO = {"no-rows", "few-rows", "unsorted-stamps"}
 """Findings that are right beside others."""
 
 Z24_BASELINE = 2240
@@ -147,46 +147,46 @@ def gross_errors(T, F, seed):
         return T, with_values(F, rows, mode, values)
 
     for value in (-999.0, 9999.0, 484.667, 1e6):
-        yield f"thermometer is {value:g} in 2 % of the rows", {"markers"}, in_T, of_sensor(some, value)
-        yield f"thermometer is {value:g} in a third of the rows", {"markers"}, in_T, of_sensor(third, value)
-    yield "thermometer is 1e6 in one row", {"markers"}, in_T, of_sensor([n_rows // 2], 1e6)
+        yield f"thermometer is {value:g} in 2 % of the rows", {"placeholders"}, in_T, of_sensor(some, value)
+        yield f"thermometer is {value:g} in a third of the rows", {"placeholders"}, in_T, of_sensor(third, value)
+    yield "thermometer is 1e6 in one row", {"placeholders"}, in_T, of_sensor([n_rows // 2], 1e6)
     garbage = random.uniform(-300, 900, len(third))
     yield (
         "thermometer is random, -300 to 900, in a third",
-        {"markers", "implausible values"},
+        {"placeholders", "implausible-values"},
         in_T,
         of_sensor(third, garbage),
     )
     for value in (-999.0, 9999.0):
-        yield f"mode is {value:g} in 2 % of the rows", {"markers"}, in_F, of_mode(some, value)
+        yield f"mode is {value:g} in 2 % of the rows", {"placeholders"}, in_F, of_mode(some, value)
     for value, share, rows in ((0.0, "2 %", some), (0.0, "a third", third), (-1.0, "2 %", some)):
-        yield f"mode is {value:g} in {share} of the rows", {"not positive"}, in_F, of_mode(rows, value)
+        yield f"mode is {value:g} in {share} of the rows", {"not-positive"}, in_F, of_mode(rows, value)
     here = T.iloc[:, sensor]
     yield "kelvin", {"kelvin"}, set(T), (T + 273.15, F)
     yield "kelvin in one sensor", {"kelvin"}, in_T, of_sensor(both, here + 273.15)
     yield "kelvin in a third of the rows", {"kelvin"}, in_T, of_sensor(third, here.iloc[third] + 273.15)
     yield "Fahrenheit", {"fahrenheit"}, set(T), (1.8 * T + 32, F)
-    yield "tenths of a degree", {"scaled temperatures"}, set(T), ((10 * T).round(), F)
+    yield "tenths of a degree", {"scaled-temperatures"}, set(T), ((10 * T).round(), F)
     if T.shape[1] > 1:
         yield "Fahrenheit in one sensor", {"fahrenheit"}, in_T, of_sensor(both, 1.8 * here + 32)
-        yield "tenths of a degree in one sensor", {"scaled temperatures"}, in_T, of_sensor(both, 10 * here)
+        yield "tenths of a degree in one sensor", {"scaled-temperatures"}, in_T, of_sensor(both, 10 * here)
         either = in_T if T.shape[1] > 2 else set(T)
-        yield "one sensor of opposite sign", {"opposite signs"}, either, of_sensor(both, -here)
-        yield "equal sensors", {"equal columns"}, set(T), of_sensor(both, T.iloc[:, sensor - 1])
+        yield "one sensor of opposite sign", {"opposite-signs"}, either, of_sensor(both, -here)
+        yield "equal sensors", {"equal-columns"}, set(T), of_sensor(both, T.iloc[:, sensor - 1])
     yield "constant sensor", {"constant"}, in_T, of_sensor(both, 12.5)
-    yield "sensor without a value", {"missing column"}, in_T, of_sensor(both, np.nan)
+    yield "sensor without a value", {"missing-column"}, in_T, of_sensor(both, np.nan)
     yield "constant mode", {"constant"}, in_F, of_mode(both, 5.0)
-    yield "mode without a value", {"missing column"}, in_F, of_mode(both, np.nan)
+    yield "mode without a value", {"missing-column"}, in_F, of_mode(both, np.nan)
     middle = F.iloc[:, mode].median()
     coarse = middle * (1 + 0.02 * (F.iloc[:, mode] > middle)).where(F.iloc[:, mode].notna())
-    yield "mode of two values", {"few values"}, in_F, of_mode(both, coarse)
+    yield "mode of two values", {"few-values"}, in_F, of_mode(both, coarse)
     if F.shape[1] > 1:
-        yield "equal modes", {"equal columns"}, set(F), of_mode(both, F.iloc[:, mode - 1])
-    yield "exchanged tables", {"exchanged tables"}, {""}, (F, T)
-    yield "frequencies as temperatures", {"temperatures are frequencies"}, set(F), (F, F)
-    yield "infinite values", {"infinite values"}, in_T, of_sensor(some, np.inf)
-    yield "no rows", {"no rows"}, {""}, (T[:0], F[:0])
-    yield "one row", {"no rows"}, {""}, (T[:1], F[:1])
+        yield "equal modes", {"equal-columns"}, set(F), of_mode(both, F.iloc[:, mode - 1])
+    yield "exchanged tables", {"exchanged-tables"}, {""}, (F, T)
+    yield "frequencies as temperatures", {"temperatures-are-frequencies"}, set(F), (F, F)
+    yield "infinite values", {"infinite-values"}, in_T, of_sensor(some, np.inf)
+    yield "no rows", {"no-rows"}, {""}, (T[:0], F[:0])
+    yield "one row", {"no-rows"}, {""}, (T[:1], F[:1])
     yield from wrong_rows(T, F, random)
     yield from no_tables(T, F)
 
@@ -197,31 +197,31 @@ def wrong_rows(T, F, random):
     again = np.sort(np.append(np.arange(n_rows), random.integers(n_rows, size=5)))
     unsorted = random.permutation(n_rows)
     text = stamps.strftime("%Y-%m-%d %H:%M")
-    yield "stamps twice", {"repeated stamps"}, {""}, (T.iloc[again], F.iloc[again])
-    yield "stamps in disorder", {"unsorted stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
+    yield "stamps twice", {"repeated-stamps"}, {""}, (T.iloc[again], F.iloc[again])
+    yield "stamps in disorder", {"unsorted-stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
     for name, kind, index in (
-        ("equal stamps", "equal stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
-        ("a missing stamp", "missing stamps", stamps.where(np.arange(n_rows) != 7)),
-        ("seconds read as nanoseconds", "stamps from numbers", pd.to_datetime(stamps.as_unit("s").asi8)),
-        ("20230101 read as nanoseconds", "stamps from numbers", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
-        ("stamps as text", "stamps as text", text),
+        ("equal-stamps", "equal-stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
+        ("a missing stamp", "missing-stamps", stamps.where(np.arange(n_rows) != 7)),
+        ("seconds read as nanoseconds", "stamps-from-numbers", pd.to_datetime(stamps.as_unit("s").asi8)),
+        ("20230101 read as nanoseconds", "stamps-from-numbers", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
+        ("stamps-as-text", "stamps-as-text", text),
     ):
-        yield name, {kind, "equal stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
+        yield name, {kind, "equal-stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
     late = T.set_axis(stamps + pd.Timedelta("1D"))
-    yield "tables of other times", {"different rows"}, {""}, (late, F)
-    yield "tables of other lengths", {"different rows"}, {""}, (T[:-3], F)
+    yield "tables of other times", {"different-rows"}, {""}, (late, F)
+    yield "tables of other lengths", {"different-rows"}, {""}, (T[:-3], F)
     if T.shape[1] > 1:
         names = [T.columns[0], *T.columns[:-1]]
-        yield "a name twice", {"column names"}, {T.columns[0]}, (T.set_axis(names, axis=1), F)
-    yield "tuples as names", {"column names"}, {""}, (T.set_axis(pd.MultiIndex.from_product([["a"], T]), axis=1), F)
+        yield "a name twice", {"column-names"}, {T.columns[0]}, (T.set_axis(names, axis=1), F)
+    yield "tuples as names", {"column-names"}, {""}, (T.set_axis(pd.MultiIndex.from_product([["a"], T]), axis=1), F)
 
 
 def no_tables(T, F):
     """What is no table of numbers."""
     texts, mixed = T.astype(str), T.astype(object)
     mixed.iloc[3, 0] = "error"
-    yield "values as text", {"no numbers"}, set(T), (texts, F)
-    yield "one text", {"no numbers"}, {T.columns[0]}, (mixed, F)
+    yield "values as text", {"no-numbers"}, set(T), (texts, F)
+    yield "one text", {"no-numbers"}, {T.columns[0]}, (mixed, F)
     for name, table in (
         ("a dict", dict(T)),
         ("three dimensions", np.stack([T, T])),
@@ -229,21 +229,21 @@ def no_tables(T, F):
         ("a Series", T.iloc[:, 0]),
         ("a text", "T.csv"),
     ):
-        yield f"{name} as temperatures", {"no table"}, {""}, (table, F)
+        yield f"{name} as temperatures", {"no-table"}, {""}, (table, F)
 
 
 def other_units(T, F):
     """Frequencies in other units than the model's."""
     for name, values in (("rad/s", 2 * np.pi * F), ("kHz", F / 1000), ("periods", 1 / F)):
-        yield name, {"unit of frequencies"}, {""}, (T, values)
+        yield name, {"unit-of-frequencies"}, {""}, (T, values)
     if F.shape[1] > 1:
         yield (
             "one mode in rad/s",
-            {"unit of a mode"},
+            {"unit-of-a-mode"},
             {F.columns[0]},
             (T, with_values(F, slice(None), 0, 2 * np.pi * F.iloc[:, 0])),
         )
-        yield "a mode too few", {"number of modes"}, {""}, (T, F.iloc[:, 1:])
+        yield "a mode too few", {"number-of-modes"}, {""}, (T, F.iloc[:, 1:])
 
 
 def print_all_gross_errors(folder, seeds):

@@ -93,7 +93,7 @@ def main():
     parser.add_argument("--boxes", type=float, nargs="+", default=[0.3, 0.1], help="half-widths of the box")
     parser.add_argument("--models", nargs="+", default=["truss", "KW51"])
     options = parser.parse_args()
-    warnings.filterwarnings("ignore", r".*did not converge")
+    warnings.filterwarnings("ignore", ".*not-converged")
     for bounds in options.boxes:
         if "truss" in options.models:
             truss = make_truss()

@@ -55,8 +55,8 @@ def rows(seed):
                 "mean": way,
                 "seed": seed,
                 "time constants": "" if features is None else " ".join(features.time_constants),
-                "memory": "memory" in kinds,
-                "step": "step" in kinds,
+                "memory": "thermal-memory" in kinds,
+                "step": "sudden-change" in kinds,
                 "trend": "trend" in kinds,
                 "drift": bool(history.has_drift),
             }

@@ -104,7 +104,7 @@ def fit(model, dofs, frequencies, shapes, **options):
     updater = ModelUpdater(model, bounds=0.3, shape_weight=SHAPE_WEIGHT, random_state=1, **options)
     started = time.perf_counter()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*swap|.*other modes")
+        warnings.filterwarnings("ignore", message=".*(modes-cross|mode-order)")
         updater.fit(frequencies, shapes=shapes, dofs=dofs, frequency_std=FREQUENCY_NOISE * frequencies)
     return updater, time.perf_counter() - started
 

@@ -12,7 +12,7 @@ from tests.reporting.pages import HOSTILE, fitted_chain, run_study
 from tests.studies.identified import identified
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.filterwarnings("ignore:.*baseline records depend", "ignore:the threshold is .* far above")
+pytestmark = pytest.mark.filterwarnings("ignore:.*few-baseline-records", "ignore:.*high-threshold")
 
 BREAKABLE = """
 return [...document.querySelectorAll("tr, img, .chart, .state")]

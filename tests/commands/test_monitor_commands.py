@@ -213,7 +213,7 @@ def test_stamps_with_offsets_come_in_the_time_zone_of_the_baseline(records, tmp_
     monitor, file = fitted_monitor(zoned), tmp_path / "bridge.joblib"
     monitor.save(file)
     new = zoned[FIRST + 84 : FIRST + 90]  # the clocks change in between
-    with pytest.warns(UserWarning, match="of 6 new records are not evaluated"):
+    with pytest.warns(UserWarning, match="of 6 .*not-evaluated"):
         monitor.update(new)
     new.to_csv(tmp_path / "new.csv")
     assert len({line[:25][-6:] for line in (tmp_path / "new.csv").read_text().splitlines()[1:]}) == 2  # offsets

@@ -86,7 +86,7 @@ class TestChecks:
     def test_a_chain_within_reports_what_was_found(self):
         fitted, _ = said(detector(chain()).fit, STUCK)
         table = fitted[0].estimator_.report_.findings.table
-        assert table[["what", "column", "n_rows"]].to_numpy().tolist() == [["stuck sensor", "T1", 40]]
+        assert table[["what", "column", "n_rows"]].to_numpy().tolist() == [["stuck-sensor", "T1", 40]]
 
     def test_several_compensators_of_the_same_records_share_a_check(self, n_checks):
         parts = [("lines", detector(LinearRegression())), ("ridge", detector(Ridge())), ("chain", detector(chain()))]
@@ -137,7 +137,7 @@ class TestChecks:
         np.testing.assert_array_equal(fitted[0].folds_, alone[0].folds_)
 
     def test_findings_of_an_estimator_around_are_those_of_its_parts(self):
-        with reported_by_caller(["stuck sensor"], "what was found"):
+        with reported_by_caller(["stuck-sensor"], "what was found"):
             assert findings_of(None, T, F) == "what was found"
         with pytest.raises(ValueError, match="broken"), reported_by_caller([], "what was found"):
             raise ValueError("broken")
@@ -182,13 +182,13 @@ class TestRows:
         detector = MahalanobisDetector().fit(compensator.fit_transform(X))
         gaps = LATER.copy()
         gaps.iloc[:3, : T.shape[1]] = np.nan
-        with pytest.warns(UserWarning, match="3 of .* rows cannot be predicted"):
+        with pytest.warns(UserWarning, match="3 of .*not-predicted"):
             residuals = compensator.transform(gaps)
         residuals.iloc[5] = np.nan
-        with pytest.warns(UserWarning, match="^1 of .* rows are not evaluated"):
+        with pytest.warns(UserWarning, match="^1 of .*not-evaluated"):
             detector.predict(residuals)
         residuals.loc[residuals.index.max() + pd.Timedelta("1D")] = 0.0
-        with pytest.warns(UserWarning, match="^4 of .* rows are not evaluated"):
+        with pytest.warns(UserWarning, match="^4 of .*not-evaluated"):
             assert len(detector.predict(residuals)) == len(LATER) + 1
 
     def test_lags_that_find_nothing_are_reported_once(self):

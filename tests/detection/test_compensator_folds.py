@@ -51,7 +51,7 @@ def test_blocks_are_longer_than_the_memory_of_the_residuals():
     assert rows == pytest.approx(5 * (1 + 0.95) / (1 - 0.95), rel=0.35)
 
 
-@pytest.mark.filterwarnings("ignore:what the weather leaves of the frequencies has a trend")
+@pytest.mark.filterwarnings(r"ignore:.*\[trend\]")
 def test_every_fold_keeps_two_blocks():
     fitted = compensator().fit(year(memory=0.999))
     assert fitted.block_ <= pd.Timedelta("36.5D")
@@ -101,7 +101,7 @@ def test_no_target_of_a_fold_reaches_its_own_prediction():
 
 
 def test_contiguous_folds_of_one_year_are_warned_of_with_numbers():
-    with pytest.warns(UserWarning, match=r"[0-9]+ of 584 records of fold [0-9] of 5 .* 'T' is there from") as given:
+    with pytest.warns(UserWarning, match="[0-9]+ of 584 .*of 5 .*'T' .*weather-of-one-fold") as given:
         residuals = compensator(DecisionTreeRegressor(max_depth=5), cv="contiguous").fit_transform(winter_year())
     assert len(given) == 1
     assert len(residuals) == len(STAMPS)
@@ -116,10 +116,10 @@ def winter_year():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:lags reach 2 rows back")  # before the first row of a fold
+@pytest.mark.filterwarnings("ignore:.*no-earlier-records")  # before the first row of a fold
 def test_lags_inside_an_estimator_keep_rows_without_stamps_together():
     mapper = make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression()))
-    with pytest.warns(UserWarning, match="rows have no stamps, and lags inside DataInformedFEM would take rows of"):
+    with pytest.warns(UserWarning, match="DataInformedFEM.*lags-without-stamps"):
         fitted = compensator(chain(mapper), targets=POSITIONS).fit(X.to_numpy())
     np.testing.assert_array_equal(fitted.folds_, np.arange(len(X)) * 5 // len(X))
 
@@ -137,7 +137,7 @@ def service():
     return detector, later
 
 
-@pytest.mark.filterwarnings("ignore:8 of (480|18) rows cannot be predicted")
+@pytest.mark.filterwarnings("ignore:.*not-predicted")
 def test_a_day_behind_the_records_before_it_is_evaluated_as_in_one_pass(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -151,8 +151,8 @@ def test_a_day_behind_the_records_before_it_is_evaluated_as_in_one_pass(service)
     assert 100 < n_alarms < 300
 
 
-@pytest.mark.filterwarnings("ignore:[0-9]+ of [0-9]+ rows cannot be predicted")
-@pytest.mark.filterwarnings("ignore:lags reach 1 day back; the first record given is")
+@pytest.mark.filterwarnings("ignore:.*not-predicted")
+@pytest.mark.filterwarnings("ignore:.*no-earlier-records")
 def test_a_day_alone_is_evaluated_only_where_its_lags_are_known(service):
     detector, later = service
     index = detector[-1].damage_index(detector[0].transform(later))
@@ -165,11 +165,8 @@ def test_a_day_alone_is_evaluated_only_where_its_lags_are_known(service):
 
 def test_a_day_alone_says_what_lags_lack(service):
     detector, later = service
-    said = (
-        "lags reach 1 day back; the first record given is 2026-03-04 00:00:00, and 8 of 8 rows have a lag before it "
-        "that finds no record; give the 1 day before, too"
-    )
-    with pytest.warns(UserWarning, match="give the 1 day before") as given:
+    with pytest.warns(UserWarning, match="lags reach 1 day .*no-earlier-records") as given:
         residuals = detector[0].transform(later.loc["2026-03-04"])
-    assert [str(warning.message) for warning in given] == [said]
+    (one,) = given
+    assert all(part in str(one.message) for part in ("2026-03-04 00:00:00", "8 of 8 rows"))
     assert residuals.isna().all(axis=None)

@@ -80,7 +80,7 @@ def test_every_backend_gives_the_same_bits(backend):
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_many_chunks_without_modes_are_one_warning_by_row(n_jobs):
     model = AffineModel({("k",): np.eye(3), ("force",): -0.5 * np.eye(3)}, np.eye(3), n_modes=2)
-    with pytest.warns(UserWarning, match="of 2000 samples are NaN") as caught:
+    with pytest.warns(UserWarning, match="of 2000 .*no-solution") as caught:
         drawn = sample(model, [[0.1, 1.0], [0.9, 1.1]], 2000, n_jobs=n_jobs, random_state=0)
     failed = np.isnan(drawn.frequencies).any(axis=1)
     assert len(caught) == 1
@@ -92,7 +92,7 @@ def test_many_chunks_without_modes_are_one_warning_by_row(n_jobs):
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
     reduced = TRUSS.reduced(0.1, random_state=0)
-    with pytest.warns(UserWarning, match=r"\d+ of 600 theta are outside the bounds") as caught:
+    with pytest.warns(UserWarning, match=r"\d+ of 600 .*outside-reduced-bounds") as caught:
         sample(reduced, 0.2, 600, n_jobs=n_jobs, random_state=0)
     assert len(caught) == 1
     assert caught[0].filename == __file__

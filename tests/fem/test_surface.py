@@ -60,19 +60,36 @@ def crossing(coupling, is_tracked):
     return AffineModel(terms, np.eye(3), n_modes=3, track=is_tracked), np.c_[a, np.ones(600)]
 
 
-def test_rows_near_a_veering_of_modes_that_are_followed_are_not_served():
-    model, theta = crossing(1e-4, True)
-    frequencies, served = FrequencySurface(model.frequencies, theta).frequencies(theta)
+@pytest.mark.parametrize("is_tracked", [True, False])
+@pytest.mark.parametrize("coupling", [0.0, 1e-4, 2e-2, 4e-2])
+def test_rows_on_both_sides_of_modes_that_cross_or_repel_each_other_are_served(coupling, is_tracked):
+    model, theta = crossing(coupling, is_tracked)
+    surface = FrequencySurface(model.frequencies, theta)
+    frequencies, served = surface.frequencies(theta)
     exact = model.frequencies(theta)
     gap = np.abs(exact[:, 0] / exact[:, 1] - 1)
+    assert surface.error_ <= TOL
     assert not served[gap < 0.0099].any()
     assert served[gap > 0.0101].mean() > 0.9
     assert np.abs(frequencies[served] / exact[served] - 1).max() < 2 * TOL
 
 
-@pytest.mark.parametrize(("coupling", "is_tracked"), [(0.0, False), (1e-4, False), (5e-3, True)])
-def test_modes_that_swap_places_or_repel_each_other_widely_have_no_surface(coupling, is_tracked):
-    model, theta = crossing(coupling, is_tracked)
+@pytest.mark.parametrize("share", [0.5, 0.7, 0.9])
+def test_modes_whose_columns_change_places_at_some_distance_are_not_served_there(share):
+    model, theta = crossing(4e-2, False)
+    border = np.quantile(theta[:, 0], share)  # where the columns change places, 4 % apart and more
+
+    def solve(rows):
+        modes = np.where(rows[:, :1] > border, [1, 0, 2], [0, 1, 2])
+        return np.take_along_axis(model.frequencies(rows), modes, axis=1)
+
+    frequencies, served = FrequencySurface(solve, theta).frequencies(theta)
+    assert served.mean() > 0.5
+    assert np.abs(frequencies[served] / solve(theta)[served] - 1).max() < 2 * TOL
+
+
+def test_modes_whose_columns_are_not_known_have_no_surface():
+    model, theta = crossing(5e-3, True)  # those of the nominal model are half one mode and half the other
     with pytest.raises(RuntimeError, match="check points"):
         FrequencySurface(model.frequencies, theta)
 
@@ -121,3 +138,8 @@ def test_the_same_rows_give_the_same_bits():
 def test_more_solves_allow_a_higher_degree():
     degrees = [FrequencySurface.degree_within(n, 4) for n in (0, 169, 170, 240, 352, 520, 10_000)]
     assert degrees == [2, 2, 3, 4, 5, 6, 8]
+
+
+def test_with_too_low_a_degree_nothing_is_solved():
+    with pytest.raises(RuntimeError, match="degree 2"):
+        FrequencySurface(lambda rows: pytest.fail("solved"), weather_rows(0), highest_degree=2)

@@ -166,16 +166,16 @@ def test_gaps_and_records_that_are_not_evaluated_are_no_time_of_the_baseline():
 
 def test_half_a_year_gives_no_estimate_for_the_other_half():
     index = pd.Series(chi(np.random.default_rng(5), 182), stamps(182))
-    with pytest.warns(UserWarning, match=r"no record of 153 days of the year \(17 July to 16 December\)"):
+    with pytest.warns(UserWarning, match="153 days of the year .17 July to 16 December.*missing-seasons"):
         estimate = estimate_false_alarms(index, 2.0)
     assert "17 July" in estimate.missing_season
     assert "no estimate for 153 days" in str(estimate)
 
 
-@pytest.mark.filterwarnings("ignore:the baseline has no record of")
+@pytest.mark.filterwarnings("ignore:.*missing-seasons")
 def test_a_threshold_far_beyond_the_baseline_is_said_to_be_one():
     index = pd.Series(chi(np.random.default_rng(6), 90), stamps(90))
-    with pytest.warns(UserWarning, match="1 false alarm a year, and the baseline is 0.24 years long: .* extrapolated"):
+    with pytest.warns(UserWarning, match="1 false alarm a year.*0.24 years.*extrapolated-threshold"):
         estimate = estimate_false_alarms(index, 1.0)
     assert estimate.rule.threshold > index.max()
 
@@ -192,7 +192,7 @@ def test_a_day_that_was_no_healthy_one_is_named():
     index = pd.Series(chi(np.random.default_rng(8), 365), stamps(365))
     spoilt = index.copy()
     spoilt.iloc[100] = 30.0
-    with pytest.warns(UserWarning, match=r"highest excursion of the baseline, 2025-04-11 00:00:00, .* index 30, next"):
+    with pytest.warns(UserWarning, match="2025-04-11 00:00:00.* 30,.*baseline-excursion"):
         raised = estimate_false_alarms(spoilt)
     assert raised.rule.threshold > 2 * estimate_false_alarms(index).rule.threshold
 

@@ -17,12 +17,12 @@ WEEKS, YEAR = 60, 365
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "the baseline has no record of",
-        "is extrapolated",
-        "of fold",
-        "independent",
-        "far beyond the others",
-        "not evaluated",
+        "missing-seasons",
+        "extrapolated-threshold",
+        "weather-of-one-fold",
+        "few-baseline-records",
+        "baseline-excursion",
+        "not-evaluated",
     )
 ]
 

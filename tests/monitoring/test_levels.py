@@ -16,7 +16,7 @@ from tests.monitoring.test_status import replayed
 
 LEVELS = {"healthy": 0, "not evaluated": 0, "watch": 1, "alarm": 2}
 ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
-pytestmark = pytest.mark.filterwarnings("ignore:.*not evaluated")
+pytestmark = pytest.mark.filterwarnings("ignore:.*not-evaluated")
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,9 @@ from skthermo.monitoring._smallest import LARGE, LoweredIndices
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 ANSWER = ["state", "index", "reason", "event"]
-pytestmark = pytest.mark.filterwarnings("ignore:.*(season|independent|not evaluated|of fold|is extrapolated)")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(weather-of-one-fold|not-evaluated|missing-seasons|few-baseline-records|extrapolated-threshold)"
+)
 
 
 @cache

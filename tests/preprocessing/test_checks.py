@@ -50,7 +50,7 @@ class TestHealthyRecords:
 
     def test_few_records_say_nothing_but_that(self):
         found = one(check_records(T[:20].sample(frac=1, random_state=0).set_axis(T.index[:20]), F[:20]))
-        assert (found["what"], found["n_rows"]) == ("few rows", 20)
+        assert (found["what"], found["n_rows"]) == ("few-rows", 20)
 
 
 class TestStuck:
@@ -58,7 +58,7 @@ class TestStuck:
         stuck = T.copy()
         stuck.loc["2025-12", "T2"] = 20.0
         found = one(check_records(stuck, F))
-        assert (found["what"], found["column"], found["n_rows"]) == ("stuck sensor", "T2", 31)
+        assert (found["what"], found["column"], found["n_rows"]) == ("stuck-sensor", "T2", 31)
         assert (found["from"], found["to"]) == (pd.Timestamp("2025-12-01"), pd.Timestamp("2025-12-31"))
 
     def test_a_mode_over_gaps_in_an_array(self):
@@ -66,7 +66,7 @@ class TestStuck:
         stuck[100:130, 4] = stuck[100, 4]
         stuck[110:115, 4] = np.nan
         found = one(check_records(T.to_numpy(), stuck))
-        assert tuple(found[["what", "column", "n_rows", "from", "to"]]) == ("stuck mode", "f5", 25, 100, 129)
+        assert tuple(found[["what", "column", "n_rows", "from", "to"]]) == ("stuck-mode", "f5", 25, 100, 129)
 
     @pytest.mark.parametrize("digits", [None, 1, 0])
     def test_rounding_of_slow_temperatures_is_not_stuck(self, digits):
@@ -99,7 +99,7 @@ class TestTime:
     @pytest.mark.parametrize("shift", [60, -60])
     def test_a_shift_is_found_with_its_size_and_direction(self, shift):
         found = one(check_records(T, F.shift(shift)))
-        assert found["what"] == "time shift"
+        assert found["what"] == "time-shift"
         direction = "before" if shift > 0 else "after"
         assert f"those of 60 rows {direction} (about 60 days)" in found["detail"]
         array = one(check_records(T.to_numpy(), F.shift(shift).to_numpy()))
@@ -117,7 +117,7 @@ class TestTime:
         late = np.roll(np.column_stack([air, deck]), shift, axis=0)
         tables = [pd.DataFrame(table, index).iloc[abs(shift) : -abs(shift)] for table in (late, modes)]
         found = one(check_records(*tables))
-        assert found["what"] == "time shift"
+        assert found["what"] == "time-shift"
         assert f"{abs(shift)} rows {'after' if shift > 0 else 'before'}" in found["detail"]
 
     @pytest.mark.parametrize("lag", [2, 12])
@@ -137,13 +137,13 @@ class TestTime:
         frequencies = np.array([3.0, 5.0, 7.0]) * (1 - 0.002 * air[:, np.newaxis])
         noisy = pd.DataFrame(frequencies * (1 + 0.005 * random.standard_normal((60, 3))), index)
         assert check_records(lagged, noisy).table.empty
-        assert one(check_records(lagged, noisy.shift(-10)))["what"] == "time shift"
+        assert one(check_records(lagged, noisy.shift(-10)))["what"] == "time-shift"
 
     @pytest.mark.parametrize("seed", range(3))
     def test_shuffled_temperatures_explain_nothing(self, seed):
         shuffled = T.sample(frac=1, random_state=seed).set_axis(T.index)
         found = one(check_records(shuffled, F))
-        assert (found["what"], found["n_rows"]) == ("weather", 365)
+        assert (found["what"], found["n_rows"]) == ("no-thermal-effect", 365)
 
 
 class TestExchangedModes:
@@ -151,14 +151,14 @@ class TestExchangedModes:
     def test_rows_are_found(self, share):
         rows = np.random.default_rng(0).random(len(F)) < share
         found = one(check_records(T, exchanged(rows)))
-        assert (found["what"], found["column"], found["n_rows"]) == ("exchanged modes", "'f3' and 'f4'", rows.sum())
+        assert (found["what"], found["column"], found["n_rows"]) == ("exchanged-modes", "'f3' and 'f4'", rows.sum())
 
     def test_with_gaps_a_value_alone_is_found_too(self):
         rows, random = np.arange(len(F)) < 180, np.random.default_rng(0)
         gappy = exchanged(rows).mask(random.random(F.shape) < 0.2)
         either = gappy[["f3", "f4"]].notna().any(axis=1)
         found = check_records(T, gappy).table.iloc[0]
-        assert found["what"] == "exchanged modes"
+        assert found["what"] == "exchanged-modes"
         assert found["n_rows"] >= 0.98 * (rows & either).sum()
 
     def test_modes_that_cross_with_the_weather_are_not_exchanged(self):
@@ -175,7 +175,7 @@ class TestOutliers:
         random = np.random.default_rng(1)
         wrong = random.random(F.shape) < share
         table = check_records(T, F.where(~wrong, F * random.choice([0.8, 1.25], F.shape))).table
-        assert set(table["what"]) == {"outliers"}
+        assert set(table["what"]) == {"frequency-outliers"}
         assert dict(zip(table["column"], table["n_rows"], strict=True)) == {
             name: count for name, count in zip(F, wrong.sum(axis=0), strict=True) if count
         }
@@ -184,12 +184,12 @@ class TestOutliers:
         few = F[:20].copy()
         few.iloc[3, 1] *= 2.1
         found = check_records(T[:20], few).table.iloc[1]
-        assert (found["what"], found["column"], found["from"]) == ("outliers", "f2", F.index[3])
+        assert (found["what"], found["column"], found["from"]) == ("frequency-outliers", "f2", F.index[3])
 
     def test_a_change_that_lasts_is_none(self):
         changed = F.copy()
         changed.iloc[300:, 0] *= 0.8
-        assert "outliers" not in set(check_records(T, changed).table["what"])
+        assert "frequency-outliers" not in set(check_records(T, changed).table["what"])
 
 
 class TestStep:
@@ -198,7 +198,7 @@ class TestStep:
         changed = F.copy()
         changed.iloc[start:, modes] *= 0.97
         table = check_records(T, changed).table
-        assert table["what"].tolist() == ["step"] * len(modes)
+        assert table["what"].tolist() == ["sudden-change"] * len(modes)
         assert table["column"].tolist() == [f"f{mode + 1}" for mode in modes]
         for mode, detail in zip(modes, table["detail"], strict=True):
             change, at = detail.split("by ")[1].split(" Hz about ")
@@ -210,7 +210,7 @@ class TestStep:
         air = 11 - 9 * np.cos(2 * np.pi * day / 365) + 2 * random.standard_normal(465)
         mode = 2.92 - 0.001 * air + 0.06 * (day >= 292) + 0.004 * random.standard_normal(465)
         found = one(check_records(air[:, np.newaxis], mode[:, np.newaxis]))
-        assert found["what"] == "step"
+        assert found["what"] == "sudden-change"
         assert "Hz about row 29" in found["detail"]
 
 
@@ -251,7 +251,7 @@ def test_findings_do_not_depend_on_the_order_of_rows():
     order = np.random.default_rng(0).permutation(len(T))
     expected = check_records(stuck, F).table
     found = check_records(stuck.iloc[order], F.iloc[order]).table
-    assert found["what"].tolist() == ["unsorted stamps", "stuck sensor"]
+    assert found["what"].tolist() == ["unsorted-stamps", "stuck-sensor"]
     pd.testing.assert_frame_equal(found[1:].reset_index(drop=True), expected)
 
 
@@ -262,7 +262,7 @@ def test_each_kind_gives_one_warning_and_the_tables_stay_as_they_are():
     before = stuck.copy(), spoiled.copy()
     findings = check_records(stuck, spoiled)
     kinds = [warning.kind for warning in findings.warnings()]
-    assert kinds == ["stuck sensor", "outliers"]
+    assert kinds == ["stuck-sensor", "frequency-outliers"]
     assert len(findings.table) == sum(": " in line for line in str(findings).splitlines()) == 4
     for table, copy in zip((stuck, spoiled), before, strict=True):
         pd.testing.assert_frame_equal(table, copy)

@@ -87,7 +87,7 @@ def test_records_after_an_outage_say_that_they_have_no_past():
     means = ExponentialMeans(["1D"]).fit(T[:100])
     with pytest.warns(FewRecordsWarning, match="20 of 20") as given:
         means.transform(T[300:320])
-    assert given[0].message.kind == "no records for means"
+    assert given[0].message.kind == "no-earlier-records"
     means.transform(T[100:120])
     means.transform(T[:30])  # begin as the records of fit do
 

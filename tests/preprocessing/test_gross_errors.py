@@ -40,14 +40,14 @@ class TestValues:
     @often
     def test_markers_of_thermometers_are_named_with_their_rows(self, rows, column, value):
         found = gross_errors(changed(T, rows, column, value), F)
-        assert only(found) == ("markers", T.columns[column], len(rows), T.index[rows[0]], T.index[rows[-1]])
+        assert only(found) == ("placeholders", T.columns[column], len(rows), T.index[rows[0]], T.index[rows[-1]])
 
     @given(rows=ROWS, column=MODE, value=st.sampled_from([-999.0, 9999.0, 0.0, -1.0, np.inf, 1e308]))
     @often
     def test_values_that_are_no_frequencies_are_named_with_their_rows(self, rows, column, value):
-        kind = {0.0: "not positive", -1.0: "not positive", np.inf: "infinite values", 1e308: "infinite values"}
+        kind = {0.0: "not-positive", -1.0: "not-positive", np.inf: "infinite-values", 1e308: "infinite-values"}
         found = gross_errors(T, changed(F, rows, column, value))
-        expected = (kind.get(value, "markers"), F.columns[column], len(rows), F.index[rows[0]], F.index[rows[-1]])
+        expected = (kind.get(value, "placeholders"), F.columns[column], len(rows), F.index[rows[0]], F.index[rows[-1]])
         assert only(found) == expected
 
     @given(columns=st.sets(SENSOR, min_size=1), share=st.floats(0.3, 0.9))
@@ -58,11 +58,14 @@ class TestValues:
             broken.iloc[rows, column] = (484.667, -999.0, 1e6)[number]
         table = gross_errors(broken, F).table
         assert table["column"].tolist() == [T.columns[column] for column in sorted(columns)]
-        assert set(table["what"]) == {"markers"}
+        assert set(table["what"]) == {"placeholders"}
 
     def test_a_broken_thermometer_is_no_shift_in_time(self):
         for broken in (484.667, np.random.default_rng(0).uniform(-300, 900, 120)):
-            assert kinds(check_records(changed(T, slice(100, 220), 0, broken), F)) <= {"markers", "implausible values"}
+            assert kinds(check_records(changed(T, slice(100, 220), 0, broken), F)) <= {
+                "placeholders",
+                "implausible-values",
+            }
 
     def test_values_that_bridges_have_are_none(self):
         fire = T.copy()
@@ -74,8 +77,8 @@ class TestValues:
     def test_a_level_that_repeats_far_from_all_others_is_doubtful(self):
         found = gross_errors(changed(T, [3, 77, 200], 0, 85.0), changed(F, [5, 6, 200], 0, 25.0))
         assert [tuple(row) for row in found.table[["what", "column", "severity"]].to_numpy()] == [
-            ("isolated level", "T1", "doubtful"),
-            ("isolated level", "f1", "doubtful"),
+            ("isolated-level", "T1", "doubtful"),
+            ("isolated-level", "f1", "doubtful"),
         ]
 
     @pytest.mark.parametrize(
@@ -83,11 +86,11 @@ class TestValues:
         [
             ((T.assign(T2=12.5), F), ("constant", "T2")),
             ((T, F.assign(f2=5.0)), ("constant", "f2")),
-            ((T, F.assign(f2=(F["f2"] > 27) + 27.0)), ("few values", "f2")),
-            ((T.assign(T2=np.nan), F), ("missing column", "T2")),
-            ((T, F.assign(f2=np.nan)), ("missing column", "f2")),
-            ((T.assign(T3=T["T1"]), F), ("equal columns", "T3")),
-            ((T, F.assign(f4=F["f2"])), ("equal columns", "f4")),
+            ((T, F.assign(f2=(F["f2"] > 27) + 27.0)), ("few-values", "f2")),
+            ((T.assign(T2=np.nan), F), ("missing-column", "T2")),
+            ((T, F.assign(f2=np.nan)), ("missing-column", "f2")),
+            ((T.assign(T3=T["T1"]), F), ("equal-columns", "T3")),
+            ((T, F.assign(f4=F["f2"])), ("equal-columns", "f4")),
         ],
     )
     def test_columns_that_say_nothing(self, tables, expected):
@@ -95,8 +98,8 @@ class TestValues:
 
     def test_values_far_from_others_are_named_where_no_weather_is_given(self):
         far = changed(F, [17], 2, 250.0)
-        assert only(gross_errors(None, far))[:3] == ("implausible values", "f3", 1)
-        assert kinds(check_records(T, far)) == {"outliers"}
+        assert only(gross_errors(None, far))[:3] == ("implausible-values", "f3", 1)
+        assert kinds(check_records(T, far)) == {"frequency-outliers"}
 
 
 class TestUnits:
@@ -111,13 +114,13 @@ class TestUnits:
         name = T.columns[column]
         for kind, values in (
             ("fahrenheit", 1.8 * T[name] + 32),
-            ("scaled temperatures", 10 * T[name]),
-            ("opposite signs", -T[name]),
+            ("scaled-temperatures", 10 * T[name]),
+            ("opposite-signs", -T[name]),
         ):
             assert only(gross_errors(T.assign(**{name: values})))[:2] == (kind, name)
 
     def test_tenths_of_a_degree(self):
-        assert kinds(gross_errors((10 * T).round())) == {"scaled temperatures"}
+        assert kinds(gross_errors((10 * T).round())) == {"scaled-temperatures"}
 
     @pytest.mark.one_case
     @pytest.mark.parametrize(
@@ -142,31 +145,31 @@ class TestUnits:
     def test_frequencies_in_another_unit_than_the_model(self, factor):
         model = make_truss()
         assert check_records(T, F, model=model).table.empty
-        assert kinds(gross_errors(None, factor * F, model=model)) == {"unit of frequencies"}
-        assert only(gross_errors(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("unit of a mode", "f2")
+        assert kinds(gross_errors(None, factor * F, model=model)) == {"unit-of-frequencies"}
+        assert only(gross_errors(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("unit-of-a-mode", "f2")
         assert gross_errors(None, factor * F).table.empty
 
     def test_periods_and_modes_too_few(self):
-        assert kinds(gross_errors(None, 1 / F, model=make_truss())) == {"unit of frequencies"}
-        assert kinds(gross_errors(None, F.iloc[:, 1:], model=make_truss())) == {"number of modes"}
+        assert kinds(gross_errors(None, 1 / F, model=make_truss())) == {"unit-of-frequencies"}
+        assert kinds(gross_errors(None, F.iloc[:, 1:], model=make_truss())) == {"number-of-modes"}
 
 
 class TestTables:
     def test_exchanged_or_the_same(self):
-        assert only(check_records(F, T))[0] == "exchanged tables"
+        assert only(check_records(F, T))[0] == "exchanged-tables"
         assert check_records(F, F).table["column"].tolist() == list(F)
-        assert kinds(check_records(T.assign(f1=F["f1"]), F)) == {"temperatures are frequencies"}
+        assert kinds(check_records(T.assign(f1=F["f1"]), F)) == {"temperatures-are-frequencies"}
 
     @pytest.mark.parametrize(
         ("stamps", "kind"),
         [
-            (pd.DatetimeIndex([T.index[0]] * 365), "equal stamps"),
-            (T.index.where(np.arange(365) != 7), "missing stamps"),
-            (pd.to_datetime(T.index.strftime("%Y%m%d").astype(int)), "stamps from numbers"),
-            (pd.to_datetime(T.index.as_unit("s").asi8), "stamps from numbers"),
-            (T.index.strftime("%Y-%m-%d"), "stamps as text"),
-            (pd.Index(T.index.strftime("%Y%m%d").astype(int)), "stamps as text"),
-            (T.index - T.index[0], "stamps as text"),
+            (pd.DatetimeIndex([T.index[0]] * 365), "equal-stamps"),
+            (T.index.where(np.arange(365) != 7), "missing-stamps"),
+            (pd.to_datetime(T.index.strftime("%Y%m%d").astype(int)), "stamps-from-numbers"),
+            (pd.to_datetime(T.index.as_unit("s").asi8), "stamps-from-numbers"),
+            (T.index.strftime("%Y-%m-%d"), "stamps-as-text"),
+            (pd.Index(T.index.strftime("%Y%m%d").astype(int)), "stamps-as-text"),
+            (T.index - T.index[0], "stamps-as-text"),
         ],
     )
     def test_wrong_times(self, stamps, kind):
@@ -174,26 +177,26 @@ class TestTables:
 
     def test_repeated_times_and_disorder(self):
         rows = [0, 0, *range(1, 365), 364]
-        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("repeated stamps", "", 2, T.index[0], T.index[-1])
-        assert kinds(check_records(T[::-1], F[::-1])) == {"unsorted stamps"}
+        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("repeated-stamps", "", 2, T.index[0], T.index[-1])
+        assert kinds(check_records(T[::-1], F[::-1])) == {"unsorted-stamps"}
         assert gross_errors(T.to_period("D"), F.to_period("D")).table.empty
 
     def test_rows_and_names(self):
         late = T.set_axis(T.index + pd.Timedelta("1D"))
-        assert only(check_records(late, F))[:3] == ("different rows", "", 365)
-        assert only(check_records(T[:-5], F))[:3] == ("different rows", "", 5)
-        assert kinds(check_records(T[:0], F[:0])) == {"no rows"}
-        assert kinds(check_records(T[:1], F[:1])) == {"no rows"}
+        assert only(check_records(late, F))[:3] == ("different-rows", "", 365)
+        assert only(check_records(T[:-5], F))[:3] == ("different-rows", "", 5)
+        assert kinds(check_records(T[:0], F[:0])) == {"no-rows"}
+        assert kinds(check_records(T[:1], F[:1])) == {"no-rows"}
         twice = T.set_axis(["T1", "T1", "T3"], axis=1)
-        assert only(check_records(twice, F))[:2] == ("column names", "T1")
+        assert only(check_records(twice, F))[:2] == ("column-names", "T1")
         tuples = pd.MultiIndex.from_product([["a"], list(T)])
         assert kinds(check_records(T.set_axis(tuples, axis=1), F.set_axis([("f", n) for n in F], axis=1))) == {
-            "column names"
+            "column-names"
         }
 
     def test_an_array_beside_a_frame_has_its_times(self):
         found = check_records(T[::-1], changed(F, [10], 0, 30.0).to_numpy()[::-1])
-        assert kinds(found) == {"unsorted stamps", "outliers"}
+        assert kinds(found) == {"unsorted-stamps", "frequency-outliers"}
         assert np.argwhere(found.outliers.to_numpy()).tolist() == [[354, 0]]
         assert found.table.iloc[1]["from"] == T.index[10]
 
@@ -225,10 +228,10 @@ def test_nothing_fails_whatever_is_given(temperatures, frequencies):
     assert len(list(found.warnings())) <= len(kinds(found))
     assert isinstance(str(found), str)
     alone = gross_errors(temperatures), gross_errors(None, frequencies)
-    assert set().union(*map(kinds, alone)) - {"implausible values"} <= kinds(found) | {"fahrenheit", *KINDS_OF_PAIRS}
+    assert set().union(*map(kinds, alone)) - {"implausible-values"} <= kinds(found) | {"fahrenheit", *KINDS_OF_PAIRS}
 
 
-KINDS_OF_PAIRS = {what for what in WARNINGS if what not in ("no table", "no numbers", "infinite values", "kelvin")}
+KINDS_OF_PAIRS = {what for what in WARNINGS if what not in ("no-table", "no-numbers", "infinite-values", "kelvin")}
 """Kinds that tables which are exchanged or equal are not searched for."""
 
 
@@ -254,7 +257,7 @@ class TestFindings:
         rows, sensors = random.sample(range(365), 365), random.sample(list(T), 3)
         expected = gross_errors(wrong, F).table
         found = gross_errors(wrong.iloc[rows][sensors], F.iloc[rows]).table
-        found = found[found["what"] != "unsorted stamps"]
+        found = found[found["what"] != "unsorted-stamps"]
         pd.testing.assert_frame_equal(*(one.sort_values("column").reset_index(drop=True) for one in (found, expected)))
 
     def test_one_error_lists_all_that_is_meaningless_and_nothing_that_is_doubtful(self):

@@ -40,7 +40,7 @@ def test_shapes_find_nearly_all_modes_among_spurious_poles(follow):
     assert right(ModeTracker(reference, follow=follow).fit_transform(records).poles, true) > 99.8
 
 
-@pytest.mark.filterwarnings("ignore:.*cannot be distinguished")
+@pytest.mark.filterwarnings("ignore:.*similar-modes")
 def test_shapes_beat_frequency_and_frequency_beats_sorting():
     records, true, reference = simulated_poles(500, n_sensors=6)
     shares = {way: right(poles, true) for way, poles in ways(records, reference, 0.15).items()}
@@ -173,7 +173,7 @@ def test_with_two_sensors_close_modes_are_distinct():
 def test_a_drift_beyond_max_shift_is_followed():
     drift = np.linspace(1, 1.25, 1000)
     raw = padded(F0 * drift[:, np.newaxis], n_records=1000, extra=3)
-    with pytest.warns(UnevaluatedRowsWarning, match="max_shift"):
+    with pytest.warns(UnevaluatedRowsWarning, match="modes-not-found"):
         fixed = ModeTracker((F0, PHI), max_shift=0.05).fit_transform(raw)
     followed = ModeTracker((F0, PHI), max_shift=0.05, follow=20).fit_transform(raw)
     assert fixed.frequencies.isna().mean().max() > 0.7
@@ -184,7 +184,7 @@ def test_a_drift_beyond_max_shift_is_followed():
 
 def test_no_drift_beyond_max_drift_is_followed():
     raw = padded(F0 * np.linspace(1, 1.25, 1000)[:, np.newaxis], n_records=1000)
-    with pytest.warns(UnevaluatedRowsWarning, match="max_shift"):
+    with pytest.warns(UnevaluatedRowsWarning, match="modes-not-found"):
         modes = ModeTracker((F0, PHI), max_shift=0.05, follow=20, max_drift=0.1).fit_transform(raw)
     assert (modes.followed.max() / F0 <= 1.1 + 1e-12).all()
     assert (modes.frequencies.max() / F0 <= 1.1 * 1.05).all()
@@ -258,7 +258,7 @@ def test_no_records_and_empty_records():
 def test_modes_never_found_and_modes_found_elsewhere_give_one_warning():
     raw = padded(F0 * [1, 1.3, 1], extra=1)
     raw.frequencies[:, 3] = np.nan
-    with pytest.warns(UnevaluatedRowsWarning, match="found in none") as caught:
+    with pytest.warns(UnevaluatedRowsWarning, match="modes-not-found") as caught:
         ModeTracker((F0, PHI)).fit_transform(raw)
     assert len(caught) == 1
     assert "['f2', 'f3'] are found in none of 50" in str(caught[0].message)
@@ -284,7 +284,7 @@ def test_poles_without_shape_are_left_over_with_a_warning():
 GOOD = padded(n_records=12)
 
 
-@pytest.mark.filterwarnings("ignore:the modes .* are found in none")
+@pytest.mark.filterwarnings("ignore:.*modes-not-found")
 @pytest.mark.parametrize("change", [np.flip, lambda S: S * np.array([1, 1, 1, -1, -1, 1])], ids=["order", "sign"])
 def test_modes_lost_by_their_shapes_are_named(change):
     raw = padded()

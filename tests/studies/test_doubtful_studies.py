@@ -48,12 +48,12 @@ def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
     both = study(fem, [*sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]])
     both.run(WEATHER)
     assert [both.is_undetected(family) for family in ("bottom", "vertical")] == [False, True]
-    with pytest.warns(UserWarning, match="no curve .*'vertical'.*does not increase.*as rare as for the healthy"):
+    with pytest.warns(UserWarning, match="'vertical'.*rare.*no-curve"):
         curve = both.minimum_detectable_damage(method="curve")
     assert 0.1 < curve.loc[("bottom", "simulated"), "mdd"] < 0.3
     unknown = curve.loc[("vertical", "simulated")]
     assert (np.isnan(unknown["mdd"]), unknown["ci_low"], np.isnan(unknown["ci_high"])) == (True, 0.002, True)
-    with pytest.warns(UserWarning, match=r"families \['vertical'\] have candidates without a gain"):
+    with pytest.warns(UserWarning, match="'vertical'.*undetected-families"):
         table = compare_extensions(both, WEATHER, modes=[], baseline_factors=(2,))
     assert np.isfinite(table.set_index("family")["gain"]["bottom"])
 
@@ -76,7 +76,7 @@ def test_one_warning_counts_the_families_whose_curves_lie_beside_their_points(fe
     both = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"]))
     results = both.run(WEATHER)
     results.loc[results["measure"] == "POD", "rate"] = [0.3, 0.35, 0.99] * 2
-    with pytest.warns(UserWarning, match="of 3 tested severities.*1 times more for other families") as caught:
+    with pytest.warns(UserWarning, match="of 3 .*1 times more for other families.*poor-curve-fit") as caught:
         both.minimum_detectable_damage(method="curve")
     assert len(caught) == 1
 

@@ -34,7 +34,7 @@ def test_causes_have_plain_names_bounds_and_one_sign():
     assert opposed == {("top", "top stiffer"), ("diagonal higher", "diagonal lower")}
 
 
-@pytest.mark.filterwarnings("ignore:.*outside the box of the reduced model")
+@pytest.mark.filterwarnings("ignore:.*outside-reduced-model")
 @pytest.mark.parametrize("which", ["full", "reduced"])
 def test_effects_are_those_of_simulated_records(fem, reduced_fem, which):
     fem = fem if which == "full" else reduced_fem

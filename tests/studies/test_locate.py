@@ -11,7 +11,7 @@ from skthermo.fem import Beam, ImportedStructure, Spring, Structure, add_noise
 from skthermo.studies import locate_damage
 from skthermo.surrogate import DataInformedFEM
 
-pytestmark = pytest.mark.filterwarnings("ignore:groups that these modes")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(indistinguishable|unobservable)-groups")
 
 N = 12  # elements of the symmetric bridge
 SENSORS = [("deck", i) for i in range(1, N)]

@@ -203,7 +203,7 @@ def test_a_limit_that_nobody_keeps_is_said(study):
     assert table["false_alarms"][:-1].is_monotonic_increasing
     quietest = table.index[0]
     assert study.summary(0.0001).startswith(
-        f"No detector keeps the limit of 0.0% false alarms. With the fewest, {quietest!r} finds "
+        f"All false-alarm rates exceed the limit of 0.0%. With the lowest one, {quietest!r} detects "
     )
     assert study.ranking(0.3)["within_limit"][:-1].all()
     assert study.ranking(0.3).index[0] in ("loud", "lines")
@@ -212,16 +212,15 @@ def test_a_limit_that_nobody_keeps_is_said(study):
 def test_in_sentences(study, table):
     said = study.summary().splitlines()
     best = table.iloc[0]
-    assert (
-        said[0] == f"'lines' finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
-    )
-    assert said[1].startswith("Clearly worse: 'raw' (")
-    assert said[2].startswith("This holds the noise alone")
-    assert said[3].startswith("More false alarms than 2.0%: 'loud' (")
+    rates = f"{best['pod']:.1%} of the damaged records at a false-alarm rate of {best['false_alarms']:.1%}"
+    assert said[0] == f"'lines' detects {rates}."
+    assert said[1].startswith("Significantly worse at 95% confidence: 'raw' (")
+    assert "noise only" in said[2]
+    assert said[3].startswith("False-alarm rates above the limit of 2.0%: 'loud' (")
     assert said[4] == "Stopped by an error: 'broken' (OSError: no dice)."
 
 
-def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
+def test_a_detector_whose_decisions_never_vary_is_significantly_worse(fem):
     """Such as a one-class SVM, whose index saturates far from its records."""
 
     class Deaf(MahalanobisDetector):
@@ -234,7 +233,7 @@ def test_a_detector_whose_decisions_never_vary_is_clearly_behind(fem):
     table = study.ranking()
     assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
     assert table.loc["deaf", "pod_deficit_ci_low"] > 0
-    assert "Clearly worse: 'deaf'" in study.summary()
+    assert "Significantly worse at 95% confidence: 'deaf'" in study.summary()
 
 
 def test_records_that_are_not_evaluated_are_said(fem):
@@ -247,7 +246,7 @@ def test_records_that_are_not_evaluated_are_said(fem):
     study.run(WEATHER)
     share = study.ranking().loc["half", "not_evaluated"]
     assert share == pytest.approx(0.5, abs=0.01)
-    assert f"neither healthy nor damaged: 'half' {share:.1%}." in study.summary()
+    assert f"(neither healthy nor damaged): 'half' {share:.1%}." in study.summary()
 
 
 @pytest.mark.one_case
@@ -260,7 +259,7 @@ def test_without_other_noise_nothing_is_significant(fem, options):
         table = study.ranking(by=by)
         assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
         assert not table["significantly_worse"].any()
-    assert "do not show which detectors" in study.summary()
+    assert "does not show which detectors" in study.summary()
 
 
 def test_measured_records_rank_by_what_was_found(fem):
@@ -312,7 +311,7 @@ def evaluated(random, names, pods, n_repeats=10, n_records=50, share=0.02):
 
 
 @pytest.mark.nightly
-def test_the_best_is_seldom_called_clearly_behind():
+def test_the_best_is_seldom_called_significantly_worse():
     random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
     n = 40
     for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
@@ -322,7 +321,7 @@ def test_the_best_is_seldom_called_clearly_behind():
     assert wrong <= binom.ppf(0.999, n, 0.05)
 
 
-def test_what_is_clearly_worse_is_called_so():
+def test_what_is_much_worse_is_called_significantly_worse():
     random = np.random.default_rng(0)
     records, rows = evaluated(random, ["good", "bad"], [0.6, 0.3])
     table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")

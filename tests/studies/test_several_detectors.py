@@ -268,7 +268,7 @@ def test_what_is_asked_of_one_of_several_detectors(study):
 
 
 @pytest.mark.nightly
-def test_what_to_add_asks_for_a_detector_of_several(fem):
+def test_compare_extensions_asks_for_a_detector_of_several(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
     several = study_of(fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, noise=0.01)
     several.run(WEATHER)

@@ -178,11 +178,9 @@ def test_rows_without_stamps_are_counted():
 def test_the_smallest_damage_that_is_soon_found_is_described_in_words(study):
     every = study.time_to_detection(detector="single").set_index("scenario")
     healthy, certain = every.loc["healthy"], every.loc["bottom 60 %"]
-    assert f"within 7 days in {round(100 * healthy['7D'])}" in healthy["text"]
-    in_text = (
-        f"is found within 1 day in 95 of 100 cases; a healthy structure alarms by then in {100 * healthy['1D']:.0f}"
-    )
-    assert certain["text"] == f"{in_text} of 100"
+    assert f"{round(100 * healthy['7D'])} within 7 days" in healthy["text"]
+    false = f"false alarms in that time: {100 * healthy['1D']:.0f} of 100"
+    assert certain["text"] == f"is detected within 1 day in 95 of 100 cases; {false}"
     soon = study.time_to_detection(detector="single", smallest=True).set_index("scenario")
     assert list(soon.index) == ["healthy", "crack"]
     assert every.loc["bottom 6 %", "reliable"] > pd.Timedelta("30D") >= soon.loc["crack", "reliable"]
@@ -201,8 +199,8 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
             warnings.simplefilter("ignore")  # of thresholds learned from too few windows
             study.run(WEATHER)
         words.append(study.time_to_detection().set_index("scenario").loc["bottom 0.1 %", "text"])
-    assert words[0].endswith("so that such an alarm says little")
-    assert words[1] == "is not found in 95 of 100 cases within the 365 days of the records"
+    assert words[0].endswith("so that such an alarm is weak evidence")
+    assert words[1] == "is detected in fewer than 95 of 100 cases within the 365 days of the records"
 
 
 @pytest.mark.parametrize(

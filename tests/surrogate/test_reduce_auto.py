@@ -78,7 +78,7 @@ def test_the_decision_is_monotone_in_rows_and_in_size():
     assert table[-1, -1]
 
 
-@pytest.mark.filterwarnings("ignore:12 complete rows")
+@pytest.mark.filterwarnings("ignore:.*few-rows")
 def test_few_rows_do_not_pay_for_a_basis():
     T, F = records(LARGE, 12)
     fem = chain(LARGE, FEW).fit(T, F)
@@ -87,7 +87,7 @@ def test_few_rows_do_not_pay_for_a_basis():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:12 complete rows")
+@pytest.mark.filterwarnings("ignore:.*few-rows")
 def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
     T, F = records(LARGE, 12)
     assert chain(LARGE, FEW, reduce=True).fit(T, F).inverse_.reduce is True
@@ -198,7 +198,7 @@ def with_surfaces(known=None):
 def test_many_rows_come_from_a_surface_and_the_others_are_counted():
     simulator = with_surfaces().damaged({"top": 0.2})
     later = np.vstack([np.repeat(USUAL, 4, axis=0), [[1.3, 1, 1, 1]], [[np.nan, 1, 1, 1]], 2 * USUAL[:3]])
-    with pytest.warns(UserWarning, match="4 of .* rows are outside the box"):
+    with pytest.warns(UserWarning, match="4 of .*outside-reduced-model"):
         found = simulator.frequencies(later)
     exact = simulator.model.frequencies(later[~np.isnan(later).any(axis=1)])
     np.testing.assert_allclose(found[~np.isnan(found).any(axis=1)], exact, rtol=1.5e-5)

@@ -69,7 +69,7 @@ def test_noise_in_training_damps_the_noise_of_estimates():
         for refine in (0, None):
             inverse = InverseSurrogate(TRUSS, QUADRATIC, bounds=0.2, noise=noise, refine=refine, random_state=0)
             with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", ".* far outside the bounds")  # as exact frequencies contradict them
+                warnings.filterwarnings("ignore", ".*outside-prior")  # as exact frequencies contradict them
                 errors[noise, refine] = np.abs(inverse.fit().predict(noisy) - HELD_OUT.theta).mean()
     assert errors[0.01, 0] < 0.8 * errors[0.0, 0]
     assert errors[0.01, None] < 0.8 * errors[0.0, None]
@@ -128,7 +128,7 @@ def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
 
 
 def test_more_parameters_than_modes_warns():
-    with pytest.warns(UserWarning, match="4 parameters and 3 modes"):
+    with pytest.warns(UserWarning, match=r"4 parameters .*3 modes.*\[underdetermined\]"):
         InverseSurrogate(make_truss(n_modes=3), LinearRegression(), bounds=0.2, n_samples=20, random_state=0).fit()
 
 
@@ -138,7 +138,7 @@ def crossing(track):
 
 
 def test_modes_that_change_order_warn_with_their_share_unless_tracked(recwarn):
-    with pytest.warns(UserWarning, match=r"modes change their order in \d+\.\d% of 100 samples"):
+    with pytest.warns(UserWarning, match="modes-cross"):
         InverseSurrogate(crossing(False), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()
     recwarn.clear()
     InverseSurrogate(crossing(True), LinearRegression(), bounds=0.3, n_samples=100, random_state=0).fit()

@@ -15,7 +15,7 @@ TRUSS = make_truss()
 T = make_truss_campaign(random_state=0).temperatures
 
 
-@pytest.mark.filterwarnings("ignore:the FE model cannot follow")
+@pytest.mark.filterwarnings("ignore:.*large-discrepancy")
 def test_predictions_are_free_of_the_shrinkage_of_the_prior():
     truth = 0.85 * np.exp(-0.002 * (T.to_numpy()[:, :1] - 10)) * np.ones(4)
     clean = TRUSS.frequencies(truth)

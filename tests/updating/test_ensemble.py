@@ -133,7 +133,7 @@ def test_a_warning_counts_models_in_which_sorted_modes_swap_places():
     sorted_ = AffineModel({("a",): np.diag([1.0, 0.0]), ("b",): np.diag([0.0, 1.1])}, np.eye(2), n_modes=2)
     F = sorted_.frequencies([[1.0, 1.0]])[0]
     updater = ModelUpdater(sorted_, bounds=0.7, prior=0.15).fit(F, frequency_std=0.05 * F)
-    with pytest.warns(UserWarning, match=r"modes swap places in \d+ of 30 drawn models"):
+    with pytest.warns(UserWarning, match=r"\d+ of 30 .*modes-cross"):
         updater.sample_models(30, random_state=0)
 
 
@@ -158,19 +158,19 @@ def test_shapes_make_models_alike_as_far_as_their_noise_allows():
 
 
 def test_each_warning_counts_the_models():
-    with pytest.warns(UserWarning, match=r"lie at the bounds of 'vertical' \(\d+ of 40\), and are less different"):
+    with pytest.warns(UserWarning, match=r"'vertical' \(\d+ of 40\).*at-bounds"):
         calibrated(bounds={"bottom": 0.7, "top": 0.7, "diagonal": 0.7, "vertical": 0.1}).sample_models(
             40, random_state=0
         )
     with pytest.warns(UserWarning, match="optimum"):
         hasty = calibrated(max_iter=1)
-    with pytest.warns(UserWarning, match="has not converged for 5 of 5 drawn models"):
+    with pytest.warns(UserWarning, match="5 of 5 .*not-converged"):
         hasty.sample_models(5, random_state=0)
     narrow = TRUSS.reduced(0.1, random_state=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         updater = calibrated(narrow)
-    with pytest.warns(UserWarning, match=r"\d+ of 6 theta are outside the bounds for which the model was reduced"):
+    with pytest.warns(UserWarning, match=r"\d+ of 6 .*outside-reduced-bounds"):
         updater.sample_models(6, random_state=0)
 
 

@@ -10,7 +10,7 @@ from skthermo.fem import AffineModel, mac, shape_jacobian
 from skthermo.updating import ModelUpdater, identifiability
 from tests.updating.test_updater import TRUSS, TRUTH, measured
 
-pytestmark = pytest.mark.filterwarnings("ignore:the optimum lies at the bounds")
+pytestmark = pytest.mark.filterwarnings("ignore:.*at-bounds")
 
 
 def oscillators(track, n_modes=3):
@@ -32,17 +32,17 @@ def test_a_false_match_of_swapped_modes_is_refused():
     bounds, F = [[0.9, 1.6], [0.6, 1.01], [0.5, 1.5]], np.sqrt([[1.3, 1.5, 9.0]]) / (2 * np.pi)
     honest = ModelUpdater(tracked, bounds=bounds, n_starts=8, random_state=0).fit(F)
     np.testing.assert_allclose(honest.theta_, [1.3, 1.01, 1.0], atol=1e-4)
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] swap places .* expected a model with track=True"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*modes-cross"):
         false = ModelUpdater(sorted_, bounds=bounds, n_starts=8, random_state=0).fit(F)
     assert false.starts_["objective"].min() < 1e-9 < honest.starts_["objective"].min()
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] are by their shapes other modes"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*mode-order"):
         updater = ModelUpdater(sorted_, bounds=0.6).fit(frequencies, shapes=np.eye(3), dofs=[0, 1, 2])
     np.testing.assert_allclose(updater.theta_, truth, rtol=1e-6)
     np.testing.assert_allclose(updater.table_["mac_after"], 1)
 
 
 def test_shapes_that_the_model_does_not_have_are_named():
-    with pytest.warns(UserWarning, match=r"no mode .* shapes of \['f3'\] \(MAC below 0.5\)"):
+    with pytest.warns(UserWarning, match=r"\['f3'\] .*foreign-shapes"):
         ModelUpdater(oscillators(True)).fit(
             oscillators(True).frequencies([np.ones(3)]), shapes=[[1, 0, 1], [0, 1, 1], [0, 0, 0.3]], dofs=[0, 1, 2]
         )
@@ -51,7 +51,7 @@ def test_shapes_that_the_model_does_not_have_are_named():
 def test_measured_modes_in_another_order_are_found_by_their_shapes():
     dofs, order = np.arange(0, 23, 3), [1, 0, 2, 4, 3, 5]
     frequencies, shapes = measured(TRUSS, TRUTH, dofs)
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2', 'f4', 'f5'\] are by their shapes other modes"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2', 'f4', 'f5'\] .*mode-order"):
         updater = ModelUpdater(TRUSS).fit(frequencies[order], shapes=shapes[:, order], dofs=dofs)
     np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
 
@@ -127,5 +127,5 @@ def test_a_third_partys_model_is_asked_for_what_it_can_do(model):
 
 def test_swapped_modes_of_a_third_partys_sorted_model_are_named():
     model, bounds = ThirdPartyModel(oscillators(False)), [[1, 1.6], [0.5, 1.05], [0.5, 1.5]]
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] swap places"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*modes-cross"):
         ModelUpdater(model, bounds=bounds, n_starts=8, random_state=0).fit(model.frequencies([[1.5, 0.9, 1.0]]))

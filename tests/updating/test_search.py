@@ -48,7 +48,7 @@ def test_a_box_that_is_not_positive_definite_throughout(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_an_optimum_without_modes_is_not_reached_and_said_to_be_so(method):
     updater = ModelUpdater(half_truss(), method=method, n_starts=3, random_state=0)
-    with pytest.warns(UserWarning, match="best start has not converged in .* within which the model has modes"):
+    with pytest.warns(UserWarning, match="not-converged"):
         updater.fit(TRUSS.frequencies([OUTSIDE]))
     starts = updater.starts_
     assert not starts["success"].any()
@@ -65,7 +65,7 @@ def test_a_start_without_derivatives_ends_where_it_is():
     model = CallableModel(only_nominal, TRUSS.parameter_names, 6, vectorized=True)
     for method in METHODS:
         updater = ModelUpdater(model, method=method, n_starts=2, random_state=0)
-        with pytest.warns(UserWarning, match="has not converged in 1 evaluations"):
+        with pytest.warns(UserWarning, match="not-converged"):
             updater.fit(TRUSS.frequencies([INSIDE]))
         np.testing.assert_array_equal(updater.theta_, 1)
         assert not updater.starts_["success"].any()
@@ -74,7 +74,7 @@ def test_a_start_without_derivatives_ends_where_it_is():
 
 def test_differences_are_one_sided_beside_theta_without_modes():
     theta = [0.9501, 1.0, 1.0, 1.0]
-    with pytest.warns(UserWarning, match="1 of 8 samples are NaN"):
+    with pytest.warns(UserWarning, match="1 of 8 .*no-solution"):
         found = sensitivity(half_truss(), theta, method="central", step=1e-3)
     exact = sensitivity(TRUSS, theta)
     np.testing.assert_allclose(found, exact, atol=1e-3)
@@ -124,7 +124,7 @@ FAILING = {
 def test_a_program_that_fails_at_many_theta_is_counted_in_one_warning(method, model):
     updater = ModelUpdater(model, method=method, n_starts=3, random_state=0).fit(TRUSS.frequencies([INSIDE]))
     np.testing.assert_allclose(updater.theta_, INSIDE, atol=1e-4)
-    with pytest.warns(UserWarning, match="best start has not converged") as caught:
+    with pytest.warns(UserWarning, match="not-converged") as caught:
         updater.fit(TRUSS.frequencies([OUTSIDE]))
     starts = updater.starts_
     best = starts.loc[starts["objective"].idxmin()]

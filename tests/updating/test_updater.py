@@ -13,7 +13,7 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from skthermo.updating import ModelUpdater, identifiability, sensitivity
 from tests.fem.frames import FRAME, portal
 
-pytestmark = pytest.mark.filterwarnings("ignore:the optimum lies at the bounds")
+pytestmark = pytest.mark.filterwarnings("ignore:.*at-bounds")
 
 TRUSS = make_truss()
 TRUTH = np.array([0.9, 1.1, 0.95, 1.05])
@@ -60,7 +60,7 @@ def test_the_objective_is_as_documented():
     frequencies, shapes = measured(TRUSS, TRUTH, dofs)
     std, weights, prior = 0.01 * np.arange(1, 7), np.arange(6.0), 0.2
     updater = ModelUpdater(TRUSS, shape_weight=weights, prior=prior, max_iter=1)
-    with pytest.warns(UserWarning, match="has not converged"):
+    with pytest.warns(UserWarning, match="not-converged"):
         updater.fit(frequencies, shapes=shapes, dofs=dofs, frequency_std=std)
     start = updater.starts_.loc[0]
     f, phi = measured(TRUSS, start.theta, dofs)
@@ -117,19 +117,19 @@ def test_complex_shapes_of_random_phase_are_made_real():
     frequencies, shapes = measured(TRUSS, TRUTH, dofs)
     turned = shapes * np.exp(1j * np.random.default_rng(0).uniform(0, 2 * np.pi, 6))
     updater = ModelUpdater(TRUSS, shape_weight=10.0)
-    with pytest.warns(UserWarning, match=r"shapes are complex: .* up to 0.0% of a shape's length"):
+    with pytest.warns(UserWarning, match="complex-shapes"):
         from_complex = clone(updater).fit(frequencies, shapes=turned, dofs=dofs)
     from_real = updater.fit(frequencies, shapes=shapes, dofs=dofs)
     np.testing.assert_allclose(from_complex.theta_, from_real.theta_, atol=1e-6)
 
 
-@pytest.mark.filterwarnings(r"ignore:\[.b., .c.\] hardly move the measured modes")
+@pytest.mark.filterwarnings("ignore:.*undetermined-parameters")
 def test_a_prior_holds_what_cannot_be_identified():
     model = AffineModel(
         {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}, np.eye(2), n_modes=2
     )
     frequencies = model.frequencies([[1.2, 0.8, 1.0]])
-    with pytest.warns(UserWarning, match="3 parameters are to be found from 2 residuals"):
+    with pytest.warns(UserWarning, match=r"3 parameters .*2 residuals.*\[underdetermined\]"):
         free = ModelUpdater(model).fit(frequencies)
     assert np.isinf(free.covariance_[2, 2])
     held = ModelUpdater(model, prior=[1.0, 1.0, 0.1], random_state=0, n_starts=3)
@@ -248,7 +248,7 @@ def test_parameters_that_no_mode_feels_are_named():
     """A hundred-thousandth of the third spring is a parameter."""
     terms = {("a",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 4.0, 0]), ("c",): np.diag([0, 0, 9e-5])}
     model = AffineModel(terms | {(): np.diag([0, 0, 9.0])}, np.eye(3), n_modes=3)
-    with pytest.warns(UserWarning, match=r"\['c'\] hardly move the measured modes and are not determined"):
+    with pytest.warns(UserWarning, match=r"\['c'\] .*undetermined-parameters"):
         ModelUpdater(model).fit(model.frequencies([[1.1, 0.9, 1.0]]))
 
 

@@ -311,5 +311,5 @@ class ReducedModel(AffineBase):
                 f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
                 f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
                 ModelWarning,
-                "outside the reduced box",
+                "outside-reduced-bounds",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 from math import comb
 from typing import Any
 
@@ -20,9 +21,8 @@ ENOUGH, LEAST_SERVED = 0.9, 0.5  # shares of the check points near rows: with le
 MARGIN, LEAST_MARGIN = 0.25, 0.02  # around the rows: shares of their half-width, and of ln theta
 ANYWHERE = 4  # one of so many points is anywhere in the box, the others are near rows
 MOST_ROWS = 1000  # rows, spread evenly, that the box is made of
-CLOSE = (
-    0.01  # relative distance of two modes in which they may cross or repel each other; a third of it where one is fit
-)
+CLOSE = 0.01  # relative distance of two modes in which the order of their columns is not known
+PAIRED = 0.05  # relative distance below which two modes are fitted together
 SAFETY = 0.5  # share of the smallest estimate at a check point of too large an error
 
 
@@ -77,12 +77,58 @@ class PrincipalBox:
         return np.clip(theta, *self.bounds.T)
 
 
+@dataclass(frozen=True)
+class SmoothCoordinates:
+    """Functions of the frequencies that are smooth in theta also where two modes cross or repel each other.
+
+    These are ln f of a mode alone, and of each of ``pairs`` of modes the mean of ln f and the square of half its
+    difference: symmetric functions of two eigenvalues have no branch points where these meet.
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of_modes(cls, frequencies: Array) -> SmoothCoordinates:
+        """The coordinates for some rows, (n_samples, n_modes): modes that come close are pairs, the closest first."""
+        logs, pairs, left = np.log(frequencies), [], set(range(frequencies.shape[1]))
+        gaps = {(i, j): np.nanmin(np.abs(logs[:, i] - logs[:, j])) for i, j in combinations(sorted(left), 2)}
+        for pair in sorted(gaps, key=gaps.__getitem__):
+            if gaps[pair] < PAIRED and left.issuperset(pair):
+                pairs.append(pair)
+                left.difference_update(pair)
+        return cls(tuple(pairs))
+
+    def of(self, frequencies: Array) -> tuple[Array, Array]:
+        """Coordinates, (n_samples, n_modes), and halves of the differences with their sign, (n_samples, n_pairs)."""
+        found, halves = np.log(frequencies), np.empty((len(frequencies), len(self.pairs)))
+        for number, (i, j) in enumerate(self.pairs):
+            mean, halves[:, number] = (found[:, j] + found[:, i]) / 2, (found[:, j] - found[:, i]) / 2
+            found[:, i], found[:, j] = mean, halves[:, number] ** 2
+        return found, halves
+
+    def frequencies(self, values: Array, errors: Array, signs: Array) -> tuple[Array, Array]:
+        """Frequencies, (n_samples, n_modes), and the largest of their relative errors in each row.
+
+        Given are coordinates with their errors, both changed in place, and the signs of the differences.
+        """
+        for number, (i, j) in enumerate(self.pairs):
+            half = np.sqrt(np.maximum(values[:, j], 0.0))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                errors[:, i] += errors[:, j] / (2 * half)
+            errors[:, j] = errors[:, i]
+            values[:, j] = values[:, i] + signs[:, number] * half
+            values[:, i] -= signs[:, number] * half
+        return np.exp(values), errors.max(axis=1)
+
+
 class FrequencySurface:
     """Frequencies of one structure as polynomials in ln theta, near the parameters that its weather gives.
 
     In the box of all parameters that a model may have, frequencies are no polynomials; along the rows of theta that the
     weather gives they nearly are. Polynomials of ln f are fitted by least squares to a few hundred solves near such
-    rows, and checked at others. A damaged structure needs a surface of its own.
+    rows, and checked at others. Of two modes that come within 2 % of each other, polynomials give the mean and the
+    squared difference of ln f, which are smooth also where modes cross or repel each other. A damaged structure needs a
+    surface of its own.
 
     Parameters
     ----------
@@ -118,7 +164,8 @@ class FrequencySurface:
     The box is that of the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %.
     The difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the
     box; where that estimate is more than half of the least one at a check point of too large an error, or more than at
-    all check points; and where two modes are within 1 %, where they may cross or repel each other.
+    all check points; and where two modes are within 1 %, or a polynomial of their difference leaves open which is
+    higher.
 
     Examples
     --------
@@ -144,21 +191,9 @@ class FrequencySurface:
     ):
         rows = np.asarray(theta, dtype=float)
         self._box = PrincipalBox.around(rows, None if bounds is None else np.asarray(bounds, dtype=float))
-        random = np.random.RandomState(0)
-        checks = self._box.drawn(CHECK_POINTS, random)
-        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
-        points, values = checks[:0], exact[:0]
-        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
-        self.share_ = 0.0
-        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
-            n_more = POINTS_PER_TERM * n_terms(rows.shape[1], degree) - len(points)
-            more = self._box.drawn(n_more, random)
-            points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
-            self._fit(points, values, degree)
-            self._check(checks, exact, near, tol)
-            if self.share_ >= ENOUGH:
-                break
-        self.n_solves_ = len(points) + len(checks)
+        self.n_solves_, self.share_ = 0, 0.0
+        if highest_degree >= FIRST_DEGREE:
+            self._learn(solve, highest_degree, tol)
         if self.share_ < LEAST_SERVED:
             raise RuntimeError(
                 f"polynomials of degree {highest_degree} give frequencies to {tol:g} at {self.share_:.0%} of the check "
@@ -215,18 +250,40 @@ class FrequencySurface:
         frequencies[~served] = np.nan
         return frequencies, served
 
+    def _learn(self, solve: Callable[[Array], Array], highest_degree: int, tol: float) -> None:
+        """Raise the degree until polynomials serve enough check points, or no higher one is allowed."""
+        random = np.random.RandomState(0)
+        checks = self._box.drawn(CHECK_POINTS, random)
+        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
+        points, values = checks[:0], exact[:0]
+        self._coordinates = SmoothCoordinates.of_modes(exact)
+        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
+        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
+            n_more = POINTS_PER_TERM * n_terms(checks.shape[1], degree) - len(points)
+            more = self._box.drawn(n_more, random)
+            points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
+            self._fit(points, values, degree)
+            self._check(checks, exact, near, tol)
+            if self.share_ >= ENOUGH:
+                break
+        self.n_solves_ = len(points) + len(checks)
+
     def _fit(self, points: Array, values: Array, degree: int) -> None:
         from sklearn.preprocessing import PolynomialFeatures  # importing fem does not load scikit-learn
 
         self.degree_, self._features = degree, PolynomialFeatures(degree)
         features = self._features.fit_transform(self._box.places(points))
-        fit = smallest_gap(values) > CLOSE / 3
         n_lower = n_terms(points.shape[1], degree - 1)
-        logs = np.log(values[fit])
-        whole, lower = (np.linalg.lstsq(part, logs, rcond=None)[0] for part in (features[fit], features[fit, :n_lower]))
+        smooth, halves = self._coordinates.of(values)
+        whole, lower = (np.linalg.lstsq(part, smooth, rcond=None)[0] for part in (features, features[:, :n_lower]))
         difference = whole.copy()
         difference[:n_lower] -= lower
-        self._coefficients = np.hstack([whole, difference])
+        apart = np.abs(halves) > CLOSE / 2
+        signed = [
+            np.linalg.lstsq(features[one], half[one], rcond=None)[0]
+            for one, half in zip(apart.T, halves.T, strict=True)
+        ]
+        self._coefficients = np.column_stack([whole, difference, *signed])
 
     def _check(self, checks: Array, exact: Array, near: NDArray[np.bool_], tol: float) -> None:
         frequencies, estimates = self._estimated(checks)
@@ -239,18 +296,26 @@ class FrequencySurface:
 
     def _estimated(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies and estimates of the largest relative error of each row, infinite where none is served."""
-        frequencies = np.full((len(theta), self._coefficients.shape[1] // 2), np.nan)
+        n_modes = (self._coefficients.shape[1] - len(self._coordinates.pairs)) // 2
+        frequencies = np.full((len(theta), n_modes), np.nan)
         estimates = np.full(len(theta), np.inf)
         known = np.flatnonzero(~np.isnan(theta).any(axis=1))
         places = self._box.places(theta[known])
         is_inside = self._box.holds(theta[known], places)
         inside = known[is_inside]
         if len(inside):
-            logs, differences = np.split(self._features.transform(places[is_inside]) @ self._coefficients, 2, axis=1)
-            frequencies[inside] = np.exp(logs)
+            polynomials = self._features.transform(places[is_inside]) @ self._coefficients
+            smooth, differences, halves = np.split(polynomials, [n_modes, 2 * n_modes], axis=1)
+            frequencies[inside], errors = self._coordinates.frequencies(smooth, np.abs(differences), np.sign(halves))
             is_apart = smallest_gap(frequencies[inside]) > CLOSE
-            estimates[inside] = np.where(is_apart, np.abs(differences).max(axis=1), np.inf)
+            estimates[inside] = np.where(is_apart & self._in_order(frequencies[inside], halves), errors, np.inf)
         return frequencies, estimates
+
+    def _in_order(self, frequencies: Array, halves: Array) -> NDArray[np.bool_]:
+        """Rows in which the polynomials of differences, with their sign, agree with the others to a half."""
+        found = self._coordinates.of(frequencies)[1]
+        agreed: NDArray[np.bool_] = np.abs(halves - found) < np.abs(found) / 2
+        return np.asarray(agreed.all(axis=1))
 
 
 def n_terms(n_parameters: int, degree: int) -> int:

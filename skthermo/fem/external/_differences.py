@@ -194,7 +194,7 @@ def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str
                 f"where parameter {name!r} is the only one, the constant rest of the stiffness is {ratio:.4g} times "
                 f"its term: was its factor {1 + (factors[name] - 1) / (1 + ratio):.4g} in place of {factors[name]:g}?",
                 ModelWarning,
-                "doubtful factor",
+                "doubtful-factor",
             )
 
 

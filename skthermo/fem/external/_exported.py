@@ -363,7 +363,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
                 f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
                 f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
                 ModelWarning,
-                "doubtful matrices",
+                "doubtful-matrices",
             )
     if len(springs) > 1 and has_pattern:
         whole = reduce(add, springs.values())
@@ -374,7 +374,7 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
         warn_user(
             f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
             ModelWarning,
-            "doubtful matrices",
+            "doubtful-matrices",
         )
     return list(found)
 
@@ -447,6 +447,6 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
             f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
             "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
             ModelWarning,
-            "doubtful matrices",
+            "doubtful-matrices",
         )
     return rest

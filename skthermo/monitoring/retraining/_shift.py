@@ -18,7 +18,6 @@ from skthermo._tables.text import probability_text
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._smallest import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian
-from skthermo.surrogate import TemperatureMapper
 
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real
 MATTERS = 0.2  # deviations of single records; smaller changes hardly move a detector's rates
@@ -91,6 +90,8 @@ def _relative(measured: pd.DataFrame, residuals: pd.DataFrame, is_relative: pd.S
 
 
 def _piecewise_linear(targets: list[Any]) -> TemperatureCompensator:
+    from skthermo.surrogate import TemperatureMapper  # monitors with a regression of their own need no chain
+
     return TemperatureCompensator(TemperatureMapper(), targets=targets, whiten=None)
 
 

@@ -74,11 +74,11 @@ class Column:
         n_levels, n_known, whole = len(self.levels), len(self.ordered), self.reading.whole
         is_coarse = n_levels <= FEW_VALUES and n_known >= LEAST_KNOWN
         if not n_known and not any(found.column == self.name for found in self.reading.findings):
-            self.reading.found("missing column", self.name, whole, f"{self.name!r} is NaN in all {len(whole)} rows")
+            self.reading.found("missing-column", self.name, whole, f"{self.name!r} is NaN in all {len(whole)} rows")
         elif n_levels == 1 < n_known:
             self.found("constant", self.levels, f"is {self.levels[0]:.6g}")
         elif n_known and is_coarse:
-            self.found("few values", self.levels, f"has the {n_levels} values {texts_of(self.levels)}")
+            self.found("few-values", self.levels, f"has the {n_levels} values {texts_of(self.levels)}")
         if n_levels < 2 or is_coarse:
             self.reading.useless.add(self.place)
         return n_levels < 2
@@ -101,5 +101,5 @@ def find_equal_columns(reading: Reading) -> None:
     for name, content in contents_of(reading):
         if content in seen:
             detail = f"{name!r} equals {seen[content]!r} in {len(reading.values)} rows"
-            reading.found("equal columns", name, reading.whole, detail)
+            reading.found("equal-columns", name, reading.whole, detail)
         seen.setdefault(content, name)

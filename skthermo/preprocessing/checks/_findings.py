@@ -85,33 +85,33 @@ def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", mode
     Notes
     -----
     - *Gross errors* are found by column, from its values in order, before anything else. A number stands for a missing
-      value (*markers*) if it is beyond -90 to 100 degrees Celsius and 50 degrees away from the others, or one that
-      loggers write (such as -999 or 9999) and far from the others. An *isolated level* is up to three values that
+      value (*placeholders*) if it is beyond -90 to 100 degrees Celsius and 50 degrees away from the others, or one that
+      loggers write (such as -999 or 9999) and far from the others. An *isolated-level* is up to three values that
       repeat exactly, 30 degrees away from all others, or, of frequencies, beyond half and twice their median. Sensors
-      are compared with the median of the others for another unit (*fahrenheit*, *scaled temperatures*) and for
-      *opposite signs*. A mode is far from the model's at a ratio above 1.6; a *unit of frequencies* is named if the
+      are compared with the median of the others for another unit (*fahrenheit*, *scaled-temperatures*) and for
+      *opposite-signs*. A mode is far from the model's at a ratio above 1.6; *unit-of-frequencies* is named if the
       typical ratio is within a fifth of that of the unit. Their ``severity`` is in the table: "meaningless" if results
       of a fit would be.
-    - *Stuck*: a run of at least five equal values. Where neighbouring records are equal by rounding, it has to be four
-      times as long as all but three runs of the column are. Nearly all other periods of its length must vary by at
-      least three steps of rounding, and its value must not be one at which the column rests again and again, as rain
-      does at zero.
-    - What the *weather* explains: piecewise-linear regression in up to three principal components of the temperatures,
+    - *stuck-sensor*, *stuck-mode*: a run of at least five equal values. Where neighbouring records are equal by
+      rounding, it has to be four times as long as all but three runs of the column are. Nearly all other periods of its
+      length must vary by at least three steps of rounding, and its value must not be one at which the column rests
+      again and again, as rain does at zero.
+    - *no-thermal-effect*: piecewise-linear regression in up to three principal components of the temperatures,
       predicted out of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every
       mode.
-    - *Time shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
+    - *time-shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
       less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
       Temperatures of up to a day before (24 rows without a ``DatetimeIndex``) are no finding: that may be inertia.
-    - *Exchanged modes*: in some rows, at least three, the values of two columns lie nearer to what the weather explains
+    - *exchanged-modes*: in some rows, at least three, the values of two columns lie nearer to what the weather explains
       of the other column, and ordering them at least halves what it leaves.
-    - *Outliers*: values more than eight robust standard deviations away from the median of the 25 rows around, and from
-      what the weather explains.
-    - *Memory*: an exponentially weighted mean of a sensor with a time constant of five days or more lowers the
+    - *frequency-outliers*: values more than eight robust standard deviations away from the median of the 25 rows
+      around, and from what the weather explains.
+    - *thermal-memory*: an exponentially weighted mean of a sensor with a time constant of five days or more lowers the
       out-of-fold error clearly, as `find_memory` finds it. Steps and trends are looked for beside this mean.
-    - *Step*: the level of a frequency beside what the weather explains changes at once, by at least five standard
-      errors, and this leaves at least a tenth less of its variance than a straight line does; not in fewer than 90
-      days, nor beside a stuck sensor. The row is the best of a hundred places.
-    - *Trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
+    - *sudden-change*: the level of a frequency beside what the weather explains changes at once, by at least five
+      standard errors, and this leaves at least a tenth less of its variance than a straight line does; not in fewer
+      than 90 days, nor beside a stuck sensor. The row is the best of a hundred places.
+    - *trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
       the scatter of a single record; not in fewer than 90 days, nor beside a stuck sensor.
 
     Examples
@@ -124,7 +124,7 @@ def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", mode
     >>> late = year.frequencies.shift(60)
     >>> check_records(year.temperatures, late).table[["what", "n_rows"]]
              what  n_rows
-    0  time shift     305
+    0  time-shift     305
     """
     if not isinstance(unit, str):
         raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
@@ -202,7 +202,7 @@ class _Records:
 
 
 def _stuck(records: _Records) -> Iterator[Finding]:
-    for what, table, names in (("stuck sensor", records.T, records.sensors), ("stuck mode", records.F, records.modes)):
+    for what, table, names in (("stuck-sensor", records.T, records.sensors), ("stuck-mode", records.F, records.modes)):
         for name, column in zip(names, table.T, strict=True):
             for rows in stuck_runs(column):
                 if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
@@ -227,11 +227,11 @@ def _against_weather(records: _Records) -> Iterator[Finding]:
     usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
     shift = best_shift(lines, past, places, F, folds, records.inertia)
     if shift is not None:
-        yield records.finding("time shift", "", *_shifted(records, shift))
+        yield records.finding("time-shift", "", *_shifted(records, shift))
         return
     if len(share) and (share < NOTHING).all() and not records.has_faulty_sensors:
         detail = f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
-        yield records.finding("weather", "", usable, detail)
+        yield records.finding("no-thermal-effect", "", usable, detail)
         return
     yield from (finding for finding, _ in slow)
     yield from changes
@@ -267,7 +267,7 @@ def _slow_means(records: _Records) -> Iterator[tuple[Finding, Array]]:
                 f"{part['fall'].mean():.0%}: ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
             )
             inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-            yield records.finding("memory", sensor, usable, detail), inputs
+            yield records.finding("thermal-memory", sensor, usable, detail), inputs
 
 
 def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
@@ -275,7 +275,7 @@ def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iter
         names = f"{records.modes[first]!r} and {records.modes[second]!r}"
         n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
         detail = f"{names} in {len(rows)} of {n_both} rows, {records.period(rows)}"
-        yield records.finding("exchanged modes", names, rows, detail)
+        yield records.finding("exchanged-modes", names, rows, detail)
         records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
 
 
@@ -313,7 +313,7 @@ def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[Findi
                 f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g}{records.unit} in "
                 f"{records.period(rows[:1])}"
             )
-            yield records.finding("outliers", name, rows, detail)
+            yield records.finding("frequency-outliers", name, rows, detail)
     F[far] = np.nan
     records.outliers |= far
 
@@ -349,7 +349,9 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
             detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"
-            found.append(records.finding("step", name, known, f"{detail}, standard error {step.standard_error:.1g}"))
+            found.append(
+                records.finding("sudden-change", name, known, f"{detail}, standard error {step.standard_error:.1g}")
+            )
             continue
         change, error = row["change"], row["standard_error"]
         scatter = error * np.sqrt(row["n_independent"] / 12)

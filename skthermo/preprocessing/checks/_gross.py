@@ -118,7 +118,7 @@ class CleanedRecords:
     @property
     def have_wrong_times(self) -> bool:
         """Whether the rows have times that cannot be used."""
-        wrong = {"missing stamps", "equal stamps", "stamps from numbers", "stamps as text"}
+        wrong = {"missing-stamps", "equal-stamps", "stamps-from-numbers", "stamps-as-text"}
         return any(found.what in wrong for found in self.findings)
 
     def _index_of(self, reading: Reading) -> pd.Index:
@@ -170,7 +170,7 @@ def _few_rows(tables: list[Reading]) -> list[Finding]:
     known = np.flatnonzero(np.all([(~np.isnan(one.values[:n_rows])).any(axis=1) for one in tables], axis=0))
     if len(known) >= FEW_ROWS or (not len(known) and any(reading.findings for reading in tables)):
         return []
-    kind = "few rows" if len(known) > 1 else "no rows"
+    kind = "few-rows" if len(known) > 1 else "no-rows"
     return [tables[0].finding(kind, "", known, f"{len(known)} of {n_rows} rows have values")]
 
 
@@ -179,12 +179,12 @@ def _different_rows(first: Reading, second: Reading) -> Finding:
     rows = [len(reading.values) for reading in (first, second)]
     if rows[0] != rows[1]:
         detail = f"{rows[0]} rows of {first.what} and {rows[1]} of {second.what}"
-        return Finding("different rows", "", abs(rows[0] - rows[1]), None, None, detail)
+        return Finding("different-rows", "", abs(rows[0] - rows[1]), None, None, detail)
     differ = np.flatnonzero([one != other for one, other in zip(first.given_index, second.given_index, strict=True)])
     row = differ[0] if len(differ) else 0
     labels = f"{first.given_index[row]} and {second.given_index[row]}"
     detail = f"{len(differ)} of {rows[0]} rows have different labels, the first row {row}: {labels}"
-    return Finding("different rows", "", len(differ), first.given_index[row], first.given_index[differ[-1]], detail)
+    return Finding("different-rows", "", len(differ), first.given_index[row], first.given_index[differ[-1]], detail)
 
 
 def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
@@ -192,7 +192,7 @@ def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
     modes = {content: name for name, content in contents_of(F)}
     shared = [(name, modes[content]) for name, content in contents_of(T) if content in modes]
     if shared:
-        what = "temperatures are frequencies"
+        what = "temperatures-are-frequencies"
         return [T.finding(what, one, T.whole, f"{one!r} of the temperatures equals {two!r}") for one, two in shared]
     if not in_hertz or min(len(T.values), len(F.values)) < FEW_ROWS:
         return []
@@ -202,7 +202,7 @@ def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
     detail = (
         f"half of the temperatures lie within {steady:.1%} of their median, of the frequencies within {changing:.0%}"
     )
-    return [T.finding("exchanged tables", "", T.whole, detail)]
+    return [T.finding("exchanged-tables", "", T.whole, detail)]
 
 
 def _relative_change(values: Array) -> tuple[float, bool]:
@@ -225,25 +225,25 @@ def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
         column = Column(F, place, name)
         rest = column.ordered[~np.isin(column.ordered, LOGGED)]
         if not len(rest):
-            column.put_aside("markers", column.levels, unit)
+            column.put_aside("placeholders", column.levels, unit)
         elif len(rest) < len(column.ordered):
             repeats = (column.counts > 1) | (column.levels < 0)
             logged = column.levels[np.isin(column.levels, LOGGED) & repeats]
             low, middle, high = (rest[int(share * (len(rest) - 1))] for share in (0.1, 0.5, 0.9))
-            column.put_aside("markers", logged[np.abs(logged - middle) > BEYOND * (high - low)], unit)
+            column.put_aside("placeholders", logged[np.abs(logged - middle) > BEYOND * (high - low)], unit)
         if in_hertz:
-            column.put_aside("not positive", column.levels[column.levels <= 0], unit)
+            column.put_aside("not-positive", column.levels[column.levels <= 0], unit)
         if column.is_poor():
             continue
         middle, width = column.quantile(0.5), column.quantile(0.9) - column.quantile(0.1)
         isolated = column.isolated_levels(BEYOND * width)
         if in_hertz:
             isolated = isolated[(isolated > OTHER_MODE * middle) | (isolated < middle / OTHER_MODE)]
-        column.put_aside("isolated level", isolated if width > 0 else isolated[:0], unit)
+        column.put_aside("isolated-level", isolated if width > 0 else isolated[:0], unit)
         deviation = QUARTILES * (column.quantile(0.75) - column.quantile(0.25))
         far = np.abs(column.levels - column.quantile(0.5)) > IMPLAUSIBLE * deviation
         if deviation > 0 and not beside_weather:
-            column.put_aside("implausible values", column.levels[far], unit)
+            column.put_aside("implausible-values", column.levels[far], unit)
     find_equal_columns(F)
 
 
@@ -252,7 +252,7 @@ def _compare_with_model(F: Reading, model: Any) -> None:
     nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
     if len(nominal) != len(F.columns):
         detail = f"{len(F.columns)} columns for {len(nominal)} modes"
-        F.found("number of modes", "", F.whole, detail)
+        F.found("number-of-modes", "", F.whole, detail)
         return
     middles = median(F.values)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -264,11 +264,11 @@ def _compare_with_model(F: Reading, model: Any) -> None:
     best = min(off, key=lambda name: np.nanmedian(off[name]))
     beside = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model"
     if np.nanmedian(off[best]) < SAME and np.nanmedian(in_hertz) > OTHER:
-        F.found("unit of frequencies", "", F.whole, f"{beside} are about those in {best}; {len(F.whole)} rows")
+        F.found("unit-of-frequencies", "", F.whole, f"{beside} are about those in {best}; {len(F.whole)} rows")
         return
     for place, name in enumerate(F.columns):
         if in_hertz[place] > OTHER:
             fits = [unit for unit, errors in off.items() if errors[place] < SAME]
             hint = f", as in {fits[0]}" if fits else ""
             detail = f"{name!r} has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
-            F.found("unit of a mode", name, F.whole, detail)
+            F.found("unit-of-a-mode", name, F.whole, detail)

@@ -108,27 +108,27 @@ class Reading:
         self.columns = names or [f"{prefix}{place + 1}" for place in range(values.shape[1])]
 
     def _is_no_table(self, detail: str) -> None:
-        self.findings.append(Finding("no table", "", 0, None, None, detail))
+        self.findings.append(Finding("no-table", "", 0, None, None, detail))
 
     def _check_names(self, columns: pd.Index) -> None:
         if isinstance(columns, pd.MultiIndex) or any(isinstance(name, tuple) for name in columns):
             self.found(
-                "column names", "", self.whole, f"the {self.what} have tuples such as {columns[0]!r}", period=False
+                "column-names", "", self.whole, f"the {self.what} have tuples such as {columns[0]!r}", period=False
             )
         texts = [isinstance(name, str) for name in columns]
         if any(texts) and not all(texts):
             others = [name for name, is_text in zip(columns, texts, strict=True) if not is_text]
-            self.found("column names", "", self.whole, f"{others[0]!r} is no text beside others", period=False)
+            self.found("column-names", "", self.whole, f"{others[0]!r} is no text beside others", period=False)
         for name in columns[columns.duplicated()].unique():
             number = int(np.sum(columns == name))
-            self.found("column names", name, self.whole, f"{name!r} is the name of {number} columns", period=False)
+            self.found("column-names", name, self.whole, f"{name!r} is the name of {number} columns", period=False)
 
     def _check_size(self) -> None:
-        if any(found.what == "no table" for found in self.findings):
+        if any(found.what == "no-table" for found in self.findings):
             return
         if not self.values.size:
             detail = f"the {self.what} have {self.values.shape[0]} rows and {self.values.shape[1]} columns"
-            self.findings.append(Finding("no rows", "", len(self.values), None, None, detail))
+            self.findings.append(Finding("no-rows", "", len(self.values), None, None, detail))
 
     def set_infinite_aside(self) -> None:
         """Make infinite values NaN, and those that are too large to be squared."""
@@ -137,7 +137,7 @@ class Reading:
         for column in np.flatnonzero(infinite.any(axis=0)):
             rows = np.flatnonzero(infinite[:, column])
             name, value = self.columns[column], self.values[rows[0], column]
-            self.found("infinite values", name, rows, f"{name!r} is {value:g} in {self.share(rows)}")
+            self.found("infinite-values", name, rows, f"{name!r} is {value:g} in {self.share(rows)}")
             self.values[rows, column] = np.nan
 
 
@@ -151,7 +151,7 @@ def _frame_values(table: pd.DataFrame, reading: Reading) -> Array:
         try:
             values[:, place] = np.ravel(as_floats(table.iloc[:, [place]]))
         except Exception as error:  # objects of users may raise anything
-            reading.found("no numbers", name, reading.whole, _reason(error), period=False)
+            reading.found("no-numbers", name, reading.whole, _reason(error), period=False)
     return values
 
 
@@ -190,27 +190,27 @@ def stamp_findings(index: pd.Index) -> list[Finding]:
         return _other_labels(index)
     missing = np.flatnonzero(index.isna())
     if len(missing):
-        return found("missing stamps", missing, f"{len(missing)} of {len(index)} rows, the first row {missing[0]}")
+        return found("missing-stamps", missing, f"{len(missing)} of {len(index)} rows, the first row {missing[0]}")
     try:
         stamps = index.as_unit("ns").asi8
     except ValueError:  # beyond the years that nanoseconds reach
-        return found("stamps from numbers", everything, f"{index.min()} to {index.max()}")
+        return found("stamps-from-numbers", everything, f"{index.min()} to {index.max()}")
     if len(index) > 1 and (stamps == stamps[0]).all():
-        return found("equal stamps", everything, f"{label_of(index[0])} in all {len(index)} rows")
+        return found("equal-stamps", everything, f"{label_of(index[0])} in all {len(index)} rows")
     steps = np.diff(stamps)
     if len(index) > 1 and 0 <= stamps.max() < NUMBERED.value and np.median(np.abs(steps)) < SHORTEST_STEP.value:
         detail = f"{index[0]} to {index[-1]} in {len(index)} rows, all at the beginning of 1970"
-        return found("stamps from numbers", everything, detail)
+        return found("stamps-from-numbers", everything, detail)
     findings = []
     if not index.is_unique:
         again = np.flatnonzero(index.duplicated())
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {len(index)} rows have the time of another, {period_of(index, again)}"
-        findings += found("repeated stamps", again, detail)
+        findings += found("repeated-stamps", again, detail)
     if (steps < 0).any():
         late = 1 + np.flatnonzero(steps < 0)
         detail = f"{len(late)} of {len(index)} rows are earlier than the row before, the first row {late[0]}"
-        findings += found("unsorted stamps", late, f"{detail} ({label_of(index[late[0]])})")
+        findings += found("unsorted-stamps", late, f"{detail} ({label_of(index[late[0]])})")
     return findings
 
 
@@ -222,10 +222,10 @@ def _other_labels(index: pd.Index) -> list[Finding]:
         months = index.to_numpy() // 100 % 100
         if DATES[0] <= ends[0] < ends[1] <= DATES[1] and ((months >= 1) & (months <= 12)).all():
             detail = f"the index holds dates as integers, such as {index[0]}"
-            return [finding(index, "stamps as text", "", everything, detail)]
+            return [finding(index, "stamps-as-text", "", everything, detail)]
     try:
         as_stamps(index)
     except Exception as error:  # labels of users may be anything
         detail = str(error).partition(";")[0].replace("X has", "the index has").replace("of X ", "")
-        return [finding(index, "stamps as text", "", everything, f"{detail:.150}")]
+        return [finding(index, "stamps-as-text", "", everything, f"{detail:.150}")]
     return []

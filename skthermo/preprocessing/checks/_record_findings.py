@@ -14,7 +14,7 @@ from skthermo.preprocessing.checks._kinds import MEANINGLESS, WARNINGS, Finding
 
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
 MOST_NAMED = 12  # findings of one kind that a sentence lists
-UNWARNED = frozenset({"few rows"})  # estimators that need more warn of them
+UNWARNED = frozenset({"few-rows"})  # estimators that need more warn of them
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,10 +24,10 @@ class RecordFindings(SavesFrames):
     Parameters
     ----------
     table : DataFrame
-        A row for each finding: ``what`` was found in which ``column``, in how many rows (``n_rows``), ``from`` and
-        ``to`` which row by the labels of the records' index, a sentence that says more (``detail``), its ``severity``
-        ("meaningless" if results of a fit would be, else "doubtful"), its ``consequence``, and the ``action`` to take.
-        Empty where nothing was found.
+        A row for each finding: ``what`` was found (its code in the guide) in which ``column``, in how many rows
+        (``n_rows``), ``from`` and ``to`` which row by the labels of the records' index, a sentence that says more
+        (``detail``), its ``severity`` ("meaningless" if results of a fit would be, else "doubtful"), its
+        ``consequence``, and the ``action`` to take. Empty where nothing was found.
     n_rows : int
         Number of records.
     outliers : DataFrame of bool of shape (n_records, n_modes), optional
@@ -43,7 +43,7 @@ class RecordFindings(SavesFrames):
     >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
-    stuck sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
+    stuck-sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
         the last value would be learned as weather; put NaN where it is stuck
     """
 

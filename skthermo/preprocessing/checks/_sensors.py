@@ -60,8 +60,8 @@ def _put_no_temperatures_aside(column: Column) -> None:
         in_kelvin = is_none & (levels > KELVIN[0]) & (levels < KELVIN[1])
         kelvin, others = levels[in_kelvin], levels[is_none & ~in_kelvin]
         column.put_aside("kelvin", kelvin)
-        column.put_aside("markers", others)
-    column.put_aside("isolated level", column.isolated_levels(JUMP))
+        column.put_aside("placeholders", others)
+    column.put_aside("isolated-level", column.isolated_levels(JUMP))
 
 
 def _stand_apart(levels: Array, some: tuple[float, ...]) -> NDArray[np.bool_]:
@@ -88,10 +88,10 @@ def _compare_sensors(columns: list[Column]) -> None:
     fine = [column for column in others if not _is_scaled(column)]
     for column in fine:
         if len(others) > 2 * len(fine):
-            column.found("scaled temperatures", column.levels, f"{column.span}, beside others in such a unit,")
+            column.found("scaled-temperatures", column.levels, f"{column.span}, beside others in such a unit,")
         else:
             beyond = (column.levels < COLDEST) | (column.levels > HOTTEST)
-            column.put_aside("implausible values", column.levels[beyond])
+            column.put_aside("implausible-values", column.levels[beyond])
 
 
 def _common_quantiles(columns: list[Column]) -> Array:
@@ -120,7 +120,7 @@ def _is_scaled(column: Column) -> bool:
         if ends[0] / scale > COLDEST and ends[1] / scale < HOTTEST:
             is_smooth = column.quantile(0.95) - column.quantile(0.05) > SMOOTH * np.median(steps)
             if is_smooth:
-                column.found("scaled temperatures", column.levels, f"{column.span}, as in degrees times {scale:g},")
+                column.found("scaled-temperatures", column.levels, f"{column.span}, as in degrees times {scale:g},")
             return bool(is_smooth)
     return False
 
@@ -143,7 +143,7 @@ def _is_in_another_unit(column: Column, place: int, quantiles: Array) -> bool:
         return True
     is_wide = high - low > WIDE or column.levels[-1] > HOTTEST or column.levels[0] < COLDEST
     if is_wide and abs(middle / SCALES[0] - centre) < NEAR / 2 and ALIKE[0] < ratio / SCALES[0] < ALIKE[1]:
-        column.found("scaled temperatures", column.levels, beside)
+        column.found("scaled-temperatures", column.levels, beside)
         return True
     return False
 
@@ -172,7 +172,7 @@ def _opposite_signs(columns: list[Column]) -> list[Column]:
             partner = f"{columns[1].name!r}" if len(columns) == 2 else "the others"
             whole = column.reading.whole
             detail = f"{column.name!r} and {partner} have a correlation of {against:.2f} in {len(whole)} rows"
-            column.reading.found("opposite signs", column.name, whole, detail)
+            column.reading.found("opposite-signs", column.name, whole, detail)
             mirrored.append(column)
             if len(columns) == 2:
                 break

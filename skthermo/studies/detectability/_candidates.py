@@ -1,6 +1,5 @@
 """The detectors of a study: the columns that each sees, what it has learned, and the smallest damage that it finds."""
 
-import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.warnings import reported_by_caller
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts
@@ -145,8 +145,7 @@ class Arrangement:
 def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     """a90 of the curve; without a finite slope, the middle of its bracket; infinite where damage is not found."""
     try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="the (severities|curve lies)")
+        with reported_by_caller({"separated-severities", "poor-curve-fit"}):
             curve = pod_curve(severities, n_detected, n_records)
     except ValueError:  # the rate does not increase with severity, or nothing could be evaluated
         return np.inf

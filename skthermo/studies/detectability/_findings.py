@@ -365,7 +365,7 @@ class StudyFindings:
 
         Differences are paired, as all detectors evaluate the same records in every repeat. Their bounds are t intervals
         of jackknife pseudo-values over the repeats, with the error of the moved threshold and Bonferroni's correction
-        for all comparisons with the first row. They hold the noise alone: neither another baseline nor an error of the
+        for all comparisons with the first row. They include noise alone: neither another baseline nor an error of the
         model. A threshold learned from n independent records at 2 % has itself a true rate with a standard deviation
         of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
 
@@ -388,11 +388,11 @@ class StudyFindings:
         Mahalanobis          0.02  0.22              0.21                False
         forest               0.02  0.18              0.17                False
         >>> print(study.summary())
-        'Mahalanobis' finds 21.9% of the damaged records at 1.6% false alarms.
-        Not clearly worse: 'forest' (17.8% at 1.6%).
-        This holds the noise alone: other weather, another baseline or an error of the model may change the order.
-        'healthy' raises a false alarm within 1 day in 2, within 7 days in 10, within 30 days in 37 of 100 cases.
-        'bottom 10 %' is found within 13 days in 95 of 100 cases; a healthy structure alarms by then in 18 of 100.
+        'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.6%.
+        Not significantly worse at 95% confidence: 'forest' (17.8% at 1.6%).
+        These comparisons include noise only: another year, baseline or FE model may change the order.
+        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 10 within 7 days, 37 within 30 days.
+        'bottom 10 %' is detected within 13 days in 95 of 100 cases; false alarms in that time: 18 of 100.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
@@ -461,7 +461,7 @@ class StudyFindings:
         return np.repeat([False, True], [len(healthy), len(damaged)]), np.r_[healthy, damaged]
 
     def summary(self, max_false_alarms: float = 0.02, source: str = "simulated") -> str:
-        """Which detector finds most, and which are not clearly worse, in plain sentences.
+        """Which detector detects most, and which are not significantly worse, in sentences.
 
         Parameters
         ----------
@@ -474,7 +474,7 @@ class StudyFindings:
         -------
         str
             What `ranking` says, a line for each group of detectors, and what `time_to_detection` says of the first
-            one: of the healthy structure, and of each family the smallest severity that is found reliably.
+            one: of the healthy structure, and of each family the smallest severity that is detected reliably.
 
         Raises
         ------
@@ -483,13 +483,16 @@ class StudyFindings:
         """
         ranking = self.ranking(max_false_alarms, source)
         waits = self.time_to_detection(source=source, detector=ranking.index[0], smallest=True)
-        lines = [in_words(ranking, max_false_alarms), *(f"{one.scenario!r} {one.text}." for one in waits.itertuples())]
+        lines = [
+            in_words(ranking, max_false_alarms, self.confidence),
+            *(f"{one.scenario!r} {one.text}." for one in waits.itertuples()),
+        ]
         if self.replicates is not None and source == SIMULATED:
             lines.append(self.uncertainty_summary(ranking.index[0]))
         return "\n".join(lines)
 
     def uncertainty_summary(self, detector: str | None = None) -> str:
-        """What the bands hold, and which part of the widest one is the largest, in plain sentences.
+        """Which uncertainties the prediction intervals include, and which dominates the widest one, in sentences.
 
         Parameters
         ----------
@@ -499,7 +502,7 @@ class StudyFindings:
         Returns
         -------
         str
-            A line on what the bands hold, one on the scenario with the widest band, and one on rates outside theirs.
+            A line on what the intervals include, one on the scenario with the widest, and one on rates outside theirs.
 
         Raises
         ------

@@ -268,7 +268,7 @@ def pod_curve(
             f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
             f"unknown, and a90 lies {place}; expected {expected}",
             ResultWarning,
-            "separated severities",
+            "separated-severities",
         )
     else:
         increases = x[k > 0].max() > x[k < n].min()
@@ -288,7 +288,7 @@ def pod_curve(
             f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
             "severities near a90 and fit those alone",
             ResultWarning,
-            "curve beside its points",
+            "poor-curve-fit",
         )
     return curve
 
@@ -399,7 +399,7 @@ class FamilyRates:
                 raise
             rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
             cause = f"{rare}baseline raise the threshold" if self.is_undetected else ""
-            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "family without a curve")
+            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "no-curve")
             return bracket
         if np.isnan(curve.slope):
             return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)

@@ -164,34 +164,34 @@ def _margin(best: Array, other: Array, confidence: float, n_comparisons: int) ->
     return float(t.isf(tail, n - 1) * (best - other).std(ddof=1) / np.sqrt(n))
 
 
-def in_words(table: pd.DataFrame, limit: float) -> str:
-    """What a ranking says, in plain sentences."""
+def in_words(table: pd.DataFrame, limit: float, confidence: float) -> str:
+    """A ranking in sentences."""
     failed, ranked = table[table["error"] != ""], table[table["error"] == ""]
     quiet, loud = ranked[ranked["within_limit"]], ranked[~ranked["within_limit"]]
     best = (quiet if len(quiet) else ranked).iloc[0]
     lines = [
-        f"{best.name!r} finds {best['pod']:.1%} of the damaged records at {best['false_alarms']:.1%} false alarms."
+        f"{best.name!r} detects {best['pod']:.1%} of the damaged records at a false-alarm rate of "
+        f"{best['false_alarms']:.1%}."
     ]
     if not len(quiet):
-        lines = [f"No detector keeps the limit of {limit:.1%} false alarms. With the fewest, {lines[0]}"]
+        lines = [f"All false-alarm rates exceed the limit of {limit:.1%}. With the lowest one, {lines[0]}"]
     behind = quiet.drop(index=best.name, errors="ignore")
     if len(behind) and behind["pod_deficit_ci_low"].isna().all():
-        lines.append("Records of one repeat do not show which detectors are clearly worse.")
+        lines.append("One repeat does not show which detectors are significantly worse; expected two or more.")
     else:
-        is_clear = behind["significantly_worse"]
-        for text, some in (("Not clearly worse", behind[~is_clear]), ("Clearly worse", behind[is_clear])):
-            shares = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
-            lines += [f"{text}: {', '.join(shares)}."] if shares else []
+        is_worse = behind["significantly_worse"]
+        for text, some in (("Not significantly worse", behind[~is_worse]), ("Significantly worse", behind[is_worse])):
+            rates = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
+            lines += [f"{text} at {confidence:.0%} confidence: {', '.join(rates)}."] if rates else []
         if len(behind):
             lines.append(
-                "This holds the noise alone: other weather, another baseline or an error of the model may change the "
-                "order."
+                "These comparisons include noise only: another year, baseline or FE model may change the order."
             )
     if len(quiet):
         shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
-        lines += [f"More false alarms than {limit:.1%}: {', '.join(shares)}."] if shares else []
+        lines += [f"False-alarm rates above the limit of {limit:.1%}: {', '.join(shares)}."] if shares else []
     not_evaluated = ranked.loc[ranked["not_evaluated"] > 0, "not_evaluated"]
     shares = [f"{name!r} {share:.1%}" for name, share in not_evaluated.items()]
-    lines += [f"Records that are not evaluated, neither healthy nor damaged: {', '.join(shares)}."] if shares else []
+    lines += [f"Records not evaluated (neither healthy nor damaged): {', '.join(shares)}."] if shares else []
     lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
     return "\n".join(lines)

@@ -13,6 +13,7 @@ from joblib import delayed
 from scipy.special import expit, logit
 from scipy.stats import t
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, without_warnings
 from skthermo._io import run_jobs
@@ -44,7 +45,7 @@ NAMES = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 class ReplicateRates:
     """Rates of alarms in replicates, (n_replicates, n_parts, n_draws), by detector and scenario, as parts are added
     one after the other, and ``own`` rates of the study's repeats; ``n_records`` are evaluated in each draw, and
-    ``with_noise`` says whether bands hold the noise, too."""
+    ``with_noise`` says whether intervals include the noise, too."""
 
     rates: Mapping[Key, Array]
     own: Mapping[Key, Array]
@@ -82,7 +83,7 @@ class ReplicateRates:
                 f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
                 "others",
                 ModelWarning,
-                "failed replicates",
+                "failed-replicates",
             )
         own = _counted(evaluation, simulation.scenarios, simulation.T)
         keys = [key for key in found[0] if all(key in one for one in (own, *found))]
@@ -210,7 +211,7 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
     random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
     seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
     here, steps, drawn = simulation, [], []
-    with without_warnings(), checked_once(), single_blas_thread():
+    with without_warnings(), answers_kept(), checked_once(), single_blas_thread():
         try:
             for part, chain, T in replicates.replicate(number):
                 if not drawn or here.T is not T:
@@ -257,11 +258,13 @@ def _counted(evaluation: Evaluation, scenarios: Sequence[BaseScenario], T: Table
 
 
 def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:
-    """What the bands of a detector hold, the widest one and its parts, and which rates are outside."""
+    """What the intervals of a detector include, the widest one and its parts, and which rates are outside."""
     if parts is None:
-        return "Bands hold the noise alone: neither other weather or training records nor an error of the model."
+        return "Intervals include noise only, not other weather, other training records or an error of the model."
     names = [column for column in parts.columns if column in NAMES]
-    lines = [f"Bands of {confidence:.0%} hold {_listed([NAMES[name] for name in names])}."]
+    lines = [
+        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}."
+    ]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()
     if len(width) and (detector, width.idxmax()) in parts.index:
@@ -269,22 +272,22 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
         shares = parts.loc[(detector, widest.name), [f"{name} share" for name in names]].set_axis(names)
         large = shares[shares >= SMALL].sort_values(ascending=False)
         causes = _listed([f"{share:.0%} from {NAMES[name]}" for name, share in large.items()])
-        band = f"{widest['pi_low']:.1%} to {widest['pi_high']:.1%}"
+        interval = f"{widest['pi_low']:.1%} to {widest['pi_high']:.1%}"
         lines.append(
-            f"A measured campaign of {widest.name!r} should show {band} of its records in alarm, the widest band."
+            f"The widest is that of {widest.name!r}: {interval} of the records of a measured campaign in alarm."
         )
         if causes:
-            lines.append(f"Of its variance come {causes}.")
+            lines.append(f"Its variance comes {causes}.")
     outside = rows[(rows["rate"] < rows["pi_low"]) | (rows["rate"] > rows["pi_high"])]
     if len(outside):
         shares = [
-            f"{name!r} ({row['rate']:.1%}, band {row['pi_low']:.1%} to {row['pi_high']:.1%})"
+            f"{name!r} ({row['rate']:.1%}, interval {row['pi_low']:.1%} to {row['pi_high']:.1%})"
             for name, row in outside.iterrows()
         ]
-        cause = "the training records contradict the chain's model: calibrate it (ModelUpdater)"
+        cause = "The training records contradict the chain's FE model: calibrate it (ModelUpdater)"
         if "model" not in names:
-            cause = "a chain of other training records is another one: give it more records"
-        lines.append(f"Rates of this chain are outside their bands in {_listed(shares)}: {cause}.")
+            cause = "Chains of other training records give other rates: give more records"
+        lines.append(f"Rates of this chain outside their intervals: {_listed(shares)}. {cause}.")
     return "\n".join(lines)
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
@@ -282,7 +283,7 @@ class Simulation:
             return run_jobs(jobs, len(numbers), unit="repeats", n_jobs=n_jobs, verbose=verbose)
 
     def _one_repeat(self, number: int, seeds: Sequence[int]) -> Evaluation:
-        with without_warnings(), single_blas_thread():
+        with without_warnings(), answers_kept(), single_blas_thread():
             return self._calibrated(self.evaluate(self.records(self.scenarios, number, seeds), {}), number, seeds)
 
     def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:

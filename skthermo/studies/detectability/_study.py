@@ -15,7 +15,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import checked_once, warn_user, warnings_once
+from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
 from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
@@ -90,7 +90,7 @@ class DetectabilityStudy(BaseEstimator):
     outliers : float, "fitted", None or array-like of shape (n_training_records, n_modes), default="fitted"
         Values that are far off, as in `~skthermo.surrogate.DataInformedFEM.simulate`.
     uncertainty : {"auto", "all", "noise", "baseline", "weather", "model"} or sequence of them, default="auto"
-        What the bands hold, in which the rate of a measured campaign should lie:
+        What the prediction intervals include, in which the rate of a measured campaign should lie:
 
         - "noise": another draw of the noise;
         - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
@@ -144,7 +144,7 @@ class DetectabilityStudy(BaseEstimator):
     uncertainty_ : DataFrame or None
         Indexed by detector and scenario: standard deviation of the rate due to each part of ``uncertainty`` ("noise",
         "weather", "baseline", "model") and to all ("together"), and the share of each in the variance ("model share").
-        None where the bands hold the noise alone.
+        None where the bands include the noise alone.
     replicates_ : ReplicateRates or None
         Rates of alarms in every replicate, ``replicates_.rates[detector, scenario]`` of shape (n_replicates, n_parts,
         n_draws), where each of ``replicates_.parts`` is added to those before it.
@@ -311,7 +311,7 @@ class DetectabilityStudy(BaseEstimator):
               length and state should lie with the probability ``confidence``, with all that ``uncertainty`` names. With
               the noise alone, it is the range of the rates of single repeats: fewer than 39 are too few for 95 %, as
               the range of all n holds it with (n - 1) / (n + 1), and a single one has none (NaN). That of reference
-              records holds their noise alone;
+              records includes their noise alone;
             - ``n_alarms``, ``n_records``, ``n_effective``, ``n_repeats``: counts over all repeats, of records that the
               detector can evaluate;
             - ``n_not_evaluated``: number of the other records, which count neither as healthy nor as alarms;
@@ -378,9 +378,9 @@ class DetectabilityStudy(BaseEstimator):
                 rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, progress)
         found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
         doubt = found.many_false_alarms()
-        self.findings_ = replace(found, warnings=[*texts, doubt]) if doubt else found
-        if doubt:
-            warn_user(doubt, ResultWarning, "many false alarms")
+        doubts = [ResultWarning(doubt, "many-false-alarms")] if doubt else []
+        self.findings_ = replace(found, warnings=[*texts, *map(str, doubts)])
+        warn_each(doubts)
         return self.findings_.table
 
     def _most_repeats(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -15,7 +14,7 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import warn_each, warn_user, warnings_once
+from skthermo._estimators.warnings import reported_by_caller, warn_each, warn_user, warnings_once
 from skthermo._tables.arrays import (
     Array,
     as_columns,
@@ -36,7 +35,7 @@ from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
 
-FIRST_ROWS = r"(\d+ of \d+ rows cannot be predicted|lags reach \d+ rows back)"  # warnings that each state would give
+FIRST_ROWS = "not-predicted", "no-earlier-records"  # kinds of warnings that the first rows of each state would give
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +124,7 @@ class TaskScorer:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
         order = np.argsort(rows, kind="stable")
         state, values = self.state[rows[order]], []
-        with warnings_once("in other states of the task"):
-            warnings.filterwarnings("ignore", FIRST_ROWS)
+        with warnings_once("in other states of the task"), reported_by_caller(FIRST_ROWS):
             for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
         repeat, scenario = np.divmod(state, self.n_scenarios)
@@ -248,7 +246,7 @@ class DetectionTask(Bunch):
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
                     "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
                     ResultWarning,
-                    "search that refits",
+                    "search-refits",
                 )
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
         check_detector(detector, "the detector")
@@ -315,7 +313,7 @@ class DetectionTask(Bunch):
                 "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
                 "was tuned",
                 WeatherWarning,
-                "same weather",
+                "same-weather",
             )
         rows = []
         for name, detector in named.items():

@@ -17,7 +17,7 @@ from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
 FEW = 10  # number of cases found, or not found, below which their dependence is not estimated
-TELLS_LITTLE = 0.3  # chance of a false alarm above which finding damage in the same time says little
+WEAK_EVIDENCE = 0.3  # probability of a false alarm above which an alarm in the same time is weak evidence of damage
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +194,11 @@ def waits_table(
 def false_alarms_text(waits: Waits, numbers: Sequence[int]) -> str:
     """In how many of a hundred cases the healthy structure raises an alarm within some times."""
     chances = [(number, waits.found(number, 0.5)[0]) for number in numbers]
-    texts = [f"within {waits.clock.text(number)} in {_cases(chance)}" for number, chance in chances if chance == chance]
-    return f"raises a false alarm {', '.join(texts)} of 100 cases" if texts else "has too few records for these times"
+    texts = [
+        f"{_cases(chance)}{' of 100 cases' * (place == 0)} within {waits.clock.text(number)}"
+        for place, (number, chance) in enumerate((number, chance) for number, chance in chances if chance == chance)
+    ]
+    return f"raises a false alarm in {', '.join(texts)}" if texts else "has too few records for these times"
 
 
 def _cases(chance: float) -> str:
@@ -207,13 +210,13 @@ def waits_text(waits: Waits, false: Waits | None, level: float) -> str:
     clock, number = waits.clock, waits.within(level)
     cases = f"{100 * level:g} of 100 cases"
     if not np.isfinite(number):
-        return f"is not found in {cases} within the {clock.text(clock.n_steps)} of the records"
-    text = f"is found within {clock.text(number)} in {cases}"
+        return f"is detected in fewer than {cases} within the {clock.text(clock.n_steps)} of the records"
+    text = f"is detected within {clock.text(number)} in {cases}"
     if false is None:
-        return f"{text}; how often a healthy structure alarms by then is not known"
+        return f"{text}; false alarms in that time: not known"
     by_chance = false.found(min(int(number), clock.n_steps), level)[0]
-    text = f"{text}; a healthy structure alarms by then in {_cases(by_chance)} of 100"
-    return f"{text}, so that such an alarm says little" if by_chance > TELLS_LITTLE else text
+    text = f"{text}; false alarms in that time: {_cases(by_chance)} of 100"
+    return f"{text}, so that such an alarm is weak evidence" if by_chance > WEAK_EVIDENCE else text
 
 
 def soonest(table: pd.DataFrame, within: Sequence[str | int] | None) -> pd.DataFrame:

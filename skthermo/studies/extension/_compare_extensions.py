@@ -268,7 +268,7 @@ def compare_extensions(
             f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
             "the study; expected a study with larger severities",
             ResultWarning,
-            "families that are not found",
+            "undetected-families",
         )
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
@@ -316,16 +316,20 @@ def _warn_of_unknown_modes(fem: FittedChain, ranks: Sequence[int]) -> None:
     measured, further = (
         linearise(model, theta, relative=True)[1][0] for model in (fem.model, fem.model.with_modes(ranks))
     )
+    doubtful = []
     for rank, slope in zip(ranks, further, strict=True):
         weights = slope @ np.linalg.pinv(measured)
         ratio = np.linalg.norm(weights) if np.allclose(weights @ measured, slope, atol=1e-6) else np.inf
         if ratio > DOUBTFUL_RATIO:
-            warn_user(
-                f"{mode_name(rank)} depends on parameters that the measured modes hardly determine: predicted from one "
-                f"record, its frequency scatters {ratio:.1f} times as much as theirs, and its gain is doubtful",
-                ResultWarning,
-                f"unknown {mode_name(rank)}",
-            )
+            doubtful.append(f"{mode_name(rank)} ({ratio:.1f} times)")
+    if doubtful:
+        warn_user(
+            "frequencies of further modes, predicted from one record, scatter more than "
+            f"{DOUBTFUL_RATIO:g} times as much as those of the measured modes: {', '.join(doubtful)}. Their gain is "
+            "doubtful. Measure such a mode once before its sensors are bought",
+            ResultWarning,
+            "undetermined-mode",
+        )
 
 
 def _scatter(study: DetectabilityStudy) -> float:

@@ -302,17 +302,17 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
         sets = "; ".join(" and ".join(causes) for causes in found.indistinguishable)
         yield ResultWarning(
             f"groups that these modes cannot distinguish: {sets}. Only their common effect is known",
-            "indistinguishable groups",
+            "indistinguishable-groups",
         )
     if found.unobservable:
         names = ", ".join(found.unobservable)
         yield ResultWarning(
-            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable groups"
+            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable-groups"
         )
     highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
         yield ResultWarning(
-            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity at its bound"
+            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity-at-bound"
         )
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
@@ -323,7 +323,7 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
         yield ResultWarning(
             f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
             f"{likely_causes(found)}",
-            "unexplained shifts",
+            "unexplained-shifts",
         )
 
 

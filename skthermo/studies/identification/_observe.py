@@ -98,9 +98,9 @@ class ComparedRecords:
     def warnings(self) -> Iterator[SkthermoWarning]:
         """What is doubtful."""
         if self.left_out:
-            yield UnevaluatedRowsWarning(self._left_out(), "records that were not compared")
+            yield UnevaluatedRowsWarning(self._left_out(), "not-compared")
         if self.n_latest >= IN_A_ROW:
-            yield ResultWarning(self._latest(), "the last records differ")
+            yield ResultWarning(self._latest(), "last-records-differ")
         few = [(self.n_independent, self.n_compared, "record", FEW)]
         few += [(self.n_trained_independent, self.n_trained, "training record", FEW_TRAINED)]
         for independent, number, noun, least in few:
@@ -108,7 +108,7 @@ class ComparedRecords:
                 yield FewRecordsWarning(
                     f"too few independent {noun}s: {_worth(noun, number, independent)}; expected {least:g} or more, "
                     "since probabilities and standard errors are rough with fewer",
-                    f"few independent {noun}s",
+                    "few-independent-records",
                 )
 
     def _latest(self) -> str:
@@ -210,7 +210,7 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no rows", "missing column", "constant"})
+    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no-rows", "missing-column", "constant"})
     return frequencies
 
 
@@ -228,12 +228,12 @@ def _named_as_in_fit(fem: Any, T: Any) -> Any:
             f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
             "columns are taken in the order that they have",
             RecordsWarning,
-            "names of temperatures",
+            "temperature-names",
         )
         return T.set_axis(range(len(columns)), axis=1)
     warn_user(
         f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
         RecordsWarning,
-        "names of temperatures",
+        "temperature-names",
     )
     return T.set_axis(names, axis=1) if columns else pd.DataFrame(as_floats(T), columns=names)

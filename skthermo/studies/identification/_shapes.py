@@ -143,7 +143,7 @@ class ShapeShift:
                 f"model's, {modes[np.flatnonzero(foreign)[0]]} the first, and are left out; expected shapes of the "
                 "same modes, with rows in the order of dofs",
                 RecordsWarning,
-                "foreign mode shapes",
+                "foreign-shapes",
             )
         effects = effects.at(effects.known & ~foreign)
         if not len(effects.modes):

@@ -28,7 +28,7 @@ WORTH_DIVIDING = 0.05  # probability of a group, and of a piece of a damaged gro
 CANNOT_TELL = 0.75  # share of a group's pieces that may be worth it before dividing them would tell nothing
 WORTH_ASKING = 0.02  # probability of a whole group from which on it is divided at all
 MOSTLY_ELSE = 0.5  # probability of something else from which on a warning says so
-OF_WHOLE_GROUPS = ("unexplained shifts", "indistinguishable groups")
+OF_WHOLE_GROUPS = ("unexplained-shifts", "indistinguishable-groups")
 """Warnings that hold for whole groups, and may not hold for parts of them."""
 
 SOME_ELSE = 0.1  # probability of something else from which on every group is divided: a part of one may be behind it
@@ -159,7 +159,7 @@ def locate_damage(
             "no damage of neighbouring members explains the shifts (something else has a probability of "
             f"{located.probability_other:.0%})",
             ResultWarning,
-            "unexplained shifts",
+            "unexplained-shifts",
         )
     return located
 

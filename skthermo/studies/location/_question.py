@@ -200,7 +200,7 @@ class MeasuredShift:
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
-        with reported_by_caller(["foreign mode shapes"]):
+        with reported_by_caller(["foreign-shapes"]):
             comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)
         return observed, Curves.of_stretches(comparison.effects, question.incidence, observed.rotation)

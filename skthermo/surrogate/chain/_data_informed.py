@@ -825,7 +825,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             warn_user(
                 f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
                 UnevaluatedRowsWarning,
-                "rows scored",
+                "rows-not-scored",
             )
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 

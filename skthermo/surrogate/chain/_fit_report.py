@@ -339,7 +339,7 @@ class FitReport(SavesFrames):
         yield FewRecordsWarning(
             f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
             "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
-            "half of the rows",
+            "rows-left-out",
         )
 
     def _few_for_parameters(self) -> Iterator[SkthermoWarning]:
@@ -349,15 +349,19 @@ class FitReport(SavesFrames):
         yield FewRecordsWarning(
             f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
             "rows for each",
-            "few rows",
+            "few-rows",
         )
 
     def _mostly_filled(self) -> Iterator[SkthermoWarning]:
-        for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples():
+        mostly = [
+            f"{name!r} is missing in {rows} of {self.n_rows} rows ({when}; standard deviation {deviation:.2g} degrees)"
+            for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples()
+        ]
+        if mostly:
             yield RecordsWarning(
-                f"the temperature {name!r} is missing in {rows} of {self.n_rows} rows and was filled from the others "
-                f"({when}; standard deviation {deviation:.2g} degrees); expected a sensor that works: leave it out",
-                f"mostly filled {name}",
+                f"temperatures were filled from the other sensors in more than half of the rows: {', '.join(mostly)}. "
+                "Repair these sensors, or leave them out",
+                "mostly-filled",
             )
 
     def _worse_than_mean(self) -> Iterator[SkthermoWarning]:
@@ -369,7 +373,7 @@ class FitReport(SavesFrames):
             f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
             f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
             "see report_.offsets, update the model, or use the default aligner and discrepancy",
-            "worse than the mean",
+            "worse-than-mean",
         )
 
     def _hidden(self) -> Iterator[SkthermoWarning]:
@@ -382,7 +386,7 @@ class FitReport(SavesFrames):
             "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
             "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
             "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
-            "hidden offsets",
+            "hidden-offsets",
         )
 
     def _many_outliers(self) -> Iterator[SkthermoWarning]:
@@ -392,7 +396,7 @@ class FitReport(SavesFrames):
         yield RecordsWarning(
             f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
             "by one way of identification: see report_.findings",
-            "many outliers",
+            "many-outliers",
         )
 
     def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
@@ -408,7 +412,7 @@ class FitReport(SavesFrames):
                 f"the FE model cannot follow what the weather does to {modes}: predictions rely on the discrepancy, "
                 "and simulated damage on a model that is not calibrated; expected a model updated to these records "
                 "(ModelUpdater), or parameters that this weather changes",
-                "large discrepancy",
+                "large-discrepancy",
             )
 
     def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
@@ -423,7 +427,7 @@ class FitReport(SavesFrames):
             f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
             f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
             "refines its estimates, narrow_bounds=True, or more samples",
-            "round trip",
+            "round-trip-error",
         )
 
 
@@ -584,7 +588,7 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
             yield ModelWarning(
                 f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
                 f"order of its modes, or model.with_modes({order.tolist()})",
-                "order of modes",
+                "mode-order",
             )
             return
     if len(far):
@@ -592,5 +596,5 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
         yield RecordsWarning(
             f"measured modes differ from the model's nominal frequencies: {listed}; expected Hz, the modes of "
             "the model in their order, and a model updated to the structure",
-            "offset of modes",
+            "mode-offsets",
         )

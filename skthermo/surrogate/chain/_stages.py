@@ -131,7 +131,7 @@ class ChainInverse:
                 "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
                 "imputer=KNNGapImputer()",
                 FewRecordsWarning,
-                "scarce modes",
+                "sparse-modes",
             )
         return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
 
@@ -170,7 +170,7 @@ class ChainInverse:
             yield RecordsWarning(
                 f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the "
                 f"{n_sensors} sensors; the other shapes are not used: expected dofs without sensors that failed",
-                "few shapes",
+                "few-shapes",
             )
         if not n_shapes or "shapes" not in inverse.samples_:
             return
@@ -189,7 +189,7 @@ class ChainInverse:
                 f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} "
                 f"to {highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, "
                 "with the signs and gains of the model's axes, or a shape_noise that covers the model's error",
-                "shapes unlike the model's",
+                "foreign-shapes",
             )
 
     def warn_of_inert(self, model: FEModel, names: Iterable[str]) -> None:
@@ -211,7 +211,7 @@ class ChainInverse:
                     "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
                     "search over the InverseSurrogate itself, whose score is that of its regressor",
                     ResultWarning,
-                    "inert settings searched",
+                    "inert-search",
                 )
 
 
@@ -404,7 +404,7 @@ class ThermalModel(SavesFrames):
                 f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
                 f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
                 ModelWarning,
-                "impossible parameters",
+                "impossible-parameters",
             )
         return theta
 
@@ -414,19 +414,19 @@ class ThermalModel(SavesFrames):
         consequence = "standard deviations and intervals of predictions are widened by what that costs"
         message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
         if message:
-            yield RecordsWarning(message, "filled temperatures")
+            yield RecordsWarning(message, "filled-temperatures")
         message = unpredicted_text(unknown, as_floats(filled))
         if message:
-            yield UnevaluatedRowsWarning(message, "rows that cannot be predicted")
+            yield UnevaluatedRowsWarning(message, "not-predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
         message = learned.warning(inputs)
         if message:
-            yield WeatherWarning(message, "weather outside the training range")
+            yield WeatherWarning(message, "outside-training-weather")
         consequence = "standard deviations and intervals say how uncertain that is"
         warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
         message = self.sensors.warning(weather.given)
         if message:
-            yield RecordsWarning(message, "sensor apart from others")
+            yield RecordsWarning(message, "sensor-disagrees")
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
@@ -566,7 +566,7 @@ def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> 
                 f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
                 "and not percent",
                 ModelWarning,
-                "large factor",
+                "large-factor",
             )
         factors[name] = float(factor)
     return np.array(list(factors.values()))

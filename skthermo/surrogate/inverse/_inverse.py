@@ -405,7 +405,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
                 "they keep what they reached, or the regressor's estimate",
                 ModelWarning,
-                "not converged",
+                "not-converged",
             )
         rows = np.flatnonzero(found.full_solves)
         if rows.size > MANY_BY_FULL_MODEL * len(theta):
@@ -414,7 +414,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
                 f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "
                 "like those that fit saw, wider bounds, or the noise of the measurement",
                 ModelWarning,
-                "refined by the full model",
+                "outside-reduced-model",
             )
         self._warn_of_box(theta, found.outside)
 
@@ -632,4 +632,4 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         if message and self.prior is not None:
             message += "; or a wider prior, which these rows contradict"
         if message:
-            warn_user(message, ModelWarning, "outside the bounds")
+            warn_user(message, ModelWarning, "outside-prior")

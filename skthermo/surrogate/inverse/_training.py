@@ -136,7 +136,7 @@ class SimulatedTraining:
                 f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot distinguish all parameters; "
                 "expected more modes: the prior decides between them",
                 FewRecordsWarning,
-                "few modes",
+                "underdetermined",
             )
         box = Box.of(inverse.bounds, names)
         n_simulated = (1 + inverse.narrow_bounds) * inverse.n_samples
@@ -147,7 +147,7 @@ class SimulatedTraining:
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
                 "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
                 ModelWarning,
-                "order of modes",
+                "modes-cross",
             )
         if reduced is None:
             reason = reason_of(model, inverse.reduce) if tol is None else NO_BASIS
