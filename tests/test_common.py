@@ -274,6 +274,7 @@ def test_fitted_state_has_a_trailing_underscore():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
 def test_metadata_routing_changes_no_result():
     def results(estimator, data):
