@@ -1,6 +1,7 @@
 """The command of nightly jobs: what it says, its exit codes, and what a crash leaves."""
 
 import contextlib
+import copy
 import io
 import shutil
 import subprocess
@@ -25,10 +26,10 @@ def records():
 
 
 @pytest.fixture(scope="module")
-def saved(records, tmp_path_factory):
+def saved(truss_monitor, records, tmp_path_factory):
     """A file of a monitor that has seen ten healthy days, and one whose alarm is open."""
     folder = tmp_path_factory.mktemp("saved")
-    monitor = fitted_monitor(records)
+    monitor = copy.deepcopy(truss_monitor)
     monitor.update(records[FIRST : FIRST + 10])
     monitor.save(folder / "healthy.joblib")
     monitor.update(records[FIRST + 10 : DAMAGED + 10])

@@ -178,6 +178,7 @@ def job(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.nightly
 def test_calculix(job):
     recipe = run_recipe(PAGE, "recipe-calculix")
     for row, ours in zip(THETA, recipe["model"].frequencies(THETA), strict=True):

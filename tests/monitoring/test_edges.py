@@ -300,13 +300,15 @@ def test_other_targets_than_those_of_the_compensator_are_refused(wanted):
         Monitor(detector(MODES), targets=wanted).fit(truss()[:N_BASELINE])
 
 
-def test_modes_are_named_whatever_the_order_of_targets():
-    for options in ({"targets": MODES[::-1]}, {}):
-        own = MODES if options else ["f6", "f1", "f3", "f2", "f5", "f4"]
-        monitor = Monitor(detector(own), sensors=False, **options).fit(truss()[:N_BASELINE])
-        monitor.update(changed({"f6": 0.9}, 2))
-        assert monitor.targets_ == MODES
-        assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
+@pytest.mark.one_case
+@pytest.mark.parametrize(
+    ("own", "options"), [(["f6", "f1", "f3", "f2", "f5", "f4"], {}), (MODES, {"targets": MODES[::-1]})]
+)
+def test_modes_are_named_whatever_the_order_of_targets(own, options):
+    monitor = Monitor(detector(own), sensors=False, **options).fit(truss()[:N_BASELINE])
+    monitor.update(changed({"f6": 0.9}, 2))
+    assert monitor.targets_ == MODES
+    assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
 
 
 def test_results_do_not_share_the_state():

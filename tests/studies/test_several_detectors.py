@@ -204,6 +204,7 @@ def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
     pd.testing.assert_frame_equal(study.set_params(scenarios=scenarios).run(WEATHER), results)
 
 
+@pytest.mark.nightly
 def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     sees = {
         "raw": (MahalanobisDetector(), MODES),
