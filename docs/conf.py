@@ -21,6 +21,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "gallery_order",
 ]
 default_role = "py:obj"
 exclude_patterns = ["_build", "gallery/**/*.ipynb"]
@@ -71,6 +72,7 @@ html_css_files = ["site.css", "api.css"]
 html_js_files = [("mathjax/settings.js", {"priority": 100}), "access.js"]
 mathjax_path = "mathjax/tex-svg.js"
 html_show_sourcelink = False
+html_sidebars = {"quickstart": [], "comparison": []}  # which have no pages below them
 html_theme_options = {
     "show_nav_level": 1,
     "navigation_with_keys": False,

@@ -13,7 +13,7 @@ document.addEventListener("DOMContentLoaded", () => {
   }
   for (const diagram of document.querySelectorAll(".method-diagram")) scrolls(diagram, "Diagram of the method");
   if (!matchMedia("(max-width: 700px)").matches) return;
-  for (const picture of document.querySelectorAll(".bd-article img:not(.sphx-glr-thumbcontainer img, .only-narrow img)")) {
+  for (const picture of document.querySelectorAll(".bd-article img:not(.sphx-glr-thumbcontainer img, .sd-card img, .only-narrow img)")) {
     const frame = document.createElement("div"), shown = picture.closest("a") ?? picture;
     frame.className = "wide-figure";
     shown.replaceWith(frame);
