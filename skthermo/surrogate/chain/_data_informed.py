@@ -315,7 +315,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        mended = {"outliers", "memory"} if self.mapper is None else {"outliers"}
+        mended = {"frequency-outliers", "thermal-memory"} if self.mapper is None else {"frequency-outliers"}
         findings = findings_of(self._findings, T, F, mended=mended)
         warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
