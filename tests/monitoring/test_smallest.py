@@ -148,6 +148,7 @@ def test_where_thermometers_contradict_each_other_nothing_is_healthy_that_one_of
         assert (later["2026-01-23":]["state"] == "alarm").all()
 
 
+@pytest.mark.filterwarnings("ignore:.*no-thermal-effect")
 def test_what_both_thermometers_call_healthy_is_healthy():
     monitor = copy.deepcopy(of_a_year(slope=1e-6))
     answers = monitor.update(contradicting(3.0, 0.0, slope=1e-6))
