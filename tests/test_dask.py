@@ -5,15 +5,19 @@ from operator import itemgetter
 
 import joblib
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV, KFold
+from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, sample
 from skthermo.fleet import fit_fleet
 from skthermo.metrics import frequency_scorer
+from skthermo.monitoring import Monitor
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 from tests.fem.frames import FRAME
 
@@ -104,9 +108,20 @@ def test_a_fleet_is_that_of_one_process():
         TRUSS, inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=100), mapper=TemperatureMapper()
     )
     given = dict.fromkeys(years, chain), {n: (one.temperatures, one.frequencies) for n, one in years.items()}
-    here = fit_fleet(*given)
+    later = make_truss_campaign(2, samples_per_year=100, random_state=3)
+    new = dict.fromkeys(years, (later.temperatures[100:], later.frequencies[100:]))
+
+    def watch(chain):
+        detector = make_pipeline(
+            TemperatureCompensator(Ridge(), targets=list(later.frequencies)), MahalanobisDetector()
+        )
+        return Monitor(detector, sensors=False)
+
+    here = fit_fleet(*given, monitor=watch)
     with joblib.parallel_config("dask"):
-        there = fit_fleet(*given)
+        there = fit_fleet(*given, monitor=watch)
+        answers = there.update(new)
+    pd.testing.assert_frame_equal(answers, here.update(new))
     for name, year in years.items():
         first, other = (fleet.chains[name].predict(year.temperatures) for fleet in (here, there))
         np.testing.assert_array_equal(other, first)

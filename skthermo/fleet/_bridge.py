@@ -185,8 +185,9 @@ class BridgeUpdate:
     fitted: bytes = b""
 
     def __getstate__(self) -> dict[str, Any]:
-        """What travels to a worker: fitted objects are read when it is its turn."""
-        return vars(self) | {"storage": None, "fitted": self.storage.fitted(self.name)}
+        """What travels to a worker: fitted objects are read when it is its turn, and once if it travels on."""
+        fitted = self.fitted if self.storage is None else self.storage.fitted(self.name)
+        return vars(self) | {"storage": None, "fitted": fitted}
 
     def __call__(self) -> Result:
         """What is known now, fitted objects as bytes, and evaluations."""

@@ -27,7 +27,7 @@ from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
-DECIMALS = 6  # of a damage index
+DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 MATTERS = 2.0  # standard deviations from which a mode drives an alarm
 MOST_MODES = 3  # that are named
@@ -226,12 +226,13 @@ class ActiveDetector(SavesFrames):
         times = records.index.asi8
         start = self.memory.start(times, first)
         exact = self._exact(records.iloc[start:])[first - start :]
-        scaled = exact * 10.0**DECIMALS
-        from_edge = np.abs(np.abs(scaled - np.floor(scaled)) - 0.5)
-        close = np.flatnonzero(from_edge <= CLOSE * np.maximum(np.abs(exact), 1.0) * 10.0**DECIMALS)
+        size = np.clip(np.abs(exact), 1.0, LARGEST)
+        scale = 10.0 ** (DECIMALS - np.floor(np.log10(size)))
+        from_edge = np.abs(exact * scale - np.floor(exact * scale) - 0.5)
+        close = np.flatnonzero(from_edge <= CLOSE * size * scale)
         for row in close:
             exact[row] = self.alone(records, times, first + row)
-        return np.round(exact, DECIMALS)
+        return np.round(exact * scale) / scale
 
     def alone(self, records: pd.DataFrame, times: NDArray[np.int64], row: int) -> float:
         """Damage index of one record by a call with just its memory."""

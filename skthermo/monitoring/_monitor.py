@@ -162,8 +162,8 @@ class Monitor(SavesFrames, Estimator):
     batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
     come late are evaluated with those around them, and later ones anew: what `update` says last of a stamp counts.
 
-    The damage index is rounded to six decimals. Where the last bits, which depend on how many records are evaluated at
-    once, would decide how, the index of the record alone with its memory counts.
+    The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
+    how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
 
     More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
     25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not

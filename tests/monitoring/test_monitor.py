@@ -205,6 +205,18 @@ def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch
     assert first[0] == 3.000001
 
 
+def test_large_indices_are_computed_in_one_call(monkeypatch):
+    monitor, _, _ = fitted("lags")
+    evaluate, fallen, calls = monitor.active_, ALL.copy(), []
+    fallen[MODES] *= 0.2
+    exact = evaluate._exact(fallen)
+    monkeypatch.setattr(ActiveDetector, "alone", lambda self, records, times, row: calls.append(row) or exact[row])
+    found = evaluate.index(fallen, N_BASELINE)
+    assert found.min() > 100
+    assert len(calls) < len(found) / 10
+    np.testing.assert_allclose(found, exact[N_BASELINE:], rtol=1e-6)
+
+
 def test_events_are_those_of_the_rule_on_the_whole_series():
     _, answers, after = fitted("lags")
     events = find_events(answers["index"].to_numpy(), answers.index, after.false_alarm_estimate_.rule)

@@ -1,0 +1,304 @@
+"""Large sizes: records of a month to ten years at ten minutes through every step, and fleets of ten to 1000 bridges.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/scale.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 5256 52560 525600 --bridges 10 100 1000
+    OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 52560 525600 --parts detection service
+    OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 1440 5760 --bridges 2 8
+
+Frequencies of the truss follow made-up weather, with noise that is correlated in time, gaps and outliers. Each part and
+size has a process of its own, whose peak memory, with that of its workers, is printed. In the parts "chain" and
+"study", the inverse is a linear regression without refinement, which costs the same for each row and is not measured
+here; the part "defaults" has the defaults of all. "service" is a monitor that is fitted to the first tenth of the
+records, and then updated by each of the other days; "fleet" are bridges with a year of hourly records each, whose files
+are updated by a day, in seconds by the clock. The exit code is 1 if a step takes more than three times as many seconds
+a row or bridge as with the next smaller size, where a quadratic one takes ten times as many, a part more than 4 GB, or
+an update of the last days more than twice as long as one of the first.
+"""
+
+import argparse
+import io
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_fleet, make_truss
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.fleet import Fleet
+from skthermo.fleet._bridge import BridgeOutcome, known_of, pickled
+from skthermo.fleet._storage import Storage
+from skthermo.monitoring import Monitor
+from skthermo.plotting import DamageIndexDisplay, MonitorDisplay, PredictionDisplay
+from skthermo.preprocessing import (
+    BlockedKFold,
+    HampelFilter,
+    HingeFeatures,
+    KNNGapImputer,
+    LagFeatures,
+    SensorMeans,
+    check_records,
+)
+from skthermo.reporting import owner_report
+from skthermo.studies import DetectabilityStudy
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+
+MOST_GIGABYTES, MOST_RATIO, MOST_GROWTH = 4.0, 3.0, 2.0
+LEAST_SECONDS = 0.5  # of a step, below which its ratio says nothing
+PER_DAY = 144
+N_FITTED = 4  # monitors of different bridges, which all bridges of a fleet share
+
+
+def memory(rows, correlation, random):
+    """Stationary series of unit variance whose columns remember what was before."""
+    return lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], random.standard_normal(rows), axis=0)
+
+
+def records(n_rows):
+    """Three temperatures, and frequencies that follow them, with noise that is correlated in time."""
+    random, row = np.random.default_rng(0), np.arange(n_rows)
+    season, day = 10 * np.sin(2 * np.pi * row / n_rows), np.sin(2 * np.pi * row / 144)
+    slow = 3 * memory((n_rows, 1), 0.99, random)
+    T = 10 + season[:, np.newaxis] + day[:, np.newaxis] * [5, 2, 0] + slow + random.standard_normal((n_rows, 3))
+    theta = 1 - 4e-4 * (T[:, [0, 1, 2, 0]] - 10)
+    F = make_truss().reduced(0.05, random_state=0).frequencies(theta)
+    F *= 1 + 0.005 * memory(F.shape, 0.5, random)
+    times = pd.date_range("2000", periods=n_rows, freq="10min")
+    return pd.DataFrame(T, times, columns=["T1", "T2", "T3"]), pd.DataFrame(F, times).add_prefix("f")
+
+
+def with_faults(F):
+    """The same with 5 % of the values missing, records missing for two hours, and outliers."""
+    random = np.random.default_rng(1)
+    off = np.convolve(random.uniform(size=len(F)) < 0.004, np.ones(12))[: len(F)] > 0
+    missing = (random.uniform(size=F.shape) < 0.05) | off[:, np.newaxis]
+    return (F * np.where(random.uniform(size=F.shape) < 0.002, 1.06, 1.0)).mask(missing)
+
+
+def preprocessing(T, F):
+    some = np.random.default_rng(2).uniform(size=len(T)) < 0.95
+    yield "check_records", lambda: check_records(T, F)
+    yield "HampelFilter", lambda: HampelFilter().fit(F).transform(F)
+    yield "KNNGapImputer", lambda: KNNGapImputer().fit_transform(T.join(F))
+    yield "LagFeatures, 24 h", lambda: LagFeatures(24, freq="1h").fit_transform(T)
+    yield "LagFeatures, rows missing", lambda: LagFeatures(24, freq="1h").fit_transform(T[some])
+    yield "BlockedKFold", lambda: list(BlockedKFold().split(T))
+
+
+def chain(T, F):
+    fem = quick_chain()
+    yield "fit", lambda: fem.fit(T, F)
+    yield "residuals()", lambda: fem.residuals()
+    yield "predict", lambda: fem.predict(T)
+    yield "predict_interval", lambda: fem.predict_interval(T)
+    yield "simulate, fitted noise", lambda: fem.simulate(T, noise="fitted", random_state=0)
+    fitted = dict.fromkeys(("noise", "gaps", "outliers"), "fitted")
+    yield "simulate, gaps and outliers", lambda: fem.simulate(T, **fitted, random_state=0)
+
+
+def quick_chain():
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=200, noise=0.005, refine=0, reduce=True)
+    return DataInformedFEM(make_truss(), inverse=inverse, imputer=KNNGapImputer(), reduce=True, random_state=0)
+
+
+def compensator(F):
+    lags = LagFeatures([0, 1, 6], freq="1h")
+    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), whiten="local")
+
+
+def detection(T, F):
+    X, whitening, found = T.join(F), compensator(F), {}
+    detector, windows, counts = MahalanobisDetector(), WindowedAlarm("24h"), WindowedAlarm("24h", rule="m-of-n")
+    yield "whitening, fit_transform", lambda: found.update(white=whitening.fit_transform(X))
+    yield "whitening, transform", lambda: whitening.transform(X)
+    yield "MahalanobisDetector, gaps", lambda: detector.fit(found["white"])
+    yield "MahalanobisDetector, complete", lambda: MahalanobisDetector().fit(found["white"].fillna(0.0))
+    yield "MahalanobisDetector, predict", lambda: detector.predict(found["white"])
+    yield "WindowedAlarm, mean", lambda: windows.fit(found["white"])
+    yield "WindowedAlarm, m of n", lambda: counts.fit(found["white"])
+    yield "WindowedAlarm, predict", lambda: windows.predict(found["white"])
+
+
+def monitoring(T, F):
+    X, half = T.join(F), len(T) // 2
+    monitor = Monitor(make_pipeline(compensator(F), WindowedAlarm("24h")))
+    yield "Monitor, fit to half", lambda: monitor.fit(X[:half])
+    yield "Monitor, update with half", lambda: monitor.update(X[half:])
+
+
+def study(T, F):
+    fem, names = quick_chain().fit(T, F), list(F)
+    whole = make_pipeline(TemperatureCompensator(LinearRegression(), targets=names), MahalanobisDetector())
+    scenarios = [{"bottom": 0.1}]
+    options = {"n_repeats": 2, "uncertainty": ("noise",), "random_state": 0}
+    yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, whole, scenarios, **options).run(T, baseline=T.join(F))
+
+
+def defaults(T, F):
+    fem = DataInformedFEM(make_truss(), random_state=0)
+    options = {"random_state": 0}
+    yield "fit", lambda: fem.fit(T, F)
+    yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, detector_of(F), [{"bottom": 0.1}], **options).run(T)
+
+
+def detector_of(F):
+    regression = make_pipeline(HingeFeatures(), Ridge())
+    return make_pipeline(TemperatureCompensator(regression, targets=list(F)), WindowedAlarm("24h"))
+
+
+def service(T, F):
+    X, first = T.join(F), len(T) // 10
+    days = [X[row : row + PER_DAY] for row in range(first, len(X), PER_DAY)]
+    monitor, file, seconds = Monitor(detector_of(F)), Path(tempfile.mkdtemp()) / "monitor.joblib", []
+
+    def by_day():
+        for day in days:
+            start = time.process_time()
+            monitor.update(day)
+            seconds.append(time.process_time() - start)
+
+    yield "Monitor, fit to a tenth", lambda: monitor.fit(X[:first])
+    yield "Monitor, all days", by_day
+    n_compared = min(len(days) // 2, 365)
+    early, late = (np.median(seconds[part]) for part in (slice(n_compared), slice(-n_compared, None)))
+    yield "save", lambda: monitor.save(file)
+    yield "status", lambda: monitor.status("2026-01-01")
+    yield "summary", lambda: monitor.summary()
+    yield "owner_report", lambda: owner_report(monitor, file.with_suffix(".html"))
+    yield "MonitorDisplay, records", lambda: saved(MonitorDisplay.from_estimator(monitor, by="record"))
+    megabytes, of_page = (one.stat().st_size / 1e6 for one in (file, file.with_suffix(".html")))
+    says(
+        f"an update by a day takes {1e3 * early:.0f} ms at first and {1e3 * late:.0f} ms at last, {len(days)} days; "
+        f"the file has {megabytes:.1f} MB, the page {of_page:.1f} MB",
+        is_missed=late > MOST_GROWTH * early,
+    )
+
+
+def drawings(T, F):
+    fem, detector = quick_chain().fit(T, F), MahalanobisDetector().fit(F)
+    yield "PredictionDisplay", lambda: saved(PredictionDisplay.from_estimator(fem, T, F))
+    yield "DamageIndexDisplay", lambda: saved(DamageIndexDisplay.from_estimator(detector, F))
+
+
+def saved(display):
+    display.figure_.savefig(io.BytesIO(), format="png")
+
+
+def says(text, *, is_missed=False):
+    """Note something that is no time of a step."""
+    print(json.dumps({"text": text, "is_missed": bool(is_missed)}))
+
+
+def fleet(n_bridges):
+    """Bridges with files of their own, of a few fitted monitors, and new records of two days."""
+    folder, many = Path(tempfile.mkdtemp()), range(n_bridges)
+    fitted, days = [], {}
+    for bridge in list(make_fleet(N_FITTED, kinds=["girder"], random_state=0).values()):
+        records = bridge.records(372, "2025-01-01", samples_per_day=24)
+        X = SensorMeans(bridge.roles).fit_transform(records.temperatures).join(records.frequencies)
+        monitor = Monitor(detector_of(records.frequencies)).fit(X[:"2025-12-31"])
+        fitted.append((BridgeOutcome("", is_fitted=True, **known_of(monitor)), pickled((None, monitor))))
+        days[len(fitted) - 1] = [own for _, own in X["2026-01-01":].groupby(X["2026-01-01":].index.normalize())]
+    storage = Storage(folder)
+    with storage.alone():
+        for number in many:
+            outcome, content = fitted[number % N_FITTED]
+            storage.put(replace(outcome, name=f"bridge {number:04}"), content)
+
+    def new(day):
+        found = {}
+        for number in many:
+            own, random = days[number % N_FITTED][day], np.random.default_rng([number, day])
+            found[f"bridge {number:04}"] = own * (1 + 1e-4 * random.standard_normal(own.shape))
+        return found
+
+    yield "Fleet(folder)", lambda: Fleet(folder)
+    yield "update, one process", lambda: Fleet(folder).update(new(0))
+    yield "update, n_jobs=2", lambda: Fleet(folder).update(new(1), n_jobs=2)
+    yield "update, two workers of Dask", lambda: by_dask(lambda: Fleet(folder).update(new(2)))
+    yield "table and summary", lambda: (Fleet(folder).table, Fleet(folder).summary())
+    yield "status", lambda: Fleet(folder).status()
+    yield "discoveries", lambda: Fleet(folder).discoveries()
+    yield "owner_report", lambda: owner_report(Fleet(folder), folder / "fleet.html", now="2026-01-05")
+    says(f"a file of a bridge has {os.path.getsize(next(folder.glob('*.bridge'))) / 1e6:.2f} MB")
+    shutil.rmtree(folder)
+
+
+def by_dask(way):
+    from dask.distributed import Client
+
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None), joblib.parallel_config("dask"):
+        return way()
+
+
+OF_RECORDS = (preprocessing, chain, detection, monitoring, study, defaults, service, drawings)
+PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
+
+
+def one(part, size):
+    """Print seconds of each step of a part, and gigabytes, as lines of JSON."""
+    if part is fleet:
+        steps, clock = fleet(size), time.perf_counter
+    else:
+        T, F = records(size)
+        steps, clock = part(T, with_faults(F)), time.process_time
+    for step, way in steps:
+        start = clock()
+        way()
+        print(json.dumps({"step": step, "seconds": clock() - start}))
+    own, workers = (resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print(json.dumps({"own": own, "worker": workers}))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", type=int, nargs="+", default=[5_256, 52_560])
+    parser.add_argument("--bridges", type=int, nargs="+", default=[10, 100])
+    parser.add_argument("--parts", nargs="+", default=[*PARTS], choices=[*PARTS])
+    parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    if options.one:
+        part = PARTS[options.parts[0]]
+        one(part, (options.bridges if part is fleet else options.rows)[0])
+        return 0
+    missed = 0
+    for part in options.parts:
+        what, sizes = ("bridge", options.bridges) if part == "fleet" else ("row", options.rows)
+        seconds, gigabytes, texts = {}, {}, []
+        for size in sizes:
+            command = [sys.executable, __file__, "--one", f"--{what}s", str(size), "--parts", part]
+            done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+            found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+            seconds[size] = {line["step"]: line["seconds"] for line in found if "step" in line}
+            gigabytes[size] = found[-1]
+            texts += [f"{size} {what}s: {line['text']}" for line in found if "text" in line]
+            missed += sum(line.get("is_missed", False) for line in found)
+        table = pd.DataFrame(seconds)
+        each = table / table.columns.to_numpy()
+        ratios = (each / each.shift(axis=1)).where(table >= LEAST_SECONDS)
+        shown = pd.concat({"seconds": table.round(2), f"us a {what}": (1e6 * each).round(1)}, axis=1)
+        shown["ratio"] = ratios.iloc[:, -1].round(2)
+        peaks = {size: max(one.values()) for size, one in gigabytes.items()}
+        memory_used = ", ".join(f"{peak:.2f} GB of {size} {what}s" for size, peak in peaks.items())
+        print("\n".join([f"{part}: at most {memory_used}", *texts, "", shown.to_string(), ""]), flush=True)
+        missed += int((ratios > MOST_RATIO).to_numpy().sum() + (max(peaks.values(), default=0.0) > MOST_GIGABYTES))
+    print(f"steps that take over {MOST_RATIO:g} times as long a row, parts of over {MOST_GIGABYTES:g} GB: {missed}")
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
