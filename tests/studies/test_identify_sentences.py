@@ -194,7 +194,7 @@ def test_what_the_most_probable_explanation_leaves_is_reported():
         "The most probable explanation does not explain all of the shifts (p value 0.004): mode f1 has the largest "
         "residual, a measured shift of -2.00 % (standard error 0.10 %) and an explained one of -0.10 %."
     )
-    assert "likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
+    assert "Likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
     assert "the fit explains any shift" in identified(CLEAR, misfit_p_value=np.nan).summary()
 
 
@@ -203,6 +203,7 @@ def test_explanations_that_are_not_listed_are_counted():
     assert "Explanations that are not listed have a probability of 11 % together." in said(identified(few))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("name", CASES)
 def test_report_summary_and_drawing_say_the_same(name):
     found = CASES[name]

@@ -217,7 +217,7 @@ def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> lis
     except ValueError as error:
         if is_needed:
             raise
-        warn_user(f"bands hold no error of the model: {error}", ResultWarning, "bands-without-models")
+        warn_user(f"bands do not include the error of the model: {error}", ResultWarning, "bands-without-models")
         return []
 
 
