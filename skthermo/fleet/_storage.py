@@ -5,14 +5,16 @@ from __future__ import annotations
 import pickle
 import re
 import zlib
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from skthermo._io import alone_with, write_when_complete
-from skthermo.fleet._bridge import BridgeOutcome, Failure
+from skthermo.fleet._bridge import BridgeOutcome, Failure, pickled, unpickled
+from skthermo.monitoring import Monitor
 
 ENDING, REPLACED = ".bridge", ".replaced"
 LONGEST = 40  # letters of a name that its file shows
@@ -57,6 +59,10 @@ class Storage:
         """Fitted objects of a bridge as bytes."""
         return self.in_memory[name] if self.folder is None else _content(self._file(name))[1]
 
+    def objects(self, name: Hashable) -> tuple[Any, Monitor | None]:
+        """The fitted estimator of a bridge and its monitor, made anew."""
+        return unpickled(self.fitted(name))
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Be the only process that works on the folder; what killed processes left half written is removed."""
@@ -74,6 +80,21 @@ class Storage:
         assert self.folder is not None
         shown = re.sub(r"[^\w-]+", "_", str(name))[:LONGEST]
         return self.folder / f"{shown}-{sha256(repr(name).encode()).hexdigest()[:10]}{ENDING}"
+
+
+@dataclass
+class MonitorsElsewhere(Storage):
+    """Monitors of a mapping that reads each when it is asked for; those that have changed since are in memory."""
+
+    monitors: Mapping[Hashable, Monitor] = field(default_factory=dict)
+
+    def objects(self, name: Hashable) -> tuple[Any, Monitor | None]:
+        """No estimator, and the monitor of a bridge."""
+        return super().objects(name) if name in self.in_memory else (None, self.monitors[name])
+
+    def fitted(self, name: Hashable) -> bytes:
+        """The same as bytes."""
+        return super().fitted(name) if name in self.in_memory else pickled(self.objects(name))
 
 
 def _content(file: Path) -> tuple[BridgeOutcome, bytes]:
