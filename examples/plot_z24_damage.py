@@ -132,17 +132,17 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 # %%
 # .. code-block:: none
 #
-#    Most probable: a loss of 3 % of stiffness in girder_torsion (between 2 and 5 %), of 10 % in abutments (between 4
-#    and 15 %) and of 18 % in soil (between 14 and 23 %), probability 41 %.
-#    It could also be: about the same and something else (1 %); a loss of 8 % in abutments and of 18 % in soil (14
-#    %); a loss of 17 % in soil (13 %); a loss of 3 % in girder_torsion and of 16 % in soil (10 %); a loss of 18 % in
-#    soil and something else (9 %).
-#    The probability that nothing has changed is below 0.1 %.
-#    Averaged over all explanations: soil 17 % (between 12 and 23 %; damaged with probability 97 %); abutments 6 %
-#    (between 0 and 14 %; damaged with probability 60 %); girder_torsion 2 % (between 0 and 5 %; damaged with
+#    Most probable: a loss of 3 % of stiffness in girder_torsion (90 % interval 2 to 5 %), of 10 % in abutments (90 %
+#    interval 4 to 15 %) and of 18 % in soil (90 % interval 14 to 23 %), probability 41 %.
+#    Less probable: about the same and something else (1 %); a loss of 8 % in abutments and of 18 % in soil (14 %); a
+#    loss of 17 % in soil (13 %); a loss of 3 % in girder_torsion and of 16 % in soil (10 %); a loss of 18 % in soil and
+#    something else (9 %).
+#    Probability of no change: below 0.1 %.
+#    Averaged over all explanations: soil 17 % (90 % interval 12 to 23 %; damaged with probability 97 %); abutments 6 %
+#    (90 % interval 0 to 14 %; damaged with probability 60 %); girder_torsion 2 % (90 % interval 0 to 5 %; damaged with
 #    probability 55 %).
 #    girder_bending and piers cannot be distinguished by these modes: only their common effect is known.
-#    Compared: 110 records, worth 7.2 independent ones; with 2,800 training records, worth 99 independent ones.
+#    110 records (worth 7.2 independent ones) compared with 2,800 training records (worth 99 independent ones).
 #    20 of 130 records could not be compared: 17 in weather far outside that of the training records and 3 far from
 #    the other records.
 #

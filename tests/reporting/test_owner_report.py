@@ -142,10 +142,11 @@ def test_the_page_says_what_the_table_says(page, study):
 
 
 def test_identified_damage_is_said_first_and_in_full(page, found):
-    said = f"Most probable: a loss of 20\xa0% of stiffness in {HOSTILE} (between 18 and 22\xa0%), probability 90\xa0%."
+    loss = f"a loss of 20\xa0% of stiffness in {HOSTILE} (90\xa0% interval 18 to 22\xa0%)"
+    said = f"Most probable: {loss}, probability 90\xa0%."
     assert page.text.count(said) == 2
     assert page.text.index(said) < page.text.index("False alarms")
-    assert f"It could also be: a loss of 15\xa0% in {HOSTILE} and of 3\xa0% in {QUOTED} (8\xa0%)." in page.text
+    assert f"Less probable: a loss of 15\xa0% in {HOSTILE} and of 3\xa0% in {QUOTED} (8\xa0%)." in page.text
     row = found.table.loc[QUOTED]
     last = len(page.cells) - page.cells[::-1].index("loss of stiffness") - 1
     assert page.cells[last - 1] == chance_text(row["probability"])
@@ -167,7 +168,7 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
     page = Page(owner_report(study, tmp_path / "a.html", identified=nothing).read_text(encoding="utf-8"))
     headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
     assert "Most probable: something else than damage of these groups, probability 93\xa0%." in headline
-    assert "No damage of these groups explains the shifts; mode" in headline
+    assert "No damage of these groups explains the shifts: mode" in headline
     assert "Identified damage: damage of these groups alone" in page.text[page.text.rindex("Warnings") :]
 
 

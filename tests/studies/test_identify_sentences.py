@@ -60,17 +60,20 @@ def shifts(measured, explained=0.0, error=0.001):
 
 def test_what_is_most_probable_what_else_could_be_and_whether_anything_has_changed():
     first, others, unchanged, averages, records = said(CASES["clear"])
-    assert first == "Most probable: a loss of 12 % of stiffness in side span (between 9 and 15 %), probability 85 %."
+    assert (
+        first == "Most probable: a loss of 12 % of stiffness in side span (90 % interval 9 to 15 %), probability 85 %."
+    )
     assert others == (
-        "It could also be: about the same and something else (2 %); a loss of 4 % in main stays and of 3 % in bearings "
+        "Less probable: about the same and something else (2 %); a loss of 4 % in main stays and of 3 % in bearings "
         "(9 %); something else than damage of these groups (4 %)."
     )
-    assert unchanged == "The probability that nothing has changed is below 0.1 %."
+    assert unchanged == "Probability of no change: below 0.1 %."
     assert re.fullmatch(
-        r"Averaged over all explanations: side span 1\d % \(between 0 and 15 %; damaged with probability 8\d %\)\.",
+        r"Averaged over all explanations: side span 1\d % "
+        r"\(90 % interval 0 to 15 %; damaged with probability 8\d %\)\.",
         averages,
     )
-    assert records == "Compared: 60 records; with 365 training records."
+    assert records == "60 records compared with 365 training records."
 
 
 def test_what_only_adds_to_the_most_probable_explanation_is_reported_in_short():
@@ -83,7 +86,7 @@ def test_what_only_adds_to_the_most_probable_explanation_is_reported_in_short():
         "piers + soil": (0.04, {"piers": (0.05, 0.012), "soil": (0.08, 0.012)}),
     }
     assert said(identified(more))[1] == (
-        "It could also be: about the same and 1.4 % in piers (5 %), something else (4 %) or 2.0 % in soil (3 %); a "
+        "Less probable: about the same and 1.4 % in piers (5 %), something else (4 %) or 2.0 % in soil (3 %); a "
         "loss of 5 % in deck and of 8 % in towers (4 %); a loss of 5 % in piers and of 8 % in soil (4 %)."
     )
 
@@ -91,8 +94,8 @@ def test_what_only_adds_to_the_most_probable_explanation_is_reported_in_short():
 def test_an_explanation_that_is_sure_needs_no_averages():
     sure = identified({"top": (0.995, {"top": (0.2, 0.004)}), "bottom": (0.005, {"bottom": (0.2, 0.01)})})
     assert said(sure)[:2] == [
-        "Most probable: a loss of 20.0 % of stiffness in top (between 19.3 and 20.7 %), probability 99.5 %.",
-        "The probability that nothing has changed is below 0.1 %.",
+        "Most probable: a loss of 20.0 % of stiffness in top (90 % interval 19.3 to 20.7 %), probability 99.5 %.",
+        "Probability of no change: below 0.1 %.",
     ]
 
 
@@ -100,10 +103,10 @@ def test_groups_that_look_alike_are_said_together_with_the_sum_of_their_probabil
     found = CASES["alike"]
     first, others, *_ = said(found)
     assert first == (
-        "Most probable: a loss of 12 % of stiffness in pier_1 or pier_2 (between 9 and 15 %), which these modes cannot "
-        "distinguish, probability 90 %."
+        "Most probable: a loss of 12 % of stiffness in pier_1 or pier_2 (90 % interval 9 to 15 %), which these modes "
+        "cannot distinguish, probability 90 %."
     )
-    assert others == "It could also be: a loss of 3 % in deck (7 %)."
+    assert others == "Less probable: a loss of 3 % in deck (7 %)."
     assert found.summary_table["probability"].to_dict() == pytest.approx(
         {"pier_1 or pier_2 12\xa0%": 0.9, "deck 3\xa0%": 0.07, "no damage": 0.03}
     )
@@ -121,18 +124,18 @@ def test_groups_that_only_together_imitate_another_are_not_said_in_its_place():
 def test_silence_is_never_healthy():
     found = CASES["healthy"]
     first, others, unnoticed, unobservable, *_ = said(found)
-    assert first == "Most probable: no damage that these modes show, probability 95 %."  # with the unobservable one's
-    assert others.startswith(
-        "It could also be: something else than damage of these groups (3 %); a loss of 2 % in deck"
-    )
+    assert (
+        first == "Most probable: no damage observable in these modes, probability 95 %."
+    )  # with the unobservable one's
+    assert others.startswith("Less probable: something else than damage of these groups (3 %); a loss of 2 % in deck")
     bounds = found.table["highest_if_damaged"]
     assert unnoticed == (
-        f"A loss of stiffness of up to {100 * bounds['deck']:.2g} % in deck and {100 * bounds['piers']:.2g} % in piers "
-        "could have gone unnoticed."
+        f"95 % upper bounds on undetected losses of stiffness: {100 * bounds['deck']:.2g} % in deck and "
+        f"{100 * bounds['piers']:.2g} % in piers."
     )
-    assert unobservable == "Damage in vertical cannot be seen in these modes: nothing is known of it."
+    assert unobservable == "Damage in vertical is unobservable in these modes."
     doubtful = identified(HEALTHY, unobservable=["vertical"], p_value=0.01)
-    assert "Yet a healthy structure shows such shifts with a probability of only 1 %." in said(doubtful)
+    assert "However, such shifts are rare in a healthy structure (p value 0.01)." in said(doubtful)
 
 
 def test_damage_of_a_group_that_is_hardly_seen_is_said_where_it_is_more_probable_than_none():
@@ -156,8 +159,8 @@ def test_where_no_damage_explains_the_shifts_likely_causes_are_named(measured, c
     assert first == "Most probable: something else than damage of these groups, probability 90 %."
     worst = int(np.argmax(np.abs(measured)))
     assert departs == (
-        f"No damage of these groups explains the shifts; mode f{worst + 1} departs most: it moved by "
-        f"{100 * measured[worst]:+.2f} % (standard error 0.10 %), of which these groups explain +0.00 %."
+        f"No damage of these groups explains the shifts: mode f{worst + 1} has the largest residual, a measured shift "
+        f"of {100 * measured[worst]:+.2f} % (standard error 0.10 %) and an explained one of +0.00 %."
     )
     assert causes.startswith(f"Likely causes: {cause}")
     assert cause in by_kind(found)["unexplained-shifts"]
@@ -166,10 +169,10 @@ def test_where_no_damage_explains_the_shifts_likely_causes_are_named(measured, c
 @pytest.mark.parametrize(
     ("cause", "kind", "amount", "text"),
     [
-        ("deck stiffer", "stiffening", -0.08, "a gain of 8 % of stiffness in deck (between 6 and 10 %)"),
-        ("E lower", "parameter", -0.08, "a fall of 8 % in E (between 6 and 10 %)"),
-        ("E higher", "parameter", 0.08, "a rise of 8 % in E (between 6 and 10 %)"),
-        ("ballast", "mass", 0.8, "added mass of 80 % of ballast (between 78 and 82 %)"),
+        ("deck stiffer", "stiffening", -0.08, "a gain of 8 % of stiffness in deck (90 % interval 6 to 10 %)"),
+        ("E lower", "parameter", -0.08, "a fall of 8 % in E (90 % interval 6 to 10 %)"),
+        ("E higher", "parameter", 0.08, "a rise of 8 % in E (90 % interval 6 to 10 %)"),
+        ("ballast", "mass", 0.8, "added mass of 80 % of ballast (90 % interval 78 to 82 %)"),
     ],
 )
 def test_other_causes_than_damage_are_said_by_what_they_change(cause, kind, amount, text):
@@ -186,13 +189,13 @@ def test_strengthening_that_was_sought_is_not_named_as_a_cause():
 
 def test_what_the_most_probable_explanation_leaves_is_reported():
     found = identified(CLEAR, misfit_p_value=0.004, shifts=shifts([-0.02, -0.001, -0.012, 0.0], -0.001))
-    (misfit,) = (line for line in said(found) if "unexplained" in line)
+    (misfit,) = (line for line in said(found) if "does not explain" in line)
     assert misfit == (
-        "The most probable explanation leaves something unexplained (probability by chance 0.4 %): mode f1 departs "
-        "most: it moved by -2.00 % (standard error 0.10 %), of which these groups explain -0.10 %."
+        "The most probable explanation does not explain all of the shifts (p value 0.004): mode f1 has the largest "
+        "residual, a measured shift of -2.00 % (standard error 0.10 %) and an explained one of -0.10 %."
     )
     assert "likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
-    assert "any shift can be explained" in identified(CLEAR, misfit_p_value=np.nan).summary()
+    assert "the fit explains any shift" in identified(CLEAR, misfit_p_value=np.nan).summary()
 
 
 def test_explanations_that_are_not_listed_are_counted():
@@ -238,7 +241,7 @@ def test_records_that_were_left_out_or_scatter_widely_are_reported():
 def test_few_independent_records_are_warned_of(is_few):
     worth = (1.6, 12.2) if is_few else (60.0, 365.0)
     found = identified(CLEAR, records=ComparedRecords(60, {}, worth[0], 365, worth[1], {}))
-    assert ("60 records, worth 1.6 independent ones" in found.summary()) == is_few
+    assert ("60 records (worth 1.6 independent ones)" in found.summary()) == is_few
     kinds = by_kind(found)
     assert ("few-independent-records" in kinds) == is_few
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
-from skthermo._tables.text import SPACE, chance_text, listed, percent
+from skthermo._tables.text import SPACE, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
 from skthermo.studies.identification._observe import ComparedRecords
@@ -32,7 +32,7 @@ NAMED, MOST_NAMED = 0.01, 4
 """Probability from which on another explanation is named, and the largest number of those that are."""
 SURE = 0.9  # probability from which on the most probable explanation is not followed by averages over all
 LIKELY = 0.1  # probability from which on a cause is named among the averages
-RARE = 0.05  # probability by chance below which a misfit, or a shift of a healthy structure, is given
+RARE = 0.05  # p value below which a misfit, or a shift of a healthy structure, is given
 CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
 PILED_UP = 1.05  # standard errors between the mean of an exponential law and its bound, with some margin
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
@@ -60,9 +60,9 @@ class Amount:
 
     @property
     def band(self) -> str:
-        """The band, from the smaller to the larger amount."""
+        """The 90 % interval, from the smaller to the larger amount."""
         low, high = sorted((self.lowest, self.highest), key=abs)
-        return f"between {self._number(low)} and {self._number(high)}{SPACE}%"
+        return f"90{SPACE}% interval {self._number(low)} to {self._number(high)}{SPACE}%"
 
     @property
     def saying(self) -> str:
@@ -218,20 +218,22 @@ def answer(found: IdentifiedDamage) -> Iterator[str]:
     """What is most probable, how probable, what else could be."""
     explanations = statements(found)
     first, *others = explanations
-    shown = " that these modes show" if found.unobservable else ""
+    shown = " observable in these modes" if found.unobservable else ""
     yield (
         f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
         f"{chance_text(first.probability)}."
     )
     if first.has_else:
-        what = "No damage of these groups" if first.is_else else "Damage of these groups alone hardly"
-        yield f"{what} explains the shifts; {_departure(found)}."
+        what = (
+            "No damage of these groups explains" if first.is_else else "Damage of these groups alone does not explain"
+        )
+        yield f"{what} the shifts: {_departure(found)}."
         yield f"Likely causes: {likely_causes(found)}."
     yield from _others(first, others)
     if not first.is_healthy:
         unchanged = sum(one.probability for one in explanations if one.is_healthy)
-        nothing = "of no change that these modes show" if found.unobservable else "that nothing has changed"
-        yield f"The probability {nothing} is {chance_text(unchanged)}."
+        observable = "observable " if found.unobservable else ""
+        yield f"Probability of no {observable}change: {chance_text(unchanged)}."
     if first.probability < SURE and not first.is_else:
         yield from _averages(found, first)
     if first.is_healthy:
@@ -247,7 +249,7 @@ def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
     different = [one for one in probable if one not in more.values()][:MOST_NAMED]
     texts += [f"{one.phrase()} ({chance_text(one.probability)})" for one in different]
     if texts:
-        yield f"It could also be: {'; '.join(texts)}."
+        yield f"Less probable: {'; '.join(texts)}."
 
 
 def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
@@ -271,7 +273,7 @@ def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
     table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unobservable)]
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
-        yield f"A loss of stiffness of up to {listed(losses)} could have gone unnoticed."
+        yield f"95{SPACE}% upper bounds on undetected losses of stiffness: {listed(losses)}."
 
 
 def limits(found: IdentifiedDamage) -> Iterator[str]:
@@ -280,15 +282,15 @@ def limits(found: IdentifiedDamage) -> Iterator[str]:
     for causes in found.indistinguishable:
         yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
     if found.unobservable:
-        yield f"Damage in {either(found.unobservable)} cannot be seen in these modes: nothing is known of it."
+        yield f"Damage in {either(found.unobservable)} is unobservable in these modes."
     if best.is_healthy and found.p_value < RARE:
-        yield f"Yet a healthy structure shows such shifts with a probability of only {chance_text(found.p_value)}."
+        yield f"However, such shifts are rare in a healthy structure (p value {probability_text(found.p_value)})."
     if np.isnan(found.misfit_p_value):
-        yield "There are no more shifts than causes, so that any shift can be explained: the fit proves little."
+        yield "There are no more shifts than causes: the fit explains any shift and cannot be tested."
     elif found.misfit_p_value < RARE and not best.has_else:
         yield (
-            "The most probable explanation leaves something unexplained (probability by chance "
-            f"{chance_text(found.misfit_p_value)}): {_departure(found)}."
+            "The most probable explanation does not explain all of the shifts (p value "
+            f"{probability_text(found.misfit_p_value)}): {_departure(found)}."
         )
     if found.rest >= NAMED:
         yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
@@ -342,8 +344,8 @@ def _departure(found: IdentifiedDamage) -> str:
     measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))
     error = float(shifts["standard_error"].iloc[worst])
     return (
-        f"mode {shifts.index[worst]} departs most: it moved by {_signed(measured)} (standard error "
-        f"{100 * error:.2f}{SPACE}%), of which these groups explain {_signed(explained)}"
+        f"mode {shifts.index[worst]} has the largest residual, a measured shift of {_signed(measured)} (standard error "
+        f"{100 * error:.2f}{SPACE}%) and an explained one of {_signed(explained)}"
     )
 
 

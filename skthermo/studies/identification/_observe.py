@@ -83,7 +83,8 @@ class ComparedRecords:
     def sentences(self) -> Iterator[str]:
         """How many records were compared, what they are worth, and what was left out."""
         new = _worth("record", self.n_compared, self.n_independent)
-        yield f"Compared: {new}; with {_worth('training record', self.n_trained, self.n_trained_independent)}."
+        known = _worth("training record", self.n_trained, self.n_trained_independent)
+        yield f"{new} compared with {known}."
         if self.left_out:
             yield f"{self._left_out()}."
         if self.n_latest >= IN_A_ROW:
@@ -91,8 +92,8 @@ class ComparedRecords:
             yield f"{latest[0].upper()}{latest[1:]}."
         for mode, factor in self.wider.items():
             yield (
-                f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its "
-                "uncertainty allows for that."
+                f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its standard "
+                "error includes this."
             )
 
     def warnings(self) -> Iterator[SkthermoWarning]:
@@ -128,7 +129,7 @@ def _worth(noun: str, number: int, independent: float) -> str:
     if independent > 0.95 * number:
         return counted(number, noun)
     said = significant(independent) if independent < 10 else f"{independent:,.0f}"
-    return f"{counted(number, noun)}, worth {said} independent {'one' if said == '1.0' else 'ones'}"
+    return f"{counted(number, noun)} (worth {said} independent {'one' if said == '1.0' else 'ones'})"
 
 
 def left_out_rows(fem: Any, T: Any, theta: Array, F: Array) -> dict[str, NDArray[np.bool_]]:

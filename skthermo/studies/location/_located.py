@@ -16,7 +16,7 @@ from skthermo.studies.location._question import Answer, Explained
 
 LIKELY, PROBABLE = 0.9, 0.5
 """Probabilities with which a summary says where damage is: almost surely, and more likely than not."""
-WORTH_TELLING = 0.1  # probability of a group from which on a summary says where in it
+WORTH_NAMING = 0.1  # probability of a group from which on a summary says where in it
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class LocatedDamage:
     >>> located = locate_damage(fem, structure, later.temperatures, F, ["top", "diagonal"], random_state=0)
     >>> print(located.summary())
     top is damaged with a probability of over 99.9 %, probably in element 3 of 5 (x = 10.4 to 15.6 m) (over 99.9 %).
-    The rest of top is unlikely.
+    Damage in the rest of top is unlikely.
     >>> round(float(located.table.loc["13", "severity"]), 1)
     0.4
     """
@@ -193,23 +193,20 @@ class LocatedDamage:
         return visible_sets(self.explained, self.found.unobservable)
 
     def _answer(self) -> Iterator[str]:
-        is_named = (self.groups["probability"] >= WORTH_TELLING) & ~self.groups.index.isin(self.found.unobservable)
+        is_named = (self.groups["probability"] >= WORTH_NAMING) & ~self.groups.index.isin(self.found.unobservable)
         probable = self.groups[is_named]
         if probable.empty:
-            yield (
-                f"No group is damaged with a probability above {percent(WORTH_TELLING)}, so that there is no place to "
-                "name."
-            )
-        if len(probable) > 1 and self._share_of_several(probable.index) < WORTH_TELLING:
+            yield f"No group is damaged with a probability above {percent(WORTH_NAMING)}: no place is given."
+        if len(probable) > 1 and self._share_of_several(probable.index) < WORTH_NAMING:
             yield f"Most probably only one of {listed(list(probable.index))} is damaged."
         for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
             yield from self._of_group(str(group), row)
         if self.alike:
-            yield f"These modes cannot tell {' from '.join(self.alike)}."
-        if self.probability_other >= WORTH_TELLING:
-            yield f"Something else may have shifted the frequencies ({_share(self.probability_other)})."
+            yield f"These modes do not distinguish {' from '.join(self.alike)}."
+        if self.probability_other >= WORTH_NAMING:
+            yield f"Another cause may have shifted the frequencies (probability {_share(self.probability_other)})."
         if self.found.unobservable:
-            yield f"Damage in {listed(self.found.unobservable)} would hardly show in these modes."
+            yield f"Damage in {listed(self.found.unobservable)} is unobservable in these modes."
 
     def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
         damaged = f"{group} is damaged with a probability of {_share(row['probability'])}"
@@ -223,17 +220,17 @@ class LocatedDamage:
             yield damaged + (
                 f", probably all {len(small)} elements alike ({_share(whole)})."
                 if whole >= PROBABLE
-                else "; these records do not say where in it."
+                else "; these records do not show where in it."
             )
             return
         yield f"{damaged}, probably in {places.text(small, alternatives=True)} ({_share(in_small)})."
         if len(wide) == len(places.members):
-            yield f"The rest of {group} cannot be excluded."
+            yield f"Damage in the rest of {group} cannot be excluded."
         elif set(wide) != set(small):
             where = places.text(wide, alternatives=True)
-            yield f"It lies in {where} with {_share(in_wide)}; the rest of {group} is unlikely."
+            yield f"It lies in {where} ({_share(in_wide)}). Damage in the rest of {group} is unlikely."
         else:
-            yield f"The rest of {group} is unlikely."
+            yield f"Damage in the rest of {group} is unlikely."
 
     def _share_of_several(self, groups: Collection[str]) -> float:
         """Probability that more than one of some groups is damaged."""
