@@ -126,8 +126,8 @@ class Ensemble:
         theta = np.array([outcome.theta for outcome in outcomes])
         if unfinished := sum(not outcome.success for outcome in outcomes):
             yield ModelWarning(
-                f"the search has not converged for {unfinished} of {n} drawn models, which may not be likely ones: "
-                "expected a higher max_iter, or bounds within which the model has modes",
+                f"the search has not converged for {unfinished} of {n} drawn models. They may be improbable. Raise "
+                "max_iter, or narrow the bounds to where the model has modes",
                 "not-converged",
             )
         at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
@@ -135,15 +135,15 @@ class Ensemble:
             counts = zip(self.names, at_bound, strict=True)
             listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in counts if count)
             yield ModelWarning(
-                f"drawn models lie at the bounds of {listed}, and are less different than what is not known: expected "
-                "wider bounds, or a narrower prior",
+                f"drawn models lie at the bounds of {listed}. They differ less than is unknown. Widen the bounds, or "
+                "give a narrower prior",
                 "at-bounds",
             )
         mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
         if mismatched:
             yield ModelWarning(
-                f"modes swap places in {mismatched} of {n} drawn models, and a measured mode is fitted with "
-                "another one: expected a model with track=True, or shapes",
+                f"modes change their order in {mismatched} of {n} drawn models. A measured mode is fitted with another "
+                "one there. Use a model with track=True, or give shapes",
                 "modes-cross",
             )
 

@@ -104,7 +104,7 @@ def _real_shapes(shapes: NDArray) -> Array:
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
     warn_user(
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
-        "shape's length, is dropped",
+        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified",
         RecordsWarning,
         "complex-shapes",
     )
