@@ -28,7 +28,7 @@ from skthermo.fleet._bridge import (
     unpickled,
 )
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
-from skthermo.fleet._storage import MonitorsElsewhere, Storage
+from skthermo.fleet._storage import Storage
 from skthermo.fleet._workers import run_tasks
 from skthermo.monitoring import Monitor, MonitorStatus
 
@@ -191,7 +191,8 @@ class Fleet:
         NotFittedError
             If a monitor is not fitted.
         """
-        storage = Storage() if isinstance(monitors, dict) else MonitorsElsewhere(monitors=monitors)
+        is_copied = isinstance(monitors, dict)
+        storage = Storage(elsewhere={} if is_copied else monitors)
         failures = {name: Failure.of("update", error) for name, error in (errors or {}).items()}
         for name in monitors:
             monitor = monitors[name]
@@ -200,11 +201,11 @@ class Fleet:
             )
             failure = failures.pop(name, None)
             outcome = outcome if failure is None else not_evaluated(outcome, failure)
-            if isinstance(storage, MonitorsElsewhere):
-                storage.outcomes[name] = replace(outcome, n_bytes=np.nan)
-            else:
+            if is_copied:
                 fitted = pickled((None, monitor))
                 storage.put(replace(outcome, n_bytes=len(fitted)), fitted)
+            else:
+                storage.outcomes[name] = replace(outcome, n_bytes=np.nan)
         for name, failure in failures.items():
             storage.put(BridgeOutcome(name, failures=(failure,)), None)
         if not storage.outcomes:

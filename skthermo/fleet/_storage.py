@@ -23,11 +23,12 @@ SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
 
 @dataclass
 class Storage:
-    """Outcomes by name, at hand; fitted objects as bytes, in memory or in a folder."""
+    """Outcomes by name, at hand; fitted objects as bytes in a folder or in memory, or monitors that are read elsewhere."""
 
     folder: Path | None = None
     outcomes: dict[Hashable, BridgeOutcome] = field(default_factory=dict)
     in_memory: dict[Hashable, bytes] = field(default_factory=dict)
+    elsewhere: Mapping[Hashable, Monitor] = field(default_factory=dict)
 
     def read(self) -> None:
         """Read what the folder holds; a file that cannot be read is a bridge that is not fitted."""
@@ -57,10 +58,14 @@ class Storage:
 
     def fitted(self, name: Hashable) -> bytes:
         """Fitted objects of a bridge as bytes."""
-        return self.in_memory[name] if self.folder is None else _content(self._file(name))[1]
+        if self.folder is not None:
+            return _content(self._file(name))[1]
+        return self.in_memory[name] if name in self.in_memory else pickled(self.objects(name))
 
     def objects(self, name: Hashable) -> tuple[Any, Monitor | None]:
-        """The fitted estimator of a bridge and its monitor, made anew."""
+        """The fitted estimator of a bridge, None elsewhere, and its monitor."""
+        if self.folder is None and name not in self.in_memory:
+            return None, self.elsewhere[name]
         return unpickled(self.fitted(name))
 
     @contextmanager
@@ -80,21 +85,6 @@ class Storage:
         assert self.folder is not None
         shown = re.sub(r"[^\w-]+", "_", str(name))[:LONGEST]
         return self.folder / f"{shown}-{sha256(repr(name).encode()).hexdigest()[:10]}{ENDING}"
-
-
-@dataclass
-class MonitorsElsewhere(Storage):
-    """Monitors of a mapping that reads each when it is asked for; those that have changed since are in memory."""
-
-    monitors: Mapping[Hashable, Monitor] = field(default_factory=dict)
-
-    def objects(self, name: Hashable) -> tuple[Any, Monitor | None]:
-        """No estimator, and the monitor of a bridge."""
-        return super().objects(name) if name in self.in_memory else (None, self.monitors[name])
-
-    def fitted(self, name: Hashable) -> bytes:
-        """The same as bytes."""
-        return super().fitted(name) if name in self.in_memory else pickled(self.objects(name))
 
 
 def _content(file: Path) -> tuple[BridgeOutcome, bytes]:
