@@ -23,7 +23,7 @@ SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
 
 @dataclass
 class Storage:
-    """Outcomes by name, at hand; fitted objects as bytes in a folder or in memory, or monitors that are read elsewhere."""
+    """Outcomes by name, at hand; fitted objects as bytes in a folder or in memory, or monitors read elsewhere."""
 
     folder: Path | None = None
     outcomes: dict[Hashable, BridgeOutcome] = field(default_factory=dict)
