@@ -458,8 +458,8 @@ def warn_of_fleet(rows: NDArray[np.bool_], consequence: str) -> None:
     """Count the rows in weather that the fleet has seen, and the records of this structure have not."""
     if rows.any():
         warn_user(
-            f"{rows.sum()} of {len(rows)} rows are in weather that the training records have not seen, and rely on "
-            f"what the fleet has shown there: {consequence}",
+            f"{rows.sum()} of {len(rows)} rows are in weather outside the training records, and are predicted from the "
+            f"fleet. {consequence}. Fit again when there are such records",
             WeatherWarning,
             "rows-from-fleet",
         )

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pickle import PicklingError
 from typing import Any, TypeVar
 
 from joblib import hash as content_of
@@ -21,7 +22,10 @@ class KeptAnswers:
 
     def of(self, asked: Any, inputs: Any, size: int, answer: Callable[[], Answer]) -> Answer:
         """The answer, of so many numbers, given now or before."""
-        key = id(asked), content_of(inputs)
+        try:
+            key = id(asked), content_of(inputs)
+        except PicklingError:  # of a part that somebody wrote in a notebook, say
+            return answer()
         if key in self._answers:
             return self._answers[key][-1]
         found = answer()
@@ -38,7 +42,7 @@ _kept: ContextVar[KeptAnswers | None] = ContextVar("answers that are kept", defa
 @contextmanager
 def answers_kept() -> Iterator[None]:
     """Within, estimators keep their last answers to `answer_once`; a warning is not repeated with an answer."""
-    token = _kept.set(KeptAnswers())
+    token = _kept.set(_kept.get() or KeptAnswers())
     try:
         yield
     finally:

@@ -430,8 +430,8 @@ def check_noise(
         )
     if (array > most).all():  # a single mode may be unknown
         raise ValueError(
-            f"{what} is {array}, which means {100 * np.min(array):.0f} % or more in every mode: percent? expected at "
-            f"most {most:g} in some mode, and {np.min(array) / 100:g} where {np.min(array):g} % is meant"
+            f"{what} is {array}, which means {100 * np.min(array):.0f} % or more in every mode; expected at most "
+            f"{most:g} in some mode. If percent were meant, give {np.min(array) / 100:g} for {np.min(array):g} %"
         )
     return np.broadcast_to(array, (n_modes,))
 

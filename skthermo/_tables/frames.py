@@ -151,8 +151,9 @@ def warn_of_markers(X: ArrayLike) -> None:
     if marked.any():
         row, column = np.argwhere(marked)[0]
         warn_user(
-            f"{marked.sum()} of {marked.size} values look as if they stood for missing ones, the first "
-            f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}; expected NaN there",
+            f"{marked.sum()} of {marked.size} values look like codes for missing values, the first "
+            f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}. They are used as "
+            "measured. Put NaN there",
             RecordsWarning,
             "placeholders",
         )

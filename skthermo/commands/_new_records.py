@@ -181,8 +181,8 @@ def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> t
         raise ValueError(f"no stamp is in all files of the baseline ({stamps}); expected records of the same times")
     if len(waiting):
         warn_user(
-            f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}; "
-            f"{len(whole)} records have all columns",
+            f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}. They "
+            f"are left out; {len(whole)} records have all columns. If they are many, compare the clocks of the loggers",
             RecordsWarning,
             "unmatched-stamps",
         )

@@ -108,7 +108,10 @@ def _csv(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished:
         text = text[: max(text.rfind("\n"), text.rfind("\r")) + 1]
     elif not is_finished:
         warn_user(
-            f"{file} does not end with a line break: its last value may be cut off", RecordsWarning, "unfinished-file"
+            f"{file} does not end with a line break. Its last value may be cut off. Rename files when they are "
+            "complete",
+            RecordsWarning,
+            "unfinished-file",
         )
     rows = [(line, row) for line, row in rows_of(text, form.separator) if line >= form.names_line]
     if not rows:

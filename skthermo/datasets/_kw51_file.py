@@ -116,8 +116,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
     if md5 != PUBLISHED_MD5:
         warn_user(
-            f"{file} has the MD5 checksum {md5}; expected {PUBLISHED_MD5}, that of the published trackedmodes.zip: its "
-            "content may differ from what was published",
+            f"{file} has the MD5 checksum {md5}, the published trackedmodes.zip has {PUBLISHED_MD5}. Its content may "
+            "differ from what was published. Download it again, unless you changed it",
             RecordsWarning,
             "other-kw51-file",
         )
@@ -152,8 +152,9 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
     if doubtful.any():
         row, column = np.argwhere(doubtful)[0]
         warn_user(
-            f"{file}: field 'env' has {doubtful.sum()} values that may stand for missing ones, the first in row {row}, "
-            f"column {channels[column]!r}: {env[row, column]:g}; expected measured values, or NaN",
+            f"{file}: field 'env' has {doubtful.sum()} values that look like codes for missing values, the first in "
+            f"row {row}, column {channels[column]!r}: {env[row, column]:g}. They are used as measured. Compare the "
+            "file with the published one, or put NaN there",
             RecordsWarning,
             "placeholders",
         )

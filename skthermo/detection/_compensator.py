@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, overload
 
@@ -420,7 +420,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         outside = reach.warning(inputs)
         if outside:
             warn_user(outside, WeatherWarning, "outside-training-weather")
-        warn_of_fleet(self.regression_.from_fleet(filled), "their residuals count less, as far as that is uncertain")
+        warn_of_fleet(self.regression_.from_fleet(filled), "Their residuals count less, by that uncertainty")
         apart = self.sensors_.warning(temperatures)
         if apart:
             warn_user(apart, RecordsWarning, "sensor-disagrees")
@@ -472,16 +472,14 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         folds = Folds.of(self._wanted_folds(filled), filled)
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         with warnings_once():
-            self.regression_ = Regression.of(self.estimator, filled, frequencies, findings)
-            predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
-            longer = folds.longer(filled, measured - predicted)
-            if longer is not None:
-                folds = longer
-                predicted, stated = self.regression_.out_of_fold(filled, frequencies, folds)
+            learn = partial(LearnedRegression.of, self.estimator, filled, frequencies, findings, folds)
+            learned = answer_once(type(self), (self.estimator, filled, frequencies, folds), measured.size, learn)
+        self.regression_, folds, stated = learned.regression, learned.folds, learned.errors
+        predicted = learned.out_of_fold.copy()
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         if not self.regression_.states_errors:
-            warn_of_unseen_weather(filled, self.folds_, "their residuals are too large, and may hide damage")
+            warn_of_unseen_weather(filled, self.folds_, "Their residuals are too large, and may hide damage")
         length = None if folds.blocks is None else folds.blocks.length(filled)
         self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
         predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
@@ -530,19 +528,42 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         if self.cv is not None or has_stamps(temperatures) or not has_lags_behind(self.estimator):
             return self.cv
         warn_user(
-            f"rows have no stamps, and lags inside {type(last_step(self.estimator)).__name__} would take rows of other "
-            "folds for earlier ones: folds are five long periods instead of blocks that see each season; expected a "
-            "frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
+            f"rows have no stamps, so that lags inside {type(last_step(self.estimator)).__name__} would take rows of "
+            "other folds for earlier ones. Folds are therefore five long periods, and may lack weather of the others. "
+            "Give a frame on a DatetimeIndex, or LagFeatures as the first step of a pipeline",
             FewRecordsWarning,
             "lags-without-stamps",
         )
         return "contiguous"
 
 
+@dataclass(frozen=True)
+class LearnedRegression:
+    """A fitted regression, and its predictions out of fold in Hz with their errors."""
+
+    regression: Regression
+    folds: Folds
+    out_of_fold: Array
+    errors: PredictionError
+
+    @classmethod
+    def of(
+        cls, estimator: BaseEstimator, temperatures: Any, frequencies: Any, findings: RecordFindings, folds: Folds
+    ) -> LearnedRegression:
+        """Learn from all rows, and again on other folds; these are longer where residuals depend on each other."""
+        regression = Regression.of(estimator, temperatures, frequencies, findings)
+        predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
+        longer = folds.longer(temperatures, as_floats(frequencies) - predicted)
+        if longer is not None:
+            folds = longer
+            predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
+        return cls(regression, folds, predicted, stated)
+
+
 def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     """Temperatures in which the other sensors fill the gaps, with a warning that counts these by sensor."""
     filled, deviations = sensors.fill(temperatures)
-    consequence = "the spread of residuals is widened by what that costs"
+    consequence = "The spread of residuals includes the error of that"
     message = filled_text(deviations, column_names(temperatures, "x"), consequence)
     if message:
         warn_user(message, RecordsWarning, "filled-temperatures")
@@ -552,7 +573,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
 def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     """Rows of which nothing is predicted, so that they are not evaluated; a warning counts those not yet explained."""
     unknown = np.isnan(predicted).all(axis=1)
-    others = "of which the estimator predicts nothing, as where lags reach to no record"
+    others = "for which the estimator predicts nothing, such as those with lags that reach to no record"
     message = unpredicted_text(unknown & ~explained_rows(predicted), weather, others)
     if message:
         warn_user(message, UnevaluatedRowsWarning, "not-predicted")

@@ -40,7 +40,8 @@ def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
     known = present.any(axis=1)
     if 2 * known.sum() < len(known):
         warn_user(
-            f"the score is of {known.sum()} of {len(known)} rows: the others have no value",
+            f"the score is of {known.sum()} of {len(known)} rows: the others have no value. Compare scores of the same "
+            "rows only",
             UnevaluatedRowsWarning,
             "rows-not-scored",
         )

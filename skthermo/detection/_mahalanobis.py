@@ -222,8 +222,8 @@ def _most_likely(F: Array, names: Sequence[str] | None) -> EmpiricalCovariance:
     if not together.all():
         pair = np.isin(np.arange(F.shape[1]), np.argwhere(~together)[0])
         warn_user(
-            f"{modes_text(pair, names)} are never there together ({(~together).sum() // 2} pairs): their correlation "
-            "is a guess",
+            f"{modes_text(pair, names)} never have a value in the same row ({(~together).sum() // 2} such pairs). "
+            "Their correlation is inferred from the other modes. Leave one of them out, or give records with both",
             FewRecordsWarning,
             "modes-never-together",
         )

@@ -65,17 +65,19 @@ def conformal_threshold(
         )
     if rank > len(ordered):
         warn_user(
-            f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a rate of false alarms of "
-            f"{contamination:.2g}: the threshold is the largest index, which later ones exceed at a rate of about "
-            f"{1 / (n_independent + 1):.2g}; expected at least {np.ceil(1 / contamination - 1):.0f}",
+            f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a false-alarm rate of "
+            f"{contamination:.2g} (expected {np.ceil(1 / contamination - 1):.0f} or more). The threshold is the "
+            f"largest index, which later {what} exceed at a rate of about {1 / (n_independent + 1):.2g}. Give a longer "
+            "baseline, or a higher contamination",
             FewRecordsWarning,
             "few-baseline-records",
         )
     elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
         warn_user(
             f"the {len(ordered)} baseline {what} depend on each other in time and count as {n_independent:.0f} "
-            f"independent ones: false alarms are {contamination:.2g} of the records on the mean over such baselines, "
-            f"but may be far more or fewer after this one; expected {FEWEST_INDEPENDENT} independent ones or more",
+            f"independent ones (expected {FEWEST_INDEPENDENT} or more). On average over such baselines, false alarms "
+            f"are {contamination:.2g} of the records; after this one, they may be several times as many. Give a longer "
+            "baseline, or a regression whose residuals depend less on each other",
             FewRecordsWarning,
             "few-baseline-records",
         )
@@ -90,10 +92,10 @@ def warn_of_blindness(own: Array, threshold: float, contamination: float, seen_a
     middle, suggested = np.quantile(own, [0.5, 1 - contamination])
     if threshold - middle > FAR_ABOVE * (suggested - middle):
         warn_user(
-            f"the threshold is {threshold:.3g}, far above the {suggested:.3g} that {contamination:.2g} of the "
-            "baseline's own indices exceed: the baseline has few records, records that depend on each other, or some "
-            f"far from all others{seen_at(threshold)}; expected a longer baseline, or one without outliers "
-            "(threshold='quantile' takes the lower one, with more false alarms)",
+            f"the threshold is {threshold:.3g}. It is more than {FAR_ABOVE:g} times as far from the median of the "
+            f"baseline's own indices as {suggested:.3g}, which {contamination:.2g} of them exceed. The baseline has "
+            f"few records, records that depend on each other, or outliers{seen_at(threshold)}. Give a longer baseline, "
+            "or one without outliers; threshold='quantile' takes the lower value, with more false alarms",
             FewRecordsWarning,
             "high-threshold",
         )

@@ -31,8 +31,9 @@ def warn_of_failures(theta: Array, solved: Array) -> None:
     if failed.any():
         first = np.flatnonzero(failed)[0]
         warn_user(
-            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or they could "
-            f"not be solved, first at theta = {theta[first].tolist()} (row {first})",
+            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or the solver "
+            f"failed. The first is theta = {theta[first].tolist()} (row {first}). Narrow the bounds, or correct the "
+            "model there",
             ModelWarning,
             "no-solution",
         )

@@ -146,9 +146,8 @@ def fit_fleet(
     if begun_again:
         warn_user(
             f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "
-            f"monitor have changed ({named(begun_again)}): their monitors begin again, without the records that they "
-            "had evaluated and their events; files ending in .replaced hold these: expected Fleet(folder) to go on "
-            "with them as they were",
+            f"monitor have changed ({named(begun_again)}). Their monitors restart without earlier records and events, "
+            "which files ending in .replaced keep. To continue with monitors as they were, use Fleet(folder)",
             SkthermoWarning,
             "monitors-restarted",
         )

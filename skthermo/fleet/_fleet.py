@@ -89,7 +89,7 @@ def named(names: Sequence[Hashable] | pd.Index) -> str:
 def kinds(warned: pd.DataFrame) -> str:
     """Kinds of warnings by how many bridges gave them."""
     numbers = warned.groupby("kind")["bridge"].nunique().sort_values(ascending=False, kind="stable")
-    shown = [f"{kind!r} of {counted(number, 'bridge')}" for kind, number in numbers.iloc[:MOST_NAMED].items()]
+    shown = [f"{kind} ({counted(number, 'bridge')})" for kind, number in numbers.iloc[:MOST_NAMED].items()]
     rest = [f"{len(numbers) - MOST_NAMED} other kinds"] if len(numbers) > MOST_NAMED else []
     return ", ".join(shown + rest).replace("\N{NO-BREAK SPACE}", " ")
 
@@ -477,8 +477,8 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
     if failed:
         first = fleet._outcomes[failed[0]].failures[0]
         warn_user(
-            f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}; "
-            "expected none: see fleet.errors",
+            f"{len(failed)} of {len(asked)} bridges have failed ({named(failed)}), the first with {first!s:.300}. "
+            "Nothing is known of their state. See fleet.errors",
             SkthermoWarning,
             "bridges-failed",
         )
@@ -486,7 +486,7 @@ def warn_of_bridges(fleet: Fleet, names: list[Hashable] | None = None, stage: st
     warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
     if len(warned):
         warn_user(
-            f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}; see fleet.warnings",
+            f"{warned['bridge'].nunique()} of {len(asked)} bridges gave warnings: {kinds(warned)}. See fleet.warnings",
             SkthermoWarning,
             "bridges-warned",
         )

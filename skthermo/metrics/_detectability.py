@@ -212,7 +212,7 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     present = index[~np.isnan(index)]
     if len(present) < len(index):
         warn_user(
-            f"{len(index) - len(present)} of {len(index)} records are not evaluated, their damage index is NaN: the "
+            f"{len(index) - len(present)} of {len(index)} records are not evaluated: their damage index is NaN. The "
             f"rate is that of the other {len(present)}",
             UnevaluatedRowsWarning,
             "not-evaluated",

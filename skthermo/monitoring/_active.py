@@ -257,15 +257,15 @@ class ActiveDetector(SavesFrames):
                 lost = int(np.flatnonzero(seen[:-1] & ~seen[1:])[0])
                 raise ValueError(
                     f"the detector is in alarm where {target} falls by {PROBED[lost]:g} standard deviations of the "
-                    f"baseline, and not where it falls by {PROBED[lost + 1]:g}: one of its steps drops or fills large "
-                    "changes; expected more alarm for more change: filter the baseline before fit"
+                    f"baseline, and not where it falls by {PROBED[lost + 1]:g}. One of its steps drops or fills large "
+                    "changes; expected an alarm for larger changes, too. Filter the baseline before fit"
                 )
             blind += [] if seen[-1] else [str(target)]
         if blind:
             warn_user(
                 f"a fall by {PROBED[-1]:g} standard deviations of the baseline stays at or below the threshold "
-                f"{self.threshold:.3g} for {', '.join(blind)}: the detector does not see damage there; expected "
-                "another detector, or more false alarms a year",
+                f"{self.threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another "
+                "detector, or allow more false alarms a year",
                 ResultWarning,
                 "blind-detector",
             )
@@ -281,8 +281,8 @@ class ActiveDetector(SavesFrames):
             row = int(np.argmin(same))
             raise ValueError(
                 f"the damage index of {baseline.index[rows[row]]} is {whole[row]:.6g} among all records and "
-                f"{alone[row]:.6g} with the records of {self.memory} before it: the detector looks at later records, "
-                "or farther back; expected steps that look back only, and lookback='48h' where that is how far"
+                f"{alone[row]:.6g} with the records of {self.memory} before it. The detector uses later records, or "
+                "earlier ones; expected steps that look back only, and lookback='48h' if that is how far"
             )
 
     def _exact(self, records: pd.DataFrame) -> Array:

@@ -335,35 +335,35 @@ def _warn_of_baseline(
     highest, second = excursions["index"].iloc[:2]
     if missing_season:
         warn_user(
-            f"the baseline has no record of {missing_season}: the number of false alarms a year is that of the other "
-            "seasons, and there is no estimate for these; expected a whole year",
+            f"the baseline has no record of {missing_season}. The number of false alarms is that of the other seasons, "
+            "and unknown for these. Refit with a whole year",
             WeatherWarning,
             "missing-seasons",
         )
     if asked < FAR:
         warn_user(
-            f"{counted_number(per_year, 'false alarm')} a year, and the baseline is {years} long: the threshold "
-            f"{rule.threshold:.3g} is extrapolated from its excursions, the highest of them {highest:.3g}: "
-            f"{asked:.2g} events are asked for in its time. {'' if seen is None else f'Now {seen}. '}Expected {FAR} or "
-            "more events in its time: a longer baseline or more alarms a year",
+            f"at {counted_number(per_year, 'false alarm')} a year, {asked:.2g} events are expected in the {years} of "
+            f"the baseline; it should be {FAR} or more. The threshold {rule.threshold:.3g} is extrapolated from its "
+            f"excursions, the highest of them {highest:.3g}.{'' if seen is None else f' Now {seen}.'} Use a longer "
+            "baseline, or allow more alarms a year",
             FewRecordsWarning,
             "extrapolated-threshold",
         )
     elif seen is not None and seen.is_large:
         warn_user(
-            f"the threshold {rule.threshold:.3g} is so high that {seen}: smaller changes count as healthy; expected an "
-            f"alarm from {100 * LARGE:g} % of all responses on: more records in a window, less scatter, or more alarms "
-            "a year",
+            f"the threshold {rule.threshold:.3g} is so high that {seen} (expected an alarm at {100 * LARGE:g} % of all "
+            "responses). Smaller changes count as healthy. Use a longer window or a closer regression, or allow more "
+            "alarms a year",
             ResultWarning,
             "undetected-changes",
         )
     if tail.has_outlier(DOUBTFUL):
         others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
         warn_user(
-            f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, is far beyond the others "
-            f"(damage index {highest:.3g}, next {second:.3g}) and raises the threshold "
-            f"from {others:.3g} to {rule.threshold:.3g}; expected a baseline "
-            "without records of a fault or of another state",
+            f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, has a damage index of "
+            f"{highest:.3g}, the next {second:.3g}: chance explains that in fewer than {DOUBTFUL:.0%} of baselines. It "
+            f"raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. Put NaN there if "
+            "it is a fault or another state",
             RecordsWarning,
             "baseline-excursion",
         )

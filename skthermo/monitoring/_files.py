@@ -114,8 +114,8 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
         raise ValueError(f"{file} holds {type(monitor).__name__!r}; expected a fitted Monitor")
     if monitor.versions_ != versions():
         warn_user(
-            f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}: its decisions "
-            "may differ from those of the monitor that was fitted",
+            f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}. Decisions may "
+            "differ from those of the fitted monitor. Refit it with these versions",
             SkthermoWarning,
             "other-versions",
         )

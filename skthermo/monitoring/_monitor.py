@@ -322,8 +322,8 @@ class Monitor(SavesFrames, Estimator):
         n_markers = int((trained.isna() & baseline.notna()).to_numpy().sum())
         if n_markers:
             warn_user(
-                f"{n_markers} of {baseline.size} values of the baseline stand for missing ones, such as -999, and "
-                "are taken as missing; expected NaN there",
+                f"{n_markers} of {baseline.size} values of the baseline are codes for missing values, such as -999. "
+                "They count as missing. Put NaN there",
                 RecordsWarning,
                 "placeholders",
             )

@@ -165,7 +165,7 @@ class LagFeatures(PastFeatures):
         if is_warned:
             done = "are padded with the first record" if self.padding == "edge" else "lack lags"
             warn_user(
-                f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}; give the "
+                f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}. Give the "
                 f"{reach} rows before, too, or a frame on a DatetimeIndex",
                 FewRecordsWarning,
                 "no-earlier-records",
@@ -179,8 +179,8 @@ class LagFeatures(PastFeatures):
         if is_warned:
             reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
             warn_user(
-                f"lags reach {reach} back; the first record given is {stamps.min()}, and {unknown.sum()} of "
-                f"{len(unknown)} rows have a lag before it that finds no record; give the {reach} before, too",
+                f"lags reach {reach} back: {unknown.sum()} of {len(unknown)} rows have one before the first record, "
+                f"{stamps.min()}, and lack lags. Give the {reach} before, too",
                 FewRecordsWarning,
                 "no-earlier-records",
             )

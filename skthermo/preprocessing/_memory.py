@@ -220,9 +220,9 @@ class ExponentialMeans(PastFeatures):
         is_timed = self.stamps_ is not None
         reach = duration_text(pd.Timedelta(self._longest)) if is_timed else f"{self._longest} rows"
         warn_user(
-            f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before: their means are of the few "
-            f"records since {X.index.min() if is_timed else 'the first row'}; give those of {REACH} times {reach} "
-            "before, too",
+            f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before. Their means are of the few "
+            f"records since {X.index.min() if is_timed else 'the first row'}. Give the records of {REACH} times "
+            f"{reach} before, too",
             FewRecordsWarning,
             "no-earlier-records",
         )

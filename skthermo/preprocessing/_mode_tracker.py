@@ -384,7 +384,7 @@ def warn_of_doubts(
     if n_without:
         warn_user(
             f"{n_without} of {len(poles.record)} poles have a frequency but no shape: zero, or NaN at all sensors but "
-            "one; they are left over",
+            "one. No mode takes them. Give shapes at two sensors or more",
             UnevaluatedRowsWarning,
             "poles-without-shape",
         )
@@ -415,11 +415,12 @@ def _warn_of_losses(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names:
         if n_similar >= FEW_RECORDS / 2 and n_similar > 0.1 * n_missing and is_similar.mean() > 0.5:
             problems.append(
                 f"{n_similar} of {n_missing} records without {name!r} have a pole of its shape at about "
-                f"{np.median(ratios):.3g} times its frequency: is max_shift too small, or the reference wrong?"
+                f"{np.median(ratios):.3g} times its frequency"
             )
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
-        warn_user("; ".join(problems[:3]) + more, UnevaluatedRowsWarning, "modes-not-found")
+        action = ". Widen max_shift, or correct the reference"
+        warn_user("; ".join(problems[:3]) + more + action, UnevaluatedRowsWarning, "modes-not-found")
 
 
 def _warn_of_other_shapes(
@@ -442,8 +443,8 @@ def _warn_of_other_shapes(
     if problems:
         more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
         warn_user(
-            "; ".join(problems[:3]) + f"{more}: expected the sensors of the reference in their order, with their signs "
-            "and gains, or a lower min_mac for noisy shapes",
+            "; ".join(problems[:3]) + f"{more}. Give the sensors in the order of the reference, with its signs and "
+            "gains, or a lower min_mac for noisy shapes",
             RecordsWarning,
             "other-shapes",
         )

@@ -200,8 +200,8 @@ class ReferenceModes(NamedTuple):
             by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
             warn_user(
                 f"{similar.sum()} of {len(pairs)} pairs of reference modes cannot be distinguished, the first {first}: "
-                f"a frequency can lie within max_shift={max_shift:g} of both, and {by}; expected a smaller max_shift "
-                "or more sensors",
+                f"a frequency can lie within max_shift={max_shift:g} of both, and {by}. One may be taken for the "
+                "other. Use a smaller max_shift, or more sensors",
                 RecordsWarning,
                 "similar-modes",
             )

@@ -267,8 +267,8 @@ def _settled(step: Callable[[Array], Array], n_rows: int, n_modes: int) -> tuple
     is_singular = np.linalg.eigvalsh(state[1:])[0] < GAPS_TOLERANCE  # which `check_invertible` refuses
     if np.abs(second).max() > SETTLED / np.sqrt(n_rows) and not is_singular:
         warn_user(
-            f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps: the gaps leave a "
-            "part of it nearly undetermined",
+            f"the covariance of {n_rows} rows with gaps has not settled after {MOST_STEPS} steps. Gaps leave a part of "
+            "it nearly undetermined. Leave out the mode that is missing most, or give more records",
             ResultWarning,
             "covariance-with-gaps",
         )

@@ -46,15 +46,16 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     is_temperature &= ((across > ALIKE) & T.nearly(F))[~is_mode].any(axis=0)
     if is_mode.any():
         yield RecordsWarning(
-            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and together "
-            "with them; expected all modes among the targets, and only temperatures beside them, since a mode that "
-            "predicts the others hides damage",
+            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
+            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
+            "beside them",
             "modes-among-temperatures",
         )
     if is_temperature.any():
         yield RecordsWarning(
-            f"the targets {F.named(is_temperature)} behave like temperatures: they are nearly equal to others, and "
-            "vary by far more than the modes; expected only frequencies among the targets",
+            f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
+            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
+            "as targets",
             "temperatures-among-modes",
         )
 

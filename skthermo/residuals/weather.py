@@ -76,9 +76,10 @@ class TrainingRange:
         kelvin = " (these look like kelvin)" if np.nanmin(values[known]) > 150 else ""
         value, lowest, highest = values[row, column], self.lowest[column], self.highest[column]
         return (
-            f"{rows.sum()} of {len(rows)} rows have temperatures far outside those of the training records: "
-            f"{self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} to {highest:.4g}; expected "
-            f"degrees Celsius{kelvin}, and records of such weather to train on"
+            f"{rows.sum()} of {len(rows)} rows have temperatures outside the training range by more than "
+            f"{FAR_OUTSIDE:.0%} of it: {self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} "
+            f"to {highest:.4g}. Predictions there are extrapolated. Give degrees Celsius{kelvin}, or train on such "
+            "weather"
         )
 
 
@@ -95,9 +96,9 @@ def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: s
             seen = values[test, column]
             text = (
                 f"{outside.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
-                f"the other folds have not seen: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
-                f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}: "
-                f"{consequence}; expected records of each season in each fold, as blocks of a week of a whole year give"
+                f"the other folds lack: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
+                f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}. "
+                f"{consequence}. Train on a whole year, in folds that each have all seasons, such as blocks of a week"
             )
     if text:
         warn_user(text, WeatherWarning, "weather-of-one-fold")
@@ -181,9 +182,8 @@ class SensorRegression:
         return (
             f"{self.reach.names[int(sensor)]!r} departs from what the other sensors predict in {len(rows)} of "
             f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
-            f"records, where training records depart by {usual[sensor]:.2g} at most: it drifts, is stuck or was moved, "
-            "which moves predictions and gives false alarms; expected NaN where it is wrong, which the other sensors "
-            "fill"
+            f"records (at most {usual[sensor]:.2g} in training). It drifts, is stuck or was moved, which moves "
+            "predictions and gives false alarms. Put NaN where it is wrong: the other sensors fill it"
         )
 
     def errors(self, temperatures: Any) -> Iterator[Array]:
@@ -282,11 +282,14 @@ def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> st
     ]
     if not sensors:
         return ""
-    return f"missing temperatures were filled from the other sensors: {', '.join(sensors)}; {consequence}"
+    return (
+        f"missing temperatures were filled from the other sensors: {', '.join(sensors)}. {consequence}. If a sensor "
+        "has failed, leave it out and fit again"
+    )
 
 
 def unpredicted_text(
-    unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach where none is"
+    unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach to no record"
 ) -> str:
     """Text of the warning that counts rows that cannot be predicted, for want of weather or as ``others`` says."""
     if not unknown.any():
@@ -295,8 +298,8 @@ def unpredicted_text(
     causes = {"without any temperature": unknown & empty, others: unknown & ~empty}
     counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
     return (
-        f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}; expected the records "
-        "before them, too, and at least one sensor that works"
+        f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}. Give the records "
+        "before them, too, and a value of at least one sensor"
     )
 
 

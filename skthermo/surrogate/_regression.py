@@ -64,9 +64,8 @@ def content_of(*parts: Any) -> str:
         hashes = [joblib.hash(_in_order(part), coerce_mmap=True) for part in parts]
     except PicklingError as error:
         raise ValueError(
-            f"memory cannot recognise {parts[0]!r:.200}; expected one that can be pickled, with functions and classes "
-            "from a module that can be imported (no lambda, nothing from a script, a notebook or a function), or "
-            "memory=None"
+            f"memory cannot recognise {parts[0]!r:.200}; expected an object that can be pickled, or memory=None. Its "
+            "functions and classes have to come from a module, not from a script, notebook, function or lambda"
         ) from error
     return joblib.hash((skthermo.__version__, sklearn.__version__, *hashes))
 

@@ -51,8 +51,8 @@ class Box:
         """Which parameters of each row are not even near the box; NaN is not."""
         return Box(self.near, self.names).outside(theta)
 
-    def warning(self, theta: Array, far: NDArray[np.bool_]) -> str:
-        """Text of the warning if parameters are far outside the box in many rows, else an empty string."""
+    def warning(self, theta: Array, far: NDArray[np.bool_], tested: str) -> str:
+        """Text of the warning if many rows have parameters that fail a test of the prior, else an empty string."""
         known = ~np.isnan(theta).any(axis=1)
         far = far[known]
         rows = far.any(axis=1)
@@ -62,10 +62,9 @@ class Box:
         values = theta[known][far[:, worst], worst]
         lowest, highest = self.bounds[worst]
         return (
-            f"{rows.sum()} of {rows.size} rows give parameters far outside the bounds that the inverse was trained in: "
-            f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, trained in "
-            f"{lowest:.6g} to {highest:.6g}; expected frequencies in Hz in the order of the model's modes, wider "
-            "bounds, or the noise of the measurement"
+            f"{rows.sum()} of {rows.size} rows give parameters {tested}. {self.names[worst]!r} is {values.min():.3g} "
+            f"to {values.max():.3g} in {len(values)} rows, with bounds {lowest:.6g} to {highest:.6g}. Give frequencies "
+            "in Hz in the order of the model's modes, wider bounds, or the noise of the measurement"
         )
 
 
@@ -177,8 +176,7 @@ class Simulator:
                 )
                 warn_user(
                     f"no reduced model is accurate to {tol:g} where the parameters of the records are ({ranges}): "
-                    f"{error}; all rows are solved by the full model, which takes long: expected a model updated to "
-                    "the records",
+                    f"{error}. The full model solves all rows, which takes long. Update the model to the records",
                     ModelWarning,
                     "no-reduced-model",
                 )
@@ -320,8 +318,9 @@ class Simulator:
         if outside.any():
             if warn:
                 warn_user(
-                    f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model and are solved by "
-                    "the full one: the weather is outside that of the training rows",
+                    f"{outside.sum()} of {len(theta)} rows are outside the box of the reduced model: their weather is "
+                    "outside that of the training rows. The full model solves them, which takes longer. Train on such "
+                    "weather, or give reduce=False",
                     ModelWarning,
                     "outside-reduced-model",
                 )

@@ -12,7 +12,7 @@ from skthermo._effects import read_groups
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem import CallableModel, FEModel
+from skthermo.fem import CallableModel, FEModel, ReducedModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._residuals import Measured, Outcome, Point, Residuals, optimise
 
@@ -92,9 +92,9 @@ class Ensemble:
         self.bounds = np.vstack([bounds, np.tile(limits, (len(self.groups), 1))])
         prior = np.append(prior, np.full(len(self.groups), spread))
         self.extended: Any = model
-        if self.groups:
-            severities = 1 - limits[1], 1 - limits[0]
-            self.extended = model.with_damage_parameters(self.groups, severities=severities)  # type: ignore[attr-defined]
+        if self.groups:  # a basis for all groups would take longer to make than the searches on the full model
+            full: Any = model.full if isinstance(model, ReducedModel) else model
+            self.extended = full.with_damage_parameters(self.groups)
         quiet = self.extended.quiet() if hasattr(self.extended, "quiet") else self.extended
         self.residuals = Residuals(quiet, measured, prior)
 
@@ -126,8 +126,8 @@ class Ensemble:
         theta = np.array([outcome.theta for outcome in outcomes])
         if unfinished := sum(not outcome.success for outcome in outcomes):
             yield ModelWarning(
-                f"the search has not converged for {unfinished} of {n} drawn models, which may not be likely ones: "
-                "expected a higher max_iter, or bounds within which the model has modes",
+                f"the search has not converged for {unfinished} of {n} drawn models. They may be improbable. Raise "
+                "max_iter, or narrow the bounds to where the model has modes",
                 "not-converged",
             )
         at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
@@ -135,23 +135,24 @@ class Ensemble:
             counts = zip(self.names, at_bound, strict=True)
             listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in counts if count)
             yield ModelWarning(
-                f"drawn models lie at the bounds of {listed}, and are less different than what is not known: expected "
-                "wider bounds, or a narrower prior",
+                f"drawn models lie at the bounds of {listed}. They differ less than is unknown. Widen the bounds, or "
+                "give a narrower prior",
                 "at-bounds",
             )
         mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
         if mismatched:
             yield ModelWarning(
-                f"modes swap places in {mismatched} of {n} drawn models, and a measured mode is fitted with "
-                "another one: expected a model with track=True, or shapes",
+                f"modes change their order in {mismatched} of {n} drawn models. A measured mode is fitted with another "
+                "one there. Use a model with track=True, or give shapes",
                 "modes-cross",
             )
 
     def warn_of(self, multipliers: Sequence[Array]) -> None:
         """Warnings of the model about drawn multipliers, such as those outside the bounds of a reduced model."""
-        if hasattr(self.extended, "warn_of"):
+        if hasattr(self.model, "warn_of"):
             theta = np.array(multipliers)
-            self.extended.warn_of(theta, self.residuals.model.frequencies(theta))
+            own = theta[:, : len(self.model.parameter_names)]
+            self.model.warn_of(own, self.residuals.model.frequencies(theta))
 
 
 def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:

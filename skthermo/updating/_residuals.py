@@ -104,7 +104,7 @@ def _real_shapes(shapes: NDArray) -> Array:
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
     warn_user(
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
-        "shape's length, is dropped",
+        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified",
         RecordsWarning,
         "complex-shapes",
     )
@@ -217,11 +217,15 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
         return as_floats(model.frequencies(rows))  # not `evaluate`, which warns of every theta without modes
 
     def derivatives() -> tuple[Array, Array]:
-        exact = getattr(model, "jacobian", None)
-        slopes = exact(row) if exact else central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+        if exact is not None:
+            slopes = exact
+        elif hasattr(model, "jacobian"):
+            slopes = model.jacobian(row)
+        else:
+            slopes = central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
         return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
-    frequencies = frequencies_at(row)
+    frequencies, exact = model.linearised(row) if hasattr(model, "linearised") else (frequencies_at(row), None)
     return PairedModes(frequencies[0, measured.columns], np.empty((0, len(measured.columns))), None, derivatives)
 
 

@@ -251,8 +251,8 @@ class ModelUpdater(Estimator):
         n_parameters = len(bounds)
         if prior is None and n_parameters > measured.n_residuals:
             warn_user(
-                f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals: many theta fit "
-                "equally well; expected fewer parameters, shapes, or a prior",
+                f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals. Many theta fit "
+                "equally well. Use fewer parameters, shapes, or a prior",
                 FewRecordsWarning,
                 "underdetermined",
             )

@@ -1700,7 +1700,7 @@ WARNED_OF = [
     ("WindowedAlarm", "few windows", lambda: WindowedAlarm(2).fit(F[:40]), "49"),
     ("TemperatureCompensator", "kelvin", lambda: LINES.fit((T + 273.15).join(F)), "kelvin"),
     ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "above 150"),
-    ("TemperatureCompensator", "hot", lambda: WHITENER.transform((T + 60).join(F)), "far outside"),
+    ("TemperatureCompensator", "hot", lambda: WHITENER.transform((T + 60).join(F)), "outside-training-weather"),
     ("ModelUpdater", "rad/s", lambda: updated(NOMINAL * 2 * np.pi), "rad/s"),
     ("ModelUpdater", "far off", lambda: updated(NOMINAL * 1.5), "15 %"),
     ("ModelUpdater", "one mode", lambda: updated([[7.4]], model=datasets.make_truss(1)), "4 parameters"),
@@ -1713,12 +1713,12 @@ WARNED_OF = [
         "frequency_std",
     ),
     ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
-    ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "far outside"),
+    ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-prior"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
     ("DataInformedFEM", "modes swapped", lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]), "0, 1, 3, 2"),
     ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "20 complete rows"),
-    ("DataInformedFEM", "kelvin", lambda: CHAIN.predict(T + 273.15), "far outside"),
-    ("DataInformedFEM", "Fahrenheit", lambda: CHAIN.predict(T * 1.8 + 32), "far outside"),
+    ("DataInformedFEM", "kelvin", lambda: CHAIN.predict(T + 273.15), "outside-training-weather"),
+    ("DataInformedFEM", "Fahrenheit", lambda: CHAIN.predict(T * 1.8 + 32), "outside-training-weather"),
 ]
 
 

@@ -30,14 +30,13 @@ import z24_recipes as z24
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 EXPECTED_WARNINGS = (
-    r"\d+ of \d+ rows have temperatures far outside",
-    "groups that these modes cannot distinguish",
-    r"\d+ of 130 records could not be compared",
-    "damage of these groups alone does not explain the shifts",
-    r"\d+ of \d+ rows cannot be predicted and are NaN",
-    r"\d+ independent baseline records are too few",  # of windows, in ten days
-    r"the \d+ baseline records depend on each other",  # raw frequencies of one winter
-    "frequencies change at once by what the weather does not explain",  # by a straight line, in frost
+    "outside-training-weather",
+    "indistinguishable-groups",
+    "not-compared",
+    "unexplained-shifts",
+    "not-predicted",
+    "few-baseline-records",  # of windows, in ten days, and of raw frequencies of one winter
+    "sudden-change",  # by a straight line, in frost
 )
 
 
@@ -109,8 +108,8 @@ def main():
     folder = parser.parse_args().folder
     if folder is None:
         parser.error("expected the folder of data, or its name in SKTHERMO_DATA")
-    for message in EXPECTED_WARNINGS:
-        warnings.filterwarnings("ignore", message=message)
+    for kind in EXPECTED_WARNINGS:
+        warnings.filterwarnings("ignore", f".*{kind}")
     targets, tower = [], Path(folder) / "tower" / "tower.csv"
     if any((Path(folder) / name).is_file() for name in z24.FILES):
         bridge = z24.Bridge(z24.find(Path(folder)))

@@ -68,11 +68,7 @@ def test_ranks_do_not_depend_on_rounding(n_rows, contamination, rank):
 
 
 def test_too_few_records_are_said_with_the_number_that_would_do():
-    message = (
-        "48 independent baseline records are too few for a rate of false alarms of 0.02: the threshold is the largest "
-        "index, which later ones exceed at a rate of about 0.02; expected at least 49"
-    )
-    with pytest.warns(UserWarning, match=message):
+    with pytest.warns(UserWarning, match="48 .*expected 49 .*few-baseline-records"):
         assert conformal_threshold(np.arange(48.0), 0.02) == 47
 
 

@@ -12,13 +12,13 @@ SAID = {
     "rad/s instead of Hz": "rad/s instead of Hz?",
     "frequencies 1.5 times too high": "'f1' by +50 %",
     "two modes swapped": "['f2', 'f3'] look like other modes",
-    "a thermometer that died": "is missing in 250 of 400 rows and was filled from the other",
+    "a thermometer that died": "'T1' is missing in 250 of 400 rows",
     "a thermometer that got stuck": "'T1'",
-    "bounds of 0.5 %": "parameters far outside the bounds",
+    "bounds of 0.5 %": "outside-prior",
     "30 records": "30 complete rows train 4 parameters",
     "kelvin in fit": "kelvin? expected degrees Celsius",
-    "kelvin in predict": "temperatures far outside",
-    "Fahrenheit in predict": "temperatures far outside",
+    "kelvin in predict": "outside-training-weather",
+    "Fahrenheit in predict": "outside-training-weather",
 }
 
 

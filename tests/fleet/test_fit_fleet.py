@@ -122,7 +122,7 @@ def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
     failed, warned = fleet.caught
     assert failed.startswith("1 of 6 bridges have failed (broken), the first with FileNotFoundError: no records")
     assert warned.startswith("1 of 6 bridges gave warnings: ")
-    assert "'odd records' of 1 bridge" in warned
+    assert "odd records (1 bridge)" in warned
 
 
 def test_nothing_known_is_never_healthy(fleet):

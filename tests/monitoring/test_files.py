@@ -183,7 +183,9 @@ def test_other_versions_are_reported_each_time(monitor, path, program):
     fitted = dict(monitor.versions_)
     monitor.versions_ = fitted | {program: "0.0.1"}
     monitor.save(path)
-    expected = rf"fitted with .*{program} 0\.0\.1.*, and this is .*{program} {re.escape(fitted[program])}"
+    expected = (
+        rf"fitted with .*{program} 0\.0\.1.*, and this is .*{program} {re.escape(fitted[program])}.*other-versions"
+    )
     for _ in range(2):
         with pytest.warns(UserWarning, match=expected):
             loaded = load_monitor(path)

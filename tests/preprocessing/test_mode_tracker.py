@@ -289,7 +289,7 @@ GOOD = padded(n_records=12)
 def test_modes_lost_by_their_shapes_are_named(change):
     raw = padded()
     raw.shapes = change(raw.shapes)
-    message = r"50 of 50 records without 'f\d' have a pole within 2% of its frequency, whose MAC .* is about 0\.\d+"
+    message = r"50 of 50 records without 'f\d' .* 2% .* MAC .* 0\.\d+.*other-shapes"
     with pytest.warns(UserWarning, match=message):
         ModeTracker((F0, PHI)).fit_transform(raw)
 

@@ -36,11 +36,9 @@ def test_one_repeat_has_no_band(fem):
 
 def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
     wrong = study(fem, [Scenario("healthy")])
-    with pytest.warns(
-        UserWarning, match=r"100% of the simulated records of scenario 'healthy'.*expected a baseline in Hz"
-    ):
+    with pytest.warns(UserWarning, match="100% .*'healthy'.*many-false-alarms"):
         wrong.run(WEATHER, YEAR.frequencies * 2 * np.pi)
-    assert any("raise an alarm" in text for text in wrong.warnings_)
+    assert any("many-false-alarms" in text for text in wrong.warnings_)
 
 
 def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
@@ -60,12 +58,12 @@ def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem):
 def test_a_blind_detector_is_said_to_be_blind(fem):
     blind = study(fem, sweep(fem, (0.05, 0.1), ["bottom"]))
     results = blind.run(WEATHER)
-    for rate, cause in (
-        (results["rate"][0], "as rare as for the healthy structure"),
-        (0.0, "expected some records in alarm"),
+    for rate, kind in (
+        (results["rate"][0], "no-curve"),
+        (0.0, "separated-severities"),
     ):
         results["rate"] = rate
-        with pytest.warns(UserWarning, match=f"{cause}.*outliers of the baseline raise the threshold") as caught:
+        with pytest.warns(UserWarning, match=f"outliers of the baseline raise the threshold.*{kind}") as caught:
             minimum = blind.minimum_detectable_damage(method="curve")
         assert len(caught) == 1
         assert minimum["mdd"].isna().all()

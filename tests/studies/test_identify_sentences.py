@@ -194,7 +194,7 @@ def test_what_the_most_probable_explanation_leaves_is_reported():
         "The most probable explanation does not explain all of the shifts (p value 0.004): mode f1 has the largest "
         "residual, a measured shift of -2.00 % (standard error 0.10 %) and an explained one of -0.10 %."
     )
-    assert "likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
+    assert "Likely causes: damage outside these groups" in by_kind(found)["unexplained-shifts"]
     assert "the fit explains any shift" in identified(CLEAR, misfit_p_value=np.nan).summary()
 
 

@@ -116,6 +116,35 @@ def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, s
     pd.testing.assert_frame_equal(other.ranking(), study.ranking())
 
 
+class Counted(LinearRegression):
+    """Counts its fits."""
+
+    n_fits = 0
+
+    def fit(self, X, y, sample_weight=None):
+        type(self).n_fits += 1
+        return super().fit(X, y, sample_weight)
+
+
+def n_fits_of(fem, **detectors):
+    before = Counted.n_fits
+    study_of(fem, detectors, SCENARIOS[:1]).run(WEATHER)
+    return Counted.n_fits - before
+
+
+def test_regressions_that_detectors_share_are_fitted_once_and_a_memory_remembers_them(fem, tmp_path):
+    def whitened(whiten, memory=None):
+        compensator = TemperatureCompensator(Counted(), targets=MODES, whiten=whiten)
+        return make_pipeline(compensator, MahalanobisDetector(), memory=memory)
+
+    once = n_fits_of(fem, one=whitened(None))
+    assert once > 1
+    assert n_fits_of(fem, one=whitened(None), two=whitened("global")) == once
+    memory = str(tmp_path)
+    assert n_fits_of(fem, one=whitened(None, memory)) == once
+    assert n_fits_of(fem, one=whitened(None, memory)) == 0
+
+
 def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
     counts = Counter()
 

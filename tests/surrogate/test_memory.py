@@ -219,8 +219,8 @@ class TestWarnings:
     @pytest.mark.parametrize(
         ("options", "records", "text"),
         [
-            ({"refine": 1, "noise": 0.0}, F, "did not converge in 1 steps"),
-            ({"bounds": 0.01, "prior": 0.1}, F * 1.1, "parameters far outside the bounds"),
+            ({"refine": 1, "noise": 0.0}, F, "not-converged"),
+            ({"bounds": 0.01, "prior": 0.1}, F * 1.1, "outside-prior"),
             ({"regressor": MLPRegressor(hidden_layer_sizes=(8,), max_iter=2)}, F, "Maximum iterations"),
         ],
     )

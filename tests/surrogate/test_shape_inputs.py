@@ -218,7 +218,7 @@ def test_clones_pickles_and_names():
     ("model", "options", "message"),
     [
         (TRUSS, {"dofs": [1, 99]}, "dofs holds 99; expected 0 to 22"),
-        (TRUSS, {"shape_noise": [0.01, 0.0]}, r"shape_noise is \[0.01 0.  \]; expected a standard deviation between"),
+        (TRUSS, {"shape_noise": [0.01, 0.0]}, r"shape_noise is \[0.01 0.  \]; expected standard deviations between"),
         (
             CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6),
             {},

@@ -123,7 +123,9 @@ def test_only_what_can_be_reduced_is():
 
 def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
     model = CallableModel(lambda theta: TRUSS.frequencies(theta), TRUSS.parameter_names, 6)
-    with pytest.raises(ValueError, match=r"memory cannot recognise CallableModel.*expected one that can be pickled"):
+    with pytest.raises(
+        ValueError, match=r"memory cannot recognise CallableModel.*expected an object that can be pickled"
+    ):
         InverseSurrogate(model, LinearRegression(), n_samples=5, memory=str(tmp_path)).fit()
 
 

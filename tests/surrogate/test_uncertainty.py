@@ -419,7 +419,7 @@ def test_a_day_whose_lags_reach_back_too_far_is_counted():
     lagged = chain(mapper=make_pipeline(LagFeatures([0, 1, 5], padding="nan"), PLAIN)).fit(T, F)
     day = LATER.temperatures.set_axis(LATER.temperatures.index + pd.Timedelta("900D"))
     day.iloc[8] = np.nan
-    message = "8 of 365 rows cannot be predicted and are NaN: 1 without any temperature, 7 with lags that reach"
+    message = "8 of 365 .*: 1 without any temperature, 7 .*not-predicted"
     with pytest.warns(UserWarning, match=message):
         assert lagged.predict(day).isna().any(axis=1).sum() == 8
 

@@ -309,7 +309,8 @@ class ReducedModel(AffineBase):
         if outside.any():
             warn_user(
                 f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
-                f"{np.flatnonzero(outside)[0]} the first: frequencies there may be wrong by more than {self._tol:g}",
+                f"{np.flatnonzero(outside)[0]} the first. Frequencies there may be wrong by more than {self._tol:g}. "
+                "Reduce the model for wider bounds, or use the full one",
                 ModelWarning,
                 "outside-reduced-bounds",
             )

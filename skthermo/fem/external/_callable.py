@@ -249,7 +249,11 @@ class CallableModel:
             if len(failures) > 1 and everywhere and not self._is_quiet:
                 raise first
             if not self._is_quiet:
-                warn_user(f"{len(failures)} of {len(rows)} rows are NaN: {first}", ModelWarning, "failing-program")
+                warn_user(
+                    f"{len(failures)} of {len(rows)} rows are NaN, because the model failed: {first}",
+                    ModelWarning,
+                    "failing-program",
+                )
             solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
         found = [solved[key] if key in solved else known[key] for key in keys]
         return np.array(found).reshape(len(rows), self.n_modes)

@@ -192,7 +192,8 @@ def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str
         if alone.nnz > len(rows) and ratio > SAME and abs(beside - ratio * alone).max() < SAME * abs(beside).max():
             warn_user(
                 f"where parameter {name!r} is the only one, the constant rest of the stiffness is {ratio:.4g} times "
-                f"its term: was its factor {1 + (factors[name] - 1) / (1 + ratio):.4g} in place of {factors[name]:g}?",
+                "its term. The term is too small if its factor is not the one that was used. Give the factor "
+                f"{1 + (factors[name] - 1) / (1 + ratio):.4g} in place of {factors[name]:g}, unless that rest is meant",
                 ModelWarning,
                 "doubtful-factor",
             )

@@ -360,8 +360,8 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
         if len(sums) == 1:
             del springs[sums[0]], found[sums[0]]
             warn_user(
-                f"{file}: {sums[0]!r} is the sum of {list(springs)} and taken as the total, not as a term; "
-                f"total={sums[0]!r} says that it is, stiffness=[...] what else the matrices are",
+                f"{file}: {sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it "
+                f"by total={sums[0]!r}, or name the terms by stiffness=[...]",
                 ModelWarning,
                 "doubtful-matrices",
             )
@@ -372,7 +372,8 @@ def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: M
                 similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
     for name, what in similar.items():
         warn_user(
-            f"{file}: {name!r} is {what}, and taken as a term; stiffness=[...] says which matrices are terms",
+            f"{file}: {name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
+            "terms by stiffness=[...]",
             ModelWarning,
             "doubtful-matrices",
         )
@@ -444,8 +445,8 @@ def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool)
         )
     if not is_meant:
         warn_user(
-            f"{what} is more than the sum of {list(terms)}: the rest is taken as a constant part of the stiffness; "
-            "total=... says that it is, total=False that the terms are all, stiffness=... what else the matrices are",
+            f"{what} is more than the sum of {list(terms)}: the rest is used as a constant part of the stiffness. "
+            "Confirm it by total=..., or give total=False if the terms are all, or name the terms by stiffness=[...]",
             ModelWarning,
             "doubtful-matrices",
         )

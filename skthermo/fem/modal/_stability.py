@@ -90,5 +90,5 @@ def _refuse(free: NDArray[np.intp], dofs: Sequence[Label]) -> None:
     listed = ", ".join(shown) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
     raise ValueError(
         f"the structure is a mechanism: {listed} can move without resistance; "
-        "expected supports, springs or members that hold every motion (a positive definite stiffness)"
+        "expected supports, springs or members that resist every motion (a positive definite stiffness)"
     )

@@ -153,16 +153,19 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
 
 
 class LearnedHeads:
-    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records."""
+    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records.
+
+    Each is a pipeline whose last step passes on what it gets, so that a ``memory`` remembers all others.
+    """
 
     def __init__(self) -> None:
         self._learned: dict[str, tuple[Pipeline, Table]] = {}
 
     def of(self, pipeline: Pipeline, healthy: Table) -> tuple[Pipeline, Table]:
         """The steps before the last one of a pipeline, fitted, and what they make of healthy records."""
-        head = pipeline[:-1]
+        head = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], "passthrough")], memory=pipeline.memory)
         try:
-            key = joblib.hash((head.steps, healthy))
+            key = joblib.hash((pipeline.steps[:-1], healthy))
         except PicklingError:
             return head, head.fit_transform(healthy)
         if key not in self._learned:
@@ -198,7 +201,7 @@ class Candidate:
         seed_parts(fitted, deepcopy(random_state))
         if isinstance(fitted, Pipeline) and len(fitted) > 1:
             head, seen = heads.of(fitted, healthy)
-            fitted.steps[:-1] = head.steps
+            fitted.steps[:-1] = head.steps[:-1]
             fitted[-1].fit(seen)
         else:
             fitted.fit(healthy)

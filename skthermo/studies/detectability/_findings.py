@@ -518,11 +518,11 @@ class StudyFindings:
         if not len(many):
             return ""
         names = ", ".join(map(repr, many["detector"].unique()))
+        by = f" (detectors {names})" if self.table["detector"].nunique() > 1 else ""
         return (
             f"{many['rate'].iloc[0]:.0%} of the simulated records of scenario {many['scenario'].iloc[0]!r}, where "
-            "nothing is changed, raise an alarm; expected a baseline in Hz of the structure that the chain has "
-            "learned, and weather in degrees Celsius as in the baseline"
-            f"{f' (detectors {names})' if self.table['detector'].nunique() > 1 else ''}"
+            f"nothing is changed, raise an alarm{by}. No rate of the study is meaningful. Give a baseline in Hz of the "
+            "structure that the chain has learned, and weather in degrees Celsius"
         )
 
     def _check_source(self, source: Any) -> None:

@@ -259,14 +259,14 @@ def pod_curve(
     x, bracket = np.log(np.abs(s)) if log else np.abs(s), bracket_of(s, k / n, 0.9)
     coefficients, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
     if not k.any() or not (n - k).any() or x[k < n].max() <= x[k > 0].min():
-        expected = "severities in between, with some misses and hits"
+        action = "Test severities in between, with some misses and hits"
         if not k.any():
-            expected = "some records in alarm: severities are small, or outliers of the baseline raise the threshold"
+            action = "Test larger severities, and look whether outliers of the baseline raise the threshold"
         lowest, highest = bracket
         place = f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
         warn_user(
-            f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: the slope of the curve is infinite or "
-            f"unknown, and a90 lies {place}; expected {expected}",
+            f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: no curve of finite slope fits, and a90 "
+            f"is {place}. {action}",
             ResultWarning,
             "separated-severities",
         )
@@ -284,9 +284,8 @@ def pod_curve(
     )
     if curve.n_missed:
         warn_user(
-            f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities, so that a50, a90 "
-            f"and a90/95 may be wrong; expected a POD that a logistic curve follows: try log={not log}, or test more "
-            "severities near a90 and fit those alone",
+            f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities. a50, a90 and a90/95 "
+            f"may be wrong. Try log={not log}, or test more severities near a90 and fit those alone",
             ResultWarning,
             "poor-curve-fit",
         )
@@ -397,8 +396,10 @@ class FamilyRates:
         except ValueError as error:
             if severities.min() < 0 < severities.max():
                 raise
-            rare = "; alarms are as rare as for the healthy structure: severities are small, or outliers of the "
-            cause = f"{rare}baseline raise the threshold" if self.is_undetected else ""
+            rare = (
+                ". Alarms are as rare as for the healthy structure. Test larger severities, and look whether outliers "
+            )
+            cause = f"{rare}of the baseline raise the threshold" if self.is_undetected else ""
             warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "no-curve")
             return bracket
         if np.isnan(curve.slope):

@@ -80,7 +80,7 @@ class ReplicateRates:
             )
         if errors:
             warn_user(
-                f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}: bands are of the "
+                f"{len(errors)} of {len(outcomes)} replicates failed, the first with {errors[0]}. Bands are of the "
                 "others",
                 ModelWarning,
                 "failed-replicates",

@@ -270,6 +270,14 @@ class Simulation:
         with without_warnings():
             return self._calibrated(found, 0, seeds)
 
+    @property
+    def share_in_replicates(self) -> float:
+        """Share of the tables of a repeat that a draw of a replicate evaluates: no transitions, and no calibration."""
+        n_damaged = sum(not scenario.is_healthy and scenario.onset is None for scenario in self.scenarios)
+        n_all, n_windowed = len(self.candidates), sum(one.memory > 1 for one in self.candidates.values())
+        n_decided, n_calibrated = n_all * len(self.scenarios), n_all * (n_damaged < len(self.scenarios))
+        return n_decided / (n_decided + n_windowed * n_damaged + n_calibrated)
+
     def without(self, failed: Collection[str]) -> Simulation:
         """The same without the detectors that failed."""
         return replace(self, candidates={k: v for k, v in self.candidates.items() if k not in failed})
@@ -278,7 +286,7 @@ class Simulation:
         self, numbers: range, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
     ) -> list[Evaluation]:
         """Evaluate the records of some later repeats; the warnings of the first are the only ones given."""
-        with without_warnings():
+        with without_warnings(), answers_kept():
             jobs = (delayed(self._one_repeat)(number, seeds[number]) for number in numbers)
             return run_jobs(jobs, len(numbers), unit="repeats", n_jobs=n_jobs, verbose=verbose)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
 from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
@@ -113,7 +114,7 @@ class DetectabilityStudy(BaseEstimator):
     random_state : int, RandomState or None, default=None
         Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
     verbose : bool or int, default=0
-        Whether `run` prints a line with the time of each of its stages, and after the first repeat how long the others
+        Whether `run` prints a line with the time of each of its stages, and after the second repeat how long the others
         and the replicates will take; from 2, joblib prints how many of them are done.
 
     Attributes
@@ -343,8 +344,8 @@ class DetectabilityStudy(BaseEstimator):
         function, measured = (reference, {}) if callable(reference) else (None, reference or {})
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
-        stages = Stages(self, 4 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
+        stages = Stages(self, 5 + bool(replicates.parts))
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once(), answers_kept():
             parts, heads = seeded(self.random_state), LearnedHeads()
             candidates, errors = ask_each(
                 detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts, heads), {}
@@ -355,18 +356,20 @@ class DetectabilityStudy(BaseEstimator):
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
-                simulation.drawn(int(seeds[0][0]))  # so that what is learned once is not timed
-                began = process_time()
                 first = simulation.first_repeat(measured, seeds[0], errors)
-                seconds = process_time() - began
-        if self.verbose:
-            print(f"[{type(self).__name__}] {replicates.predicted_time(seconds, len(seeds) - 1)}")
+        left = simulation.without(first.errors)
+        with stages.stage("second repeat"):
+            began = process_time()
+            evaluation = first.with_repeats(left.repeats(range(1, min(len(seeds), 2)), seeds, None))
+            seconds = process_time() - began
+        if self.verbose and len(seeds) > 1:
+            text = replicates.predicted_time(seconds, len(seeds) - 2, left.share_in_replicates)
+            print(f"[{type(self).__name__}] {text}")
         progress = max(self.verbose - 1, 0)
         with stages.stage("other repeats"):
-            left = simulation.without(first.errors)
             grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
             n_repeats = LEAST_REPEATS if grows else len(seeds)
-            evaluation = first.with_repeats(left.repeats(range(1, n_repeats), seeds, self.n_jobs, progress))
+            evaluation = evaluation.with_repeats(left.repeats(range(2, n_repeats), seeds, self.n_jobs, progress))
             if grows:
                 wanted = min(evaluation.n_repeats_for(tol, confidence, scenarios), len(seeds))
                 more = range(n_repeats, max(wanted, n_repeats))

@@ -243,8 +243,9 @@ class DetectionTask(Bunch):
                 raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
             if hasattr(detector, "best_estimator_"):
                 warn_user(
-                    "the search has fitted best_estimator_ to all records of the task, damaged ones among them: do not "
-                    "use it; expected refit=False in the search, and task.refit(search), which learns the baseline",
+                    "the search has fitted best_estimator_ to all records of the task, damaged ones among them. It "
+                    "takes such damage for healthy: do not use it. Give the search refit=False, and learn the "
+                    "baseline by task.refit(search)",
                     ResultWarning,
                     "search-refits",
                 )
@@ -310,8 +311,8 @@ class DetectionTask(Bunch):
         fresh = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             warn_user(
-                "the weather is that of the task, and only the noise is fresh; expected another year to confirm what "
-                "was tuned",
+                "the weather is that of the task, and only the noise is new. The optimism is that of the noise alone. "
+                "Give the weather of another year",
                 WeatherWarning,
                 "same-weather",
             )

@@ -265,8 +265,8 @@ def compare_extensions(
     unfound = list(dict.fromkeys(row["family"] for row in rows if np.isnan(row["gain"])))
     if unfound:
         warn_user(
-            f"families {unfound} have candidates without a gain: damage is not found at the severities around those of "
-            "the study; expected a study with larger severities",
+            f"families {unfound} have candidates without a gain: damage is not detected at the severities around those "
+            "of the study. Repeat the study with larger severities",
             ResultWarning,
             "undetected-families",
         )

@@ -16,6 +16,7 @@ from skthermo._tables.text import SPACE, chance_text, listed, percent, probabili
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
 from skthermo.studies.identification._observe import ComparedRecords
+from skthermo.studies.identification._separability import VISIBLE
 from skthermo.studies.scenarios import UncertainDamage
 
 ALIKE = 0.95  # cosine between effects from which on indistinguishable causes are named together
@@ -303,18 +304,23 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
     if found.indistinguishable:
         sets = "; ".join(" and ".join(causes) for causes in found.indistinguishable)
         yield ResultWarning(
-            f"groups that these modes cannot distinguish: {sets}. Only their common effect is known",
+            f"these modes cannot distinguish groups: {sets}. Only their common effect is known. Measure their shapes, "
+            "or other modes",
             "indistinguishable-groups",
         )
     if found.unobservable:
         names = ", ".join(found.unobservable)
         yield ResultWarning(
-            f"groups that these modes do not show, of which nothing is known: {names}", "unobservable-groups"
+            f"these modes do not show damage of {names}: its severity would have a standard error above {VISIBLE:.0%}. "
+            "Take records over a longer time, or measure other modes",
+            "unobservable-groups",
         )
     highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
     if highest:
         yield ResultWarning(
-            f"severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}", "severity-at-bound"
+            f"the severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}. Usually something "
+            "else has changed. See summary_table",
+            "severity-at-bound",
         )
     if best.has_else or found.misfit_p_value < RARE:
         doubt = (
@@ -323,7 +329,7 @@ def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
             else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
         )
         yield ResultWarning(
-            f"damage of these groups alone does not explain the shifts ({doubt}); likely causes: "
+            f"damage of these groups alone does not explain the shifts ({doubt}). Likely causes: "
             f"{likely_causes(found)}",
             "unexplained-shifts",
         )

@@ -107,15 +107,15 @@ class ComparedRecords:
         for independent, number, noun, least in few:
             if independent < least:
                 yield FewRecordsWarning(
-                    f"too few independent {noun}s: {_worth(noun, number, independent)}; expected {least:g} or more, "
-                    "since probabilities and standard errors are rough with fewer",
+                    f"too few independent {noun}s: {_worth(noun, number, independent)} (expected {least:g} or more). "
+                    "Probabilities and standard errors are rough. Take records over a longer time",
                     "few-independent-records",
                 )
 
     def _latest(self) -> str:
         return (
-            f"the last {counted(self.n_latest, 'record')} are all far from those before and were left out: perhaps the "
-            "structure has just changed; expected records of one state, so identify the last ones on their own"
+            f"the last {counted(self.n_latest, 'record')} are all far from those before and were left out. The "
+            "structure may have just changed. Identify the last ones on their own"
         )
 
     def _left_out(self) -> str:
@@ -226,14 +226,15 @@ def _named_as_in_fit(fem: Any, T: Any) -> Any:
         return T
     if names is None:
         warn_user(
-            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names; the "
-            "columns are taken in the order that they have",
+            f"the temperatures have the feature names {columns}, but the chain was fitted without feature names. The "
+            "columns are used in the order that they have. Fit the chain with a frame",
             RecordsWarning,
             "temperature-names",
         )
         return T.set_axis(range(len(columns)), axis=1)
     warn_user(
-        f"the temperatures have no valid feature names; their columns are taken for {list(names)}, as in fit",
+        f"the temperatures have no valid feature names. Their columns are used as {list(names)}, in the order of fit. "
+        "Give a frame with these columns",
         RecordsWarning,
         "temperature-names",
     )

@@ -140,8 +140,8 @@ class ShapeShift:
         if foreign.any():
             warn_user(
                 f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
-                f"model's, {modes[np.flatnonzero(foreign)[0]]} the first, and are left out; expected shapes of the "
-                "same modes, with rows in the order of dofs",
+                f"model's, {modes[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
+                "modes, with rows in the order of dofs",
                 RecordsWarning,
                 "foreign-shapes",
             )

@@ -157,7 +157,8 @@ def locate_damage(
     if located.probability_other >= MOSTLY_ELSE:
         warn_user(
             "no damage of neighbouring members explains the shifts (something else has a probability of "
-            f"{located.probability_other:.0%})",
+            f"{located.probability_other:.0%}). Damage may be in several places, or something else has changed. See "
+            "the likely causes of identify_damage",
             ResultWarning,
             "unexplained-shifts",
         )

@@ -195,12 +195,13 @@ class Replicates:
                 chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
-    def predicted_time(self, seconds: float, n_repeats: int) -> str:
-        """How long up to so many repeats and all replicates take, if one repeat takes so many seconds."""
+    def predicted_time(self, seconds: float, n_repeats: int, share: float) -> str:
+        """How long up to so many repeats and all replicates take, if one repeat takes so many seconds, and a draw of a
+        replicate a share of them."""
         text = f"up to {n_repeats} more repeats take about {n_repeats * seconds:.1f} s of one core"
         if self.parts:
             n_evaluated = N_DRAWS * len(self.parts) * len(self.seeds)
-            text += f", {len(self.seeds)} replicates about {n_evaluated * seconds:.1f} s"
+            text += f", {len(self.seeds)} replicates about {n_evaluated * share * seconds:.1f} s"
         return text + (", and the refits of their chains" if "model" in self.parts else "")
 
     def noise_levels(self, number: int) -> Array:
@@ -216,7 +217,7 @@ def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> lis
     except ValueError as error:
         if is_needed:
             raise
-        warn_user(f"bands hold no error of the model: {error}", ResultWarning, "bands-without-models")
+        warn_user(f"bands do not include the error of the model: {error}", ResultWarning, "bands-without-models")
         return []
 
 

@@ -315,7 +315,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        mended = {"outliers", "memory"} if self.mapper is None else {"outliers"}
+        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
         findings = findings_of(self._findings, T, F, mended=mended)
         warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
@@ -823,7 +823,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             warn_user(
-                f"the score is of {scored} of {len(predicted)} rows: the others have gaps",
+                f"the score is of {scored} of {len(predicted)} rows: the others have gaps. Compare scores of the same "
+                "rows only",
                 UnevaluatedRowsWarning,
                 "rows-not-scored",
             )

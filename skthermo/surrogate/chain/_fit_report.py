@@ -338,8 +338,9 @@ class FitReport(SavesFrames):
             return
         reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
         yield FewRecordsWarning(
-            f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}); expected records "
-            "at all times that lags reach to, and fewer missing modes: imputer=KNNGapImputer() fills these",
+            f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}). The chain has "
+            "learned little of the others' weather. Fill gaps of temperatures, use fewer lags, or fill missing modes "
+            "by imputer=KNNGapImputer()",
             "rows-left-out",
         )
 
@@ -348,8 +349,8 @@ class FitReport(SavesFrames):
         if self.n_trained >= ROWS_PER_PARAMETER * n_parameters or self.fleet is not None:
             return
         yield FewRecordsWarning(
-            f"{self.n_trained} complete rows train {n_parameters} parameters; expected at least {ROWS_PER_PARAMETER} "
-            "rows for each",
+            f"{self.n_trained} complete rows train {n_parameters} parameters (expected "
+            f"{ROWS_PER_PARAMETER * n_parameters} or more). The fit is unreliable. Give a season or a year of records",
             "few-rows",
         )
 
@@ -371,9 +372,9 @@ class FitReport(SavesFrames):
             return
         worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
         yield ModelWarning(
-            f"the chain misses its own training frequencies by {chain:.2g} % on average, but their mean only by "
-            f"{mean:.2g} % (the worst mode is {worst!r}); expected a model whose parameters can follow these modes: "
-            "see report_.offsets, update the model, or use the default aligner and discrepancy",
+            f"the chain misses its own training frequencies by {chain:.2g} % on average, their mean by only {mean:.2g} "
+            f"% (the worst mode is {worst!r}). Its parameters cannot follow these modes. See report_.offsets, update "
+            "the model, or use the default aligner and discrepancy",
             "worse-than-mean",
         )
 
@@ -383,10 +384,10 @@ class FitReport(SavesFrames):
         large = self.hidden_offsets[self.hidden_offsets.abs() >= SMALLEST_OFFSET]
         offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
         yield ModelWarning(
-            f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}): "
-            "simulated damage then moves the modes too much or too little, and rates of detection and severities are "
-            "wrong by more than their noise; expected a model updated to these records (ModelUpdater), and "
-            "models=updater.sample_models(20) or uncertainty=(..., 'model') in studies",
+            f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}). "
+            "Simulated damage moves the modes too much or too little, so that detection rates and severities are "
+            "wrong by more than their noise. Update the model to these records (ModelUpdater). Give studies "
+            "models=updater.sample_models(20) or uncertainty=(..., 'model')",
             "hidden-offsets",
         )
 
@@ -395,8 +396,8 @@ class FitReport(SavesFrames):
         if far.sum() <= MANY_OUTLIERS * far.size:
             return
         yield RecordsWarning(
-            f"{far.sum()} of {far.size} frequencies are outliers and train nothing; expected records of one structure "
-            "by one way of identification: see report_.findings",
+            f"{far.sum()} of {far.size} frequencies are outliers and train nothing (expected at most "
+            f"{MANY_OUTLIERS:.0%}). They may be of other modes, or of another state. See report_.findings",
             "many-outliers",
         )
 
@@ -406,13 +407,13 @@ class FitReport(SavesFrames):
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
         modes = ", ".join(
-            f"{name!r} {size:.2g} % beside {weather[name]:.2g} % by the model" for name, size in large.items()
+            f"{name!r} ({weather[name]:.2g} % by the model, discrepancy {size:.2g} %)" for name, size in large.items()
         )
         if modes:
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {modes}: predictions rely on the discrepancy, "
-                "and simulated damage on a model that is not calibrated; expected a model updated to these records "
-                "(ModelUpdater), or parameters that this weather changes",
+                f"the FE model cannot follow what the weather does to {modes}. Predictions rely on the discrepancy, "
+                "and simulated damage on a model that is not calibrated. Update the model (ModelUpdater), or give it "
+                "parameters that this weather changes",
                 "large-discrepancy",
             )
 
@@ -425,9 +426,9 @@ class FitReport(SavesFrames):
         worst = shares.idxmax()
         yield ModelWarning(
             f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
-            f"{self.round_trip[worst]:+.2g} %, more than measurements scatter around the predictions "
-            f"({self.scatter[worst]:.2g} %): detectors take such an error for damage; expected an inverse that "
-            "refines its estimates, narrow_bounds=True, or more samples",
+            f"{self.round_trip[worst]:+.2g} %. Measurements scatter around the predictions by only "
+            f"{self.scatter[worst]:.2g} %, so that detectors take this error for damage. Let the inverse refine, set "
+            "narrow_bounds=True, or raise n_samples",
             "round-trip-error",
         )
 
@@ -587,15 +588,17 @@ def mode_warnings(model: FEModel, F: Table) -> Iterator[SkthermoWarning]:
         is_better = (best**2).sum() < CLEARLY_BETTER * (offsets**2).sum() and np.abs(best).max() < LARGE_OFFSET
         if moved.any() and is_better and len(np.unique(order)) == len(order):
             yield ModelWarning(
-                f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model; expected the "
-                f"order of its modes, or model.with_modes({order.tolist()})",
+                f"the frequencies {offsets.index[moved].tolist()} look like other modes of the model. They would be "
+                "learned as those of their columns. Order them as the model does, or use "
+                f"model.with_modes({order.tolist()})",
                 "mode-order",
             )
             return
     if len(far):
         listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
         yield RecordsWarning(
-            f"measured modes differ from the model's nominal frequencies: {listed}; expected Hz, the modes of "
-            "the model in their order, and a model updated to the structure",
+            f"measured modes differ from the model's nominal frequencies: {listed} (expected at most {LARGE_OFFSET:g} "
+            "%). They may be other modes, or in another unit. Give Hz and the modes of the model in their order, or "
+            "update the model",
             "mode-offsets",
         )

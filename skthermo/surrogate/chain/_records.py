@@ -149,7 +149,7 @@ class TrainingRecords(SavesFrames):
                 found = reach_of(fitted, inputs[test])
                 beyond[test] = 0.0 if found is None else found[0].excess(found[1]).mean(axis=1)
         if not states:
-            warn_of_unseen_weather(records, fold_of, "standard deviations, intervals and noise are guesses there")
+            warn_of_unseen_weather(records, fold_of, "Standard deviations, intervals and noise are unreliable there")
         modelled = frequencies_of(predicted)
         expected = np.full_like(modelled, np.nan)
         for fold in range(fold_of.max() + 1):

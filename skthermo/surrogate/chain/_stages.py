@@ -128,7 +128,7 @@ class ChainInverse:
         if weight < SCARCE:
             warn_user(
                 f"because of gaps, a record carries on average {weight:.0%} of the parameter precision of a complete "
-                "one, and estimates are drawn towards the model's nominal state; expected more modes a record, or "
+                "one. Estimates are drawn towards the model's nominal state. Track more modes, or use "
                 "imputer=KNNGapImputer()",
                 FewRecordsWarning,
                 "sparse-modes",
@@ -169,7 +169,7 @@ class ChainInverse:
         if n_shapes < FEW_SHAPES * found.sum():
             yield RecordsWarning(
                 f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the "
-                f"{n_sensors} sensors; the other shapes are not used: expected dofs without sensors that failed",
+                f"{n_sensors} sensors. The other shapes are not used. Leave sensors that failed out of dofs",
                 "few-shapes",
             )
         if not n_shapes or "shapes" not in inverse.samples_:
@@ -185,10 +185,10 @@ class ChainInverse:
         mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[mode, sensor] > UNLIKE:
             yield ModelWarning(
-                f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds: at sensor "
+                f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds. At sensor "
                 f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} "
-                f"to {highest[mode, sensor]:.2f}; expected the modes of the model, and sensors in the order of dofs, "
-                "with the signs and gains of the model's axes, or a shape_noise that covers the model's error",
+                f"to {highest[mode, sensor]:.2f}. They distort the parameters. Check the modes, and order, signs and "
+                "gains of the sensors (dofs), or raise shape_noise",
                 "foreign-shapes",
             )
 
@@ -207,9 +207,9 @@ class ChainInverse:
             ]
             if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
                 warn_user(
-                    f"{searched[0]!r} is searched, but estimates are refined on the FE model, and do not depend on the "
-                    "regressor and its simulations: all settings score alike; expected refine=0 in the inverse, or a "
-                    "search over the InverseSurrogate itself, whose score is that of its regressor",
+                    f"{searched[0]!r} is searched, but refined estimates do not depend on the regressor and its "
+                    "simulations. All settings score alike. Give the inverse refine=0, or search over the "
+                    "InverseSurrogate itself",
                     ResultWarning,
                     "inert-search",
                 )
@@ -402,7 +402,8 @@ class ThermalModel(SavesFrames):
             row = np.flatnonzero(impossible)[0]
             warn_user(
                 f"in {impossible.sum()} of {len(theta)} rows, row {row} the first, the mapper gave multipliers outside "
-                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}: these rows are NaN",
+                f"{POSSIBLE[0]:g} to {POSSIBLE[1]:g}. These rows are NaN. Use a mapper that extrapolates mildly, such "
+                "as the default",
                 ModelWarning,
                 "impossible-parameters",
             )
@@ -411,7 +412,7 @@ class ThermalModel(SavesFrames):
     def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
         """Warnings about what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
-        consequence = "standard deviations and intervals of predictions are widened by what that costs"
+        consequence = "Standard deviations and intervals of predictions include the error of that"
         message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
         if message:
             yield RecordsWarning(message, "filled-temperatures")
@@ -422,7 +423,7 @@ class ThermalModel(SavesFrames):
         message = learned.warning(inputs)
         if message:
             yield WeatherWarning(message, "outside-training-weather")
-        consequence = "standard deviations and intervals say how uncertain that is"
+        consequence = "Standard deviations and intervals include that uncertainty"
         warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
         message = self.sensors.warning(weather.given)
         if message:
@@ -563,8 +564,8 @@ def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> 
             raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
         if factor > LARGE_FACTOR:
             warn_user(
-                f"the factor of parameter {name!r} is {factor:g}; expected a factor, such as 1.02 for 2 % more, "
-                "and not percent",
+                f"the factor of parameter {name!r} is {factor:g} (expected at most {LARGE_FACTOR:g}). Its stiffness is "
+                "multiplied by that. Give 1.02 for 2 % more",
                 ModelWarning,
                 "large-factor",
             )

@@ -31,7 +31,7 @@ from skthermo.fem import FEModel, evaluate
 from skthermo.metrics import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._refinement import Refinement, unconverged
+from skthermo.surrogate.inverse._refinement import FAR_OUTSIDE, Refinement, unconverged
 from skthermo.surrogate.inverse._training import InverseColumns, Inversions, ShapeScores, SimulatedTraining, held_out
 
 DEFAULT_STEPS = 100
@@ -335,7 +335,7 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         """
         theta = self._predict_arrays(X)[0]
         if not self.n_steps_ and self.box_ is not None:
-            self._warn_of_box(theta, self.box_.far_outside(theta))
+            self._warn_of_box(theta, self.box_.far_outside(theta), "farther outside the bounds than half their width")
         return frame_like(X, theta, self.get_feature_names_out())
 
     def invert(self, X: ArrayLike) -> Bunch:
@@ -402,8 +402,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         rows = np.flatnonzero(unconverged(found))
         if rows.size > MANY_UNCONVERGED * len(theta):
             warn_user(
-                f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first: "
-                "they keep what they reached, or the regressor's estimate",
+                f"{rows.size} of {len(theta)} rows did not converge in {self.n_steps_} steps, row {rows[0]} the first. "
+                "They keep what they reached, or the regressor's estimate. Raise refine, or use a model with "
+                "track=True where modes cross",
                 ModelWarning,
                 "not-converged",
             )
@@ -411,12 +412,13 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         if rows.size > MANY_BY_FULL_MODEL * len(theta):
             warn_user(
                 f"the parameters of {rows.size} of {len(theta)} rows, row {rows[0]} the first, are outside the box of "
-                f"the reduced model, so that the full one was solved {found.full_solves.sum()} times: expected records "
-                "like those that fit saw, wider bounds, or the noise of the measurement",
+                f"the reduced model. The full one was solved {found.full_solves.sum()} times, which takes longer. Give "
+                "wider bounds, or the noise of the measurement",
                 ModelWarning,
                 "outside-reduced-model",
             )
-        self._warn_of_box(theta, found.outside)
+        tested = f"farther from the prior's mean than {FAR_OUTSIDE:.2g} times the spread expected of these modes"
+        self._warn_of_box(theta, found.outside, tested)
 
     def score(
         self, X: ArrayLike | None = None, y: ArrayLike | None = None, sample_weight: ArrayLike | None = None
@@ -627,9 +629,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         self.warn_of(found)
         return as_floats(found.theta), as_floats(found.std)
 
-    def _warn_of_box(self, theta: Array, far: NDArray[np.bool_]) -> None:
-        message = "" if self.box_ is None else self.box_.warning(theta, far)
+    def _warn_of_box(self, theta: Array, far: NDArray[np.bool_], tested: str) -> None:
+        message = "" if self.box_ is None else self.box_.warning(theta, far, tested)
         if message and self.prior is not None:
-            message += "; or a wider prior, which these rows contradict"
+            message += ", or a wider prior"
         if message:
             warn_user(message, ModelWarning, "outside-prior")

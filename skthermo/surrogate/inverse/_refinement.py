@@ -60,8 +60,8 @@ class ShapeInputs:
         deviations = real_array(by_mode(noise, model.n_modes, None, "shape_noise"), "shape_noise")
         if deviations.shape not in ((), (model.n_modes,)) or not ((deviations > 0) & (deviations < 1)).all():
             raise ValueError(
-                f"shape_noise is {deviations}; expected a standard deviation between 0 and 1 (0.01 means 1 % of the "
-                f"root mean square of a shape), a number or one for each of the {model.n_modes} modes"
+                f"shape_noise is {deviations}; expected standard deviations between 0 and 1, one number or "
+                f"{model.n_modes}. 0.01 means 1 % of the root mean square of a shape"
             )
         return cls(places, shapes[places], np.broadcast_to(deviations, (model.n_modes,)))
 

@@ -133,8 +133,8 @@ class SimulatedTraining:
         model, names = inverse.model, tuple(inverse.model.parameter_names)
         if len(names) > model.n_modes:
             warn_user(
-                f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot distinguish all parameters; "
-                "expected more modes: the prior decides between them",
+                f"{len(names)} parameters and {model.n_modes} modes: frequencies cannot distinguish all parameters. "
+                "The prior decides between them. Use more modes, shapes or fewer parameters",
                 FewRecordsWarning,
                 "underdetermined",
             )
@@ -145,7 +145,8 @@ class SimulatedTraining:
         if share_reordered > MANY_REORDERED:
             warn_user(
                 f"modes change their order in {share_reordered:.1%} of {min(inverse.n_samples, ORDER_CHECKS)} samples "
-                "of the box, and the model sorts them: expected narrower bounds, or a model with track=True",
+                f"within the bounds (expected at most {MANY_REORDERED:.0%}). The model sorts them, so that a column is "
+                "not always the same mode. Use narrower bounds, or a model with track=True",
                 ModelWarning,
                 "modes-cross",
             )
