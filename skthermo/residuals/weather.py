@@ -455,7 +455,7 @@ def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, nu
     filled = np.where(used, values, 0.0)
     for part, _, near in nearest_in_parts(places, wanted, enough, n_columns=values.shape[1]):
         known = used[near]
-        known &= known.cumsum(axis=1) <= number
+        known &= known.cumsum(axis=1, dtype=np.int32) <= number
         is_enough = known.sum(axis=1) == number
         means[part] = np.where(is_enough, np.einsum("nkm,nkm->nm", filled[near], known) / number, np.nan)
     for column, is_used in enumerate(used.T):
