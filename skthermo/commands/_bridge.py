@@ -139,7 +139,7 @@ class Bridge:
         done.state = done.status.state if state is None else state
         done.code = FAILED if done.errors and done.state != "alarm" else CODES[done.state]
         reason = reason or (done.status.reason if done.state != "alarm" else "")
-        newest = f"newest record {monitor.last_}" if len(monitor.days_) else "no record came yet"
+        newest = f"newest record {monitor.last_}" if len(monitor.days_) else "no record since the baseline"
         why = f"{', as' if done.state == 'not evaluated' else ';'} {reason}" if reason else ""
         done.lines.append(f"state: {done.state} ({newest}){why}")
         done.lines += monitor.summary().splitlines()[1:]

@@ -89,7 +89,7 @@ class Discoveries:
         Returns
         -------
         str
-            Plain sentences.
+            One sentence a line.
         """
         names, is_open = self.bridges, self.table["end"].isna()
         n_open = self.table.loc[is_open, "bridge"].nunique()
@@ -100,11 +100,11 @@ class Discoveries:
             f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
             if n_open
             else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
-            f"If all bridges stay healthy, expect {alarms} a year over all bridges, {false} of them significant; "
-            f"of the significant bridges {percent(self.fdr)} are healthy on average.",
+            f"Expected if all bridges are healthy: {alarms} a year over all bridges, {false} of them significant.",
+            f"False discovery rate: {percent(self.fdr)} of the significant bridges are healthy on average.",
         ]
         if self.not_evaluated:
-            lines.append(f"Not evaluated, and so not known to be healthy: {listed(self.not_evaluated)}.")
+            lines.append(f"Not evaluated, state not known: {listed(self.not_evaluated)}.")
         return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 

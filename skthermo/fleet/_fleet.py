@@ -48,27 +48,27 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
     fitted = table[table["is_fitted"]]
     watched = fitted[fitted["state"] != ""]
     if len(watched) < len(fitted):
-        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor: nothing is known of their state."
+        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor; their state is not known."
     if len(watched):
         begun = watched["last"].notna()
         if not begun.all():
             yield (
-                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted: nothing is "
-                "known of their bridges."
+                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted; the state of "
+                "their bridges is not known."
             )
         watched = watched[begun]
     if len(watched):
         state = watched["state"]
         yield (
-            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not evaluated').sum()} "
-            f"cannot evaluate it, {(state == 'healthy').sum()} saw no change in their newest record."
+            f"Newest records of {len(watched)} monitors: {(state == 'alarm').sum()} in alarm, "
+            f"{(state == 'healthy').sum()} healthy, {(state == 'not evaluated').sum()} not evaluated."
         )
         if (state == "alarm").any():
             yield f"In alarm: {named(watched.index[state == 'alarm'])}."
         if (state == "watch").any():
-            yield f"To be watched, with a raised index but no alarm: {named(watched.index[state == 'watch'])}."
+            yield f"Raised damage index without an alarm (watch): {named(watched.index[state == 'watch'])}."
         if (state == "not evaluated").any():
-            yield f"Not evaluated, and so not known to be healthy: {named(watched.index[state == 'not evaluated'])}."
+            yield f"Not evaluated, state not known: {named(watched.index[state == 'not evaluated'])}."
         silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
         if len(silent):
             yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."

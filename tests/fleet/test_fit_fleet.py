@@ -130,7 +130,7 @@ def test_nothing_known_is_never_healthy(fleet):
     text = fleet.summary()
     assert "5 of 6 bridges are fitted." in text
     assert "Not fitted: broken." in text
-    assert "5 of 5 monitors have had no record since they were fitted: nothing is known of their bridges." in text
+    assert "5 of 5 monitors have had no record since they were fitted; the state of their bridges is not known." in text
     assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not evaluated)"
 
 
