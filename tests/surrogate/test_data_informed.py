@@ -90,6 +90,7 @@ def test_outliers_do_not_move_the_model():
     np.testing.assert_array_equal(fem.training_records_[1], raw)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("seeded", [True, False])
 def test_equals_scikit_learns_transformed_target_regressor(seeded):
     quarter = T[::4], F[::4]
@@ -156,6 +157,7 @@ def test_gaps_flow_through_cross_validation():
     assert (scores["test_neg_mape"] > -3).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(FILLED)
 def test_imputer_completes_frequencies_in_fit_only():
     holed_T, holed_F = gappy()
@@ -230,6 +232,7 @@ def test_nullable_frames_are_frames():
     np.testing.assert_array_equal(mape(nullable, holed_F), 0)
 
 
+@pytest.mark.nightly
 def test_pandas_output_everywhere_changes_no_value():
     transformer = make_pipeline(BiasAligner(TRUSS), inverse(refine=0))
     words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
