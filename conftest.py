@@ -18,10 +18,41 @@ FITTED = {}  # what chains of examples have learned, by all that tells them and 
 gc.set_threshold(50_000)  # by default 700: a fifth of the time in which tests are collected
 
 
+def pytest_collection_modifyitems(items):
+    """Of a test marked ``one_case``, the first case is tried each time, the others at night."""
+    begun = set()
+    for item in items:
+        if item.get_closest_marker("one_case"):
+            test = item.nodeid.partition("[")[0]
+            if test in begun:
+                item.add_marker(pytest.mark.nightly)
+            begun.add(test)
+
+
 def pytest_collection_finish(session):
     """What modules hold stays until the end: the garbage collector need not look through it."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory):
+    """Gives the folder of a name, which the first worker that asks fills for all; none changes what is in it."""
+    from skthermo._io import alone_with
+
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+    def folder(name, fill):
+        made = root / name
+        with alone_with(made, 600):
+            if not (made / "complete").exists():
+                made.mkdir(exist_ok=True)
+                fill(made)
+                (made / "complete").touch()
+        return made
+
+    return folder
 
 
 @pytest.fixture
@@ -51,6 +82,26 @@ def chains_fitted_once(monkeypatch):
         return fem
 
     monkeypatch.setattr(DataInformedFEM, "fit", once)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _the_memory_of_records_is_found_once():
+    """Most chains of the tests learn from few records; each check of them would look for their memory again."""
+    import joblib
+
+    from skthermo.preprocessing.checks import _findings
+
+    found, find = {}, _findings.find_memory
+
+    def once(*records):
+        key = joblib.hash(records)
+        if key not in found:
+            found[key] = find(*records)
+        return copy.deepcopy(found[key])
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(_findings, "find_memory", once)
+        yield
 
 
 @pytest.fixture(autouse=True)

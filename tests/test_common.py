@@ -104,27 +104,29 @@ ESTIMATORS = [
     ExponentialMeans([3]),
     LagFeatures(),
     HampelFilter(),
-    HampelFilter(targets=[0]),
     HingeFeatures(),
     SensorMeans(),
     KNNGapImputer(),
     BiasAligner(),
-    BiasAligner(method="scale"),
     InverseSurrogate(
         regressor=MLPRegressor(hidden_layer_sizes=(8,), learning_rate_init=0.01, max_iter=1000, tol=0.001)
     ),
     TemperatureMapper(),
     FleetMapper(),
     MahalanobisDetector(),
-    MahalanobisDetector(threshold="quantile"),
-    MahalanobisDetector(threshold="chi2"),
     FusedDetector([("paper", MahalanobisDetector(threshold="quantile")), ("default", MahalanobisDetector())]),
     WindowedAlarm(3),
+    OutlierDetector(OneClassSVM()),
+    TemperatureCompensator(Ridge(), targets=[1]),
+]
+OTHER_SETTINGS = [
+    HampelFilter(targets=[0]),
+    BiasAligner(method="scale"),
+    MahalanobisDetector(threshold="quantile"),
+    MahalanobisDetector(threshold="chi2"),
     WindowedAlarm(3, rule="m-of-n"),
     OutlierDetector(IsolationForest(n_estimators=5, random_state=0)),
-    OutlierDetector(OneClassSVM()),
     OutlierDetector(LocalOutlierFactor(5, novelty=True)),
-    TemperatureCompensator(Ridge(), targets=[1]),
     TemperatureCompensator(Ridge(), targets=[1], whiten="global"),
     TemperatureCompensator(Ridge(), targets=[1], whiten="local"),
 ]
@@ -136,7 +138,9 @@ def shown(estimator):
 
 
 @pytest.mark.filterwarnings("ignore:.*no-earlier-records")  # before rows that are not those of fit
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=shown)
+@pytest.mark.parametrize(
+    "estimator", [*ESTIMATORS, *(pytest.param(one, marks=pytest.mark.nightly) for one in OTHER_SETTINGS)], ids=shown
+)
 def test_estimator_follows_scikit_learn(estimator):
     results = check_estimator(
         estimator, expected_failed_checks=expected_failures(estimator), on_fail=None, on_skip=None
@@ -270,6 +274,7 @@ def test_fitted_state_has_a_trailing_underscore():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
 def test_metadata_routing_changes_no_result():
     def results(estimator, data):

@@ -55,6 +55,7 @@ RECORDS = {
 }
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("records", RECORDS.values(), ids=RECORDS)
 def test_every_misplaced_column_is_named_and_no_other(records):
     T, F = records()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, overload
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
 from sklearn.impute import KNNImputer
 
 from skthermo._tables.arrays import Array, rows_by_pattern
@@ -28,7 +27,8 @@ from skthermo._validation import (
 FLOATS = [np.float64, np.float32]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
-SMALL_POOL = 256  # up to so many donors, computing all distances is faster than a tree
+PAIRS_PER_TREE = 50_000  # below so many pairs of receiver and donor, computing all distances is faster than a tree
+PAIRS_AT_ONCE = 1_000_000  # pairs whose distances are in memory
 BLOCK = 512  # receivers in one query of a tree
 FEW_PAIRS = 10_000_000  # below so many pairs of receiver and donor, computing all distances is faster
 PAIRS_PER_POOL = 2000  # searching one pool takes about as long as so many distances
@@ -265,13 +265,28 @@ class Donors:
         """
         distances = np.full((len(receivers), n_neighbors), np.inf)
         rows = np.zeros((len(receivers), n_neighbors), dtype=np.intp)
+        others = []
         for shared, members in self._pools(observed, column):
+            if len(receivers) * len(members) < PAIRS_PER_TREE:
+                others.append(members)
+                continue
             scale = np.sqrt(len(shared) / shared.sum())
-            search = _searcher(self.values[np.ix_(members, shared)], n_neighbors)
-            points = receivers[:, shared]
+            # Building the tree takes most of the time, and these options make it quick.
+            pool = self.values[np.ix_(members, shared)]
+            tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)
+            points, order = receivers[:, shared], [*range(1, min(n_neighbors, len(pool)) + 1)]
             # A query has one bound for all its receivers, so those with near neighbours go together.
             for block in np.array_split(np.argsort(distances[:, -1]), math.ceil(len(points) / BLOCK)):
-                found, at = search(points[block], distances[block[-1], -1] / scale)
+                # A neighbour exactly at the bound must be found in spite of rounding.
+                within = distances[block[-1], -1] / scale * (1 + 1e-9) + 1e-300
+                found, at = tree.query(points[block], k=order, distance_upper_bound=within)
+                _merge(distances, rows, block, found * scale, members[np.where(np.isinf(found), 0, at)])
+        if others:
+            members = np.concatenate(others)
+            pool, scale = self.values[np.ix_(members, observed)], np.sqrt(len(observed))
+            size = math.ceil(PAIRS_AT_ONCE / len(members))
+            for block in np.split(np.arange(len(receivers)), range(size, len(receivers), size)):
+                found, at = _nearest_of_all(receivers[np.ix_(block, observed)], pool, n_neighbors)
                 _merge(distances, rows, block, found * scale, members[at])
         return distances, rows
 
@@ -286,28 +301,17 @@ class Donors:
         yield from sorted(joined, key=lambda pool: -len(pool[1]))
 
 
-def _searcher(pool: Array, n_neighbors: int) -> Callable[[Array, float], tuple[Array, Rows]]:
-    """A function that finds the nearest rows of a pool within a distance.
-
-    It gives their distances and positions; beyond that distance these are infinite and 0.
-    """
+def _nearest_of_all(points: Array, pool: Array, n_neighbors: int) -> tuple[Array, Rows]:
+    """Root mean squares of the differences from the nearest rows of a pool, in the columns that these have, and their
+    positions."""
+    center = points.mean(axis=0)
+    known = ~np.isnan(pool)
+    points, pool = points - center, np.where(known, pool - center, 0.0)
+    squares = points**2 @ known.T - 2 * points @ pool.T + (pool**2).sum(axis=1)  # it loses digits, and only chooses
     k = min(n_neighbors, len(pool))
-    if len(pool) <= SMALL_POOL:
-        return lambda points, within: _smallest(cdist(points, pool), k)
-    # Building the tree takes most of the time, and these options make it quick.
-    tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)
-
-    def search(points: Array, within: float) -> tuple[Array, Rows]:
-        # A neighbour exactly at the bound must be found in spite of rounding.
-        found, at = tree.query(points, k=[*range(1, k + 1)], distance_upper_bound=within * (1 + 1e-9) + 1e-300)
-        return found, np.where(np.isinf(found), 0, at)
-
-    return search
-
-
-def _smallest(distances: Array, k: int) -> tuple[Array, Rows]:
-    at = np.argpartition(distances, k - 1, axis=1)[:, :k]
-    return np.take_along_axis(distances, at, axis=1), at
+    at = np.argpartition(squares / known.sum(axis=1), k - 1, axis=1)[:, :k]
+    differences = np.where(known[at], points[:, np.newaxis] - pool[at], 0.0)
+    return np.sqrt((differences**2).sum(axis=-1) / known[at].sum(axis=-1)), at
 
 
 def _merge(distances: Array, rows: Rows, block: Rows, found: Array, found_rows: Rows) -> None:

@@ -12,7 +12,7 @@ from skthermo._effects import read_groups
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem import CallableModel, FEModel
+from skthermo.fem import CallableModel, FEModel, ReducedModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._residuals import Measured, Outcome, Point, Residuals, optimise
 
@@ -92,9 +92,9 @@ class Ensemble:
         self.bounds = np.vstack([bounds, np.tile(limits, (len(self.groups), 1))])
         prior = np.append(prior, np.full(len(self.groups), spread))
         self.extended: Any = model
-        if self.groups:
-            severities = 1 - limits[1], 1 - limits[0]
-            self.extended = model.with_damage_parameters(self.groups, severities=severities)  # type: ignore[attr-defined]
+        if self.groups:  # a basis for all groups would take longer to make than the searches on the full model
+            full: Any = model.full if isinstance(model, ReducedModel) else model
+            self.extended = full.with_damage_parameters(self.groups)
         quiet = self.extended.quiet() if hasattr(self.extended, "quiet") else self.extended
         self.residuals = Residuals(quiet, measured, prior)
 
@@ -149,9 +149,10 @@ class Ensemble:
 
     def warn_of(self, multipliers: Sequence[Array]) -> None:
         """Warnings of the model about drawn multipliers, such as those outside the bounds of a reduced model."""
-        if hasattr(self.extended, "warn_of"):
+        if hasattr(self.model, "warn_of"):
             theta = np.array(multipliers)
-            self.extended.warn_of(theta, self.residuals.model.frequencies(theta))
+            own = theta[:, : len(self.model.parameter_names)]
+            self.model.warn_of(own, self.residuals.model.frequencies(theta))
 
 
 def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:

@@ -217,11 +217,15 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
         return as_floats(model.frequencies(rows))  # not `evaluate`, which warns of every theta without modes
 
     def derivatives() -> tuple[Array, Array]:
-        exact = getattr(model, "jacobian", None)
-        slopes = exact(row) if exact else central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+        if exact is not None:
+            slopes = exact
+        elif hasattr(model, "jacobian"):
+            slopes = model.jacobian(row)
+        else:
+            slopes = central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
         return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
-    frequencies = frequencies_at(row)
+    frequencies, exact = model.linearised(row) if hasattr(model, "linearised") else (frequencies_at(row), None)
     return PairedModes(frequencies[0, measured.columns], np.empty((0, len(measured.columns))), None, derivatives)
 
 

@@ -184,7 +184,8 @@ use(
     harmless=(True, flag()),
     note=("", bad(3, None)),
 )
-SEVERAL = {name: (T, F * (1 + 0.01 * n)) for n, name in enumerate("abcd")}
+FEW = F[["f1", "f2"]]
+SEVERAL = {name: (T, FEW * (1 + 0.01 * n)) for n, name in enumerate("abc")}
 PRIOR = fleet.FleetPrior().fit(SEVERAL)
 use(
     "fleet.FleetPrior",
@@ -201,9 +202,9 @@ use(
     prior=(PRIOR, bad(3, True, "a", str)),
     link=("log", choice("None")),
     X=(T, weather(T, rows=True, fixed=False, fitting=True)),
-    y=(F, frequencies(F, rows=True, fixed=False)),
+    y=(FEW, frequencies(FEW, rows=True, fixed=False)),
 )
-MAPPER = fleet.FleetMapper(PRIOR).fit(T, F)
+MAPPER = fleet.FleetMapper(PRIOR).fit(T, FEW)
 method("fleet.FleetMapper.predict", MAPPER, X=(T, weather(T, rows=False)), return_std=(False, flag()))
 method("fleet.FleetMapper.predict_covariance", MAPPER, X=(T, weather(T, rows=False)))
 method("fleet.FleetMapper.from_fleet", MAPPER, X=(T, weather(T, rows=False)))

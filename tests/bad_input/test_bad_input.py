@@ -5,6 +5,7 @@ depends on several arguments is listed there, by callable and cause.
 """
 
 import contextlib
+import functools
 import importlib
 import inspect
 import re
@@ -123,8 +124,18 @@ def findings(result):
     return set(result.table["what"]) if isinstance(result, RecordFindings) else set()
 
 
-def verdict(example, argument, cause, value, good_result, good_warnings):
+@functools.cache
+def good_answer(number):
+    """The result and the warnings of the valid call of an example, which only values that are not refused need."""
+    example = registry.EXAMPLES[number]
+    result, error, warned = answer(example, example.good)
+    assert error is None, f"the good example of {example.name} fails: {error!r}"
+    return result, warned
+
+
+def verdict(number, argument, cause, value):
     """One of "legal", "refused", "warned", "silent", "unclear", and what was said."""
+    example = registry.EXAMPLES[number]
     with np.errstate(all="ignore"):
         result, error, warned = answer(example, example.good | {argument: value})
     if isinstance(error, TooLong):
@@ -133,6 +144,7 @@ def verdict(example, argument, cause, value, good_result, good_warnings):
         where = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {error}"
         return ("refused", said) if is_clear(error, argument) else ("unclear", f"{said} ({where.filename[-40:]})")
+    good_result, good_warnings = good_answer(number)
     if ("another order" in cause or "stamps" in cause) and same(result, good_result):
         return "legal", "read by name, or row by row"
     named = findings(result) - findings(good_result)
@@ -150,8 +162,8 @@ def all_examples():
 
 
 def bad_values():
-    """Every example with an argument, the name of the fault and a bad value of it, but for values that are legal."""
-    for example in all_examples():
+    """Number of an example, argument, name of the fault and a bad value of it, but for values that are legal."""
+    for number, example in enumerate(all_examples()):
         for argument, bad in example.bad.items():
             default = inspect.Parameter.empty
             with contextlib.suppress(KeyError, TypeError, ValueError):
@@ -161,7 +173,7 @@ def bad_values():
                     continue
                 if value is default or (isinstance(value, type(default)) and np.ndim(value) == 0 and value == default):
                     continue
-                yield example, argument, cause, value
+                yield number, argument, cause, value
 
 
 class Tried(NamedTuple):
@@ -178,14 +190,9 @@ def tried(every=1, beginnings=()):
     """Try every so many bad values, of callables whose names begin so."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        chosen = [one for one in bad_values() if one[0].name.startswith(beginnings or ("",))][::every]
-    good = {}
-    for example, argument, cause, value in chosen:
-        if id(example) not in good:
-            result, error, warned = answer(example, example.good)
-            assert error is None, f"the good example of {example.name} fails: {error!r}"
-            good[id(example)] = result, warned
-        yield Tried(example.name, argument, cause, *verdict(example, argument, cause, value, *good[id(example)]))
+        values = [(registry.EXAMPLES[number].name, number, *bad) for number, *bad in bad_values()]
+    for name, number, argument, cause, value in [one for one in values if one[0].startswith(beginnings or "")][::every]:
+        yield Tried(name, argument, cause, *verdict(number, argument, cause, value))
 
 
 def assert_refused_or_warned_of(every):

@@ -86,6 +86,7 @@ def test_detectors_and_compensators_list_all_errors(estimator, names):
     assert all(name in text for name in names)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(("unit", "factor"), [("rad/s", 2 * np.pi), ("kHz", 1e-3), ("periods", None)])
 def test_another_unit_is_refused_wherever_the_model_is_known(unit, factor):
     frequencies = 1 / F if factor is None else F * factor
@@ -110,6 +111,7 @@ def test_records_of_any_quantity_are_legal_where_no_model_is():
         assert make_pipeline(compensator(), MahalanobisDetector()).fit(inputs.join(strains))[-1].threshold_ > 0
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", ["auto", "global", "local", None])
 def test_residuals_are_no_frequencies(whiten):
     detector = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES, whiten=whiten), MahalanobisDetector())

@@ -5,12 +5,8 @@ import io
 import json
 from types import SimpleNamespace
 
-import pandas as pd
-
 from skthermo.commands.main import main
-from tests.monitoring.nightly import FIRST, truss_records
-
-UNTIL = "2026-12-31"
+from tests.monitoring.nightly import FIRST
 
 
 def run(*arguments):
@@ -31,14 +27,11 @@ def write_pair(records, folder, stem="", **options):
     return files
 
 
-def made_bridge(folder, name="bridge", records=None, **options):
+def made_bridge(folder, records):
     """A bridge whose monitor is fitted to two years; the folder it is in has the settings."""
-    records = truss_records() if records is None else records
-    files = write_pair(records[:FIRST], folder, **options)
-    run("init", *files, "--into", folder / name)
-    done = run("fit", folder / name / "monitor.toml")
+    run("init", *write_pair(records[:FIRST], folder), "--into", folder / "bridge")
+    done = run("fit", folder / "bridge" / "monitor.toml")
     assert done.code == 0, done.err
-    return folder / name
 
 
 def write_day(records, bridge, row, stop=None, name=None):
@@ -53,8 +46,3 @@ def edit(file, old, new):
     text = file.read_text(encoding="utf-8")
     assert text.count(old) == 1, (old, text)
     file.write_text(text.replace(old, new), encoding="utf-8")
-
-
-def day(row):
-    """The stamp of a record."""
-    return pd.Timestamp("2025-01-01") + pd.Timedelta(days=row)

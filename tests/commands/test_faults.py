@@ -17,23 +17,17 @@ import skthermo.reporting
 from skthermo._io import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
-from tests.commands.folders import edit, made_bridge, run, write_day
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, truss_records
+from tests.commands.folders import edit, run, write_day
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 LAST = DAMAGED + 4  # the night in which an event opens
 
 
 @pytest.fixture(scope="module")
-def records():
-    records = truss_records()
-    return records.set_axis(records.index.as_unit("ns").rename(None))
-
-
-@pytest.fixture(scope="module")
-def before(records, tmp_path_factory):
+def before(fitted, records, tmp_path_factory):
     """A bridge on the eve of an alarm, with the records of the next night in its folder."""
-    folder = made_bridge(tmp_path_factory.mktemp("before"), records=records)
+    folder = shutil.copytree(fitted, tmp_path_factory.mktemp("before") / "bridge")
     edit(folder / "monitor.toml", '# page = "status.html"', 'page = ""')
     edit(folder / "monitor.toml", "# metrics = ...", 'metrics = "metrics.prom"')
     assert run("update", folder / "monitor.toml", "--now", write_day(records, folder, FIRST, DAMAGED)).code == HEALTHY

@@ -1,17 +1,11 @@
 """The command of nightly jobs: what it says, its exit codes, and what a crash leaves."""
 
 import contextlib
-import errno
+import copy
 import io
-import multiprocessing
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from dataclasses import replace
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,7 +13,6 @@ import pandas as pd
 import pytest
 
 import skthermo.reporting
-from skthermo._io import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
@@ -33,10 +26,10 @@ def records():
 
 
 @pytest.fixture(scope="module")
-def saved(records, tmp_path_factory):
+def saved(truss_monitor, records, tmp_path_factory):
     """A file of a monitor that has seen ten healthy days, and one whose alarm is open."""
     folder = tmp_path_factory.mktemp("saved")
-    monitor = fitted_monitor(records)
+    monitor = copy.deepcopy(truss_monitor)
     monitor.update(records[FIRST : FIRST + 10])
     monitor.save(folder / "healthy.joblib")
     monitor.update(records[FIRST + 10 : DAMAGED + 10])
@@ -78,15 +71,6 @@ def test_healthy_records(bridge, records):
         f"state: healthy (newest record {records.index[FIRST + 13]})",
     ]
     assert lines[-1] == "events: none"
-
-
-@pytest.mark.nightly
-def test_records_are_read_to_the_last_bit(bridge, records):
-    whole = load_monitor(bridge("status").file)
-    whole.update(records[FIRST + 10 : DAMAGED + 10])
-    for start, stop in pairwise((FIRST + 10, FIRST + 11, DAMAGED + 3, DAMAGED + 10)):
-        done = bridge("update", new=records[start:stop])
-    assert_same_history(load_monitor(done.file), whole)
 
 
 def test_an_alarm(bridge, records):
@@ -238,19 +222,6 @@ def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
     assert (alarm.code, alarm.err) == (ALARM, "error: a.html was not written: the disk is full\n")
 
 
-@pytest.mark.parametrize("state", ["healthy", "alarm"])
-def test_no_state_is_printed_that_was_not_saved(bridge, records, monkeypatch, state):
-    def full(*_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "fsync", full)
-    first = FIRST + 10 if state == "healthy" else DAMAGED + 10
-    done = bridge("update", new=records[first : first + 2], state=state)
-    assert (done.code, done.out) == (FAILED, "")
-    assert str(done.file) in done.err
-    assert load_monitor(done.file).last_ == records.index[first - 1]
-
-
 def test_records_that_are_set_aside_are_not_healthy(bridge, records):
     new = records[FIRST + 10 : FIRST + 14].assign(f2=lambda table: 2 * table["f2"])
     done = bridge("update", new=new)
@@ -297,17 +268,6 @@ def test_files_that_do_not_belong_together_are_an_error(files, capsys):
     assert "expected" in capsys.readouterr().err
 
 
-def test_two_at_once(bridge, records, tmp_path):
-    pytest.importorskip("fcntl")
-    file = bridge("status").file
-    with alone_with(file, 0):
-        done = bridge("update", "--wait", "0.1", new=records[FIRST + 10 : FIRST + 12])
-        assert bridge("status").code == HEALTHY  # reads the last whole file
-    assert done.code == FAILED
-    assert f"is in use by process {os.getpid()} on " in done.err
-    assert bridge("update", "--wait", "0.1", new=records[FIRST + 10 : FIRST + 12]).code == HEALTHY
-
-
 @pytest.mark.nightly
 def test_it_is_started_from_a_shell(saved, records, tmp_path):
     records[FIRST + 10 : FIRST + 12].to_csv(tmp_path / "new.csv")
@@ -317,28 +277,3 @@ def test_it_is_started_from_a_shell(saved, records, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (HEALTHY, "")
     assert "state: healthy" in done.stdout
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs processes that fork")
-def test_a_kill_leaves_a_whole_state_that_goes_on_to_the_same_decisions(saved, records, tmp_path):
-    file, new = tmp_path / "healthy.joblib", tmp_path / "new.csv"
-    shutil.copy(saved / file.name, file)
-    undisturbed, random, kills = load_monitor(file), np.random.default_rng(0), 0
-    for day in range(FIRST + 10, FIRST + 14):
-        records[day : day + 1].to_csv(new)
-        undisturbed.update(records[day : day + 1])
-        for again in range(2):
-            process = multiprocessing.get_context("fork").Process(target=main, args=(["update", str(file), str(new)],))
-            process.start()
-            if not again:
-                time.sleep(random.uniform(0, 0.1))
-                os.kill(process.pid, signal.SIGKILL)
-            process.join()
-            kills += process.exitcode == -signal.SIGKILL
-            assert load_monitor(file).last_ in (records.index[day - 1], records.index[day])
-    assert kills >= 3
-    left = load_monitor(file)
-    left.status_ = replace(left.status_, n_repeated=0)  # where the kill came after the state was saved
-    assert_same_history(left, undisturbed)
-    assert not list(tmp_path.glob(".*.unfinished"))

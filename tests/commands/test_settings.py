@@ -17,17 +17,14 @@ from skthermo.commands._settings import CLASSES, SECTIONS, class_named, read_set
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import ExponentialMeans, HingeFeatures
-from tests.commands.folders import run, write_pair
-from tests.monitoring.nightly import FIRST, truss_records
+from tests.commands.folders import run
 
 MODES = ["f1", "f2", "f3", "f4", "f5", "f6"]
 
 
 @pytest.fixture(scope="module")
-def proposed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("proposed")
-    run("init", *write_pair(truss_records()[:FIRST], folder), "--into", folder / "truss")
-    return (folder / "truss" / "monitor.toml").read_text(encoding="utf-8")
+def proposed(fitted):
+    return (fitted / "monitor.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -50,6 +50,7 @@ def test_the_share_of_atypical_bridges_holds_in_every_kind(atypical):
         assert {bridge.atypical_law for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
 
 
+@pytest.mark.one_case
 def test_records_depend_on_their_date_alone(bridge):
     year = bridge.records(365)
     for part, days in ((bridge.records(20), slice(0, 20)), (bridge.records(9, "2025-11-03"), slice(306, 315))):
@@ -102,6 +103,7 @@ def test_the_users_model_is_a_little_wrong():
         assert (np.diff(nominal) > 0.05 * nominal[:, :-1]).all()  # modes keep their order
 
 
+@pytest.mark.one_case
 def test_noise_is_as_strong_and_lasts_as_long_as_said(bridge):
     records = bridge.records(3 * 365, gaps=0, outliers=0, noise=0.005)
     noise = (records.frequencies / records.clean_frequencies - 1).to_numpy()

@@ -86,6 +86,7 @@ def test_order_of_columns_and_of_targets_does_not_matter():
     np.testing.assert_allclose(shuffled[MODES], residuals, rtol=0, atol=1e-9)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("method", ["fit_transform", "transform"])
 def test_frames_arrays_names_and_positions_agree(method):
     folds = BlockedKFold(5, block=8)

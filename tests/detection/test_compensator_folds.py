@@ -68,6 +68,7 @@ def test_other_folds_are_those_that_were_asked_for():
     assert (compensator(LAGGED, cv=forward).fit(year()).folds_ == np.repeat([-1, 0], [1000, len(STAMPS) - 1000])).all()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
 @pytest.mark.parametrize("cv", [BlockedKFold(5, block=7), "contiguous"], ids=str)
 def test_lags_near_the_border_of_a_block_are_the_true_ones(data, cv):

@@ -43,6 +43,7 @@ TREES = HistGradientBoostingRegressor(max_iter=5)
 SHUFFLED = KFold(3, shuffle=True, random_state=0)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     ("cv", "same"), [(None, None), ("contiguous", KFold(5)), (4, KFold(4)), (SHUFFLED, SHUFFLED)], ids=str
 )
@@ -87,6 +88,7 @@ def test_a_missing_target_is_missing_in_its_own_residual_only():
         np.testing.assert_array_equal(np.argwhere(residuals.isna()), [[3, 1], [50, 1]])
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("estimator", [KNeighborsRegressor(3), make_pipeline(StandardScaler(), Ridge())], ids=str)
 def test_every_target_learns_from_the_rows_that_have_it(estimator):
     holed = with_gaps(["f2"], [3, 50])
@@ -169,6 +171,7 @@ def test_nothing_missing_reaches_an_estimator_that_takes_none(estimator):
     np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [0, 7])
 
 
+@pytest.mark.one_case
 @pytest.mark.filterwarnings(EMPTY)
 @pytest.mark.parametrize(
     "estimator",
@@ -239,6 +242,7 @@ def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
         compensator(cv=cv).fit_transform(X)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     ("estimator", "holed", "message"),
     [

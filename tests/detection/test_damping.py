@@ -33,6 +33,7 @@ def detector(targets, whiten="local", last=None):
     return lambda X: (fitted.predict(X.drop(columns=others)) == -1).mean()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", [None, "global", "local"])
 def test_residuals_of_damping_do_not_depend_on_temperature(whiten):
     compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES + DAMPING, whiten=whiten)

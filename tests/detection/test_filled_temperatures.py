@@ -38,6 +38,7 @@ def detectors():
     }
 
 
+@pytest.mark.one_case
 @FILLED
 @pytest.mark.parametrize("dead", [["girder"], ["girder", "deck"]], ids=str)
 @pytest.mark.parametrize("whiten", WHITENINGS)
@@ -104,6 +105,7 @@ def test_one_warning_names_sensors_and_counts():
     np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [3, 4])
 
 
+@pytest.mark.one_case
 @FILLED
 @pytest.mark.parametrize("whiten", WHITENINGS)
 def test_gaps_in_the_baseline_cost_no_false_alarms(whiten):

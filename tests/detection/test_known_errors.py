@@ -87,6 +87,7 @@ def test_without_errors_the_distribution_is_that_of_the_rows():
     np.testing.assert_allclose(learned.mean, plain.mean, atol=1e-6)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", WHITENINGS)
 def test_residuals_of_known_errors_have_one_covariance_whatever_the_error(whiten):
     compensator = TemperatureCompensator(Known(), targets=MODES, whiten=whiten)
@@ -106,6 +107,7 @@ def test_errors_together_count_in_the_modes_that_are_there():
     assert np.abs(np.cov(compensator.transform(warm)[["f1", "f3"]].T) - np.eye(2)).max() < 0.2
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", WHITENINGS)
 def test_an_estimator_that_is_certain_changes_nothing(whiten):
     records = bridge(0, 500)
@@ -120,6 +122,7 @@ def test_an_estimator_that_is_certain_changes_nothing(whiten):
     )
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", WHITENINGS)
 def test_weeks_of_winter_raise_no_more_alarms_in_summer_than_are_asked_for(whiten):
     rates, unaware = [], []

@@ -72,6 +72,7 @@ def test_units_shift_the_score_by_their_logarithm():
     assert one - other == pytest.approx(np.log(1000))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("records", [NEW, HOLED], ids=["complete", "with gaps"])
 def test_what_residuals_are_divided_by_does_not_change_the_score(records):
     plain, whitened = (pipeline(whiten=whiten).fit(X) for whiten in (None, "global"))
@@ -79,6 +80,7 @@ def test_what_residuals_are_divided_by_does_not_change_the_score(records):
     np.testing.assert_allclose(scores, scores[0], rtol=1e-9)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", [None, "global", "local"])
 @pytest.mark.parametrize("output", ["default", "pandas"])
 def test_volumes_reach_the_detector_in_arrays_and_frames(whiten, output):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import mahalanobis
 from scipy.stats import chi
@@ -28,6 +28,7 @@ def test_scores_form_one_chain():
     np.testing.assert_array_equal(detector.predict(F) == -1, index > detector.threshold_)
 
 
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(-12, 12), min_size=3, max_size=3))
 def test_index_does_not_depend_on_units(exponents):
     scale = 10.0 ** np.array(exponents)

@@ -156,6 +156,7 @@ def test_four_fifths_of_the_records_stay_however_long_they_remember():
     np.testing.assert_allclose(index, distances_without(rows, within(np.arange(85), 8)), rtol=1e-9)
 
 
+@pytest.mark.one_case
 @REMEMBERED
 @pytest.mark.parametrize("case", ["gaps", "shrunk covariance"])
 def test_false_alarms_are_as_asked_where_records_remember_those_before(case):

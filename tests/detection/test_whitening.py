@@ -99,6 +99,7 @@ def test_the_index_of_globally_whitened_residuals_is_that_of_the_residuals():
     assert white[-1].threshold_ == pytest.approx(plain[-1].threshold_, rel=1e-9)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", ["global", "local"])
 def test_columns_stay_the_modes_that_they_were(whiten):
     white, residuals = compensator(whiten).fit_transform(X), compensator(None).fit_transform(X)
@@ -220,6 +221,7 @@ def test_extrapolated_rows_are_those_outside_the_weather_of_the_baseline():
     assert not AUTO.extrapolated(X.mask(X < 0)).any()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", [None, "auto", "global", "local"])
 def test_weather_outside_the_baseline_is_counted_in_one_warning(whiten):
     fitted, hot = compensator(whiten).fit(X), LATER.copy()
@@ -242,6 +244,7 @@ def test_the_row_outside_the_baseline_is_named_beside_gaps():
 # Missing modes
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", ["global", "local"])
 def test_gaps_stay_and_the_other_modes_are_whitened_by_themselves(whiten):
     holed = X.copy()
@@ -285,6 +288,7 @@ def test_the_size_of_chunks_does_not_matter(monkeypatch):
         np.testing.assert_allclose(white, whole, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", [None, "global", "local"])
 def test_forward_in_time_only_rows_before_the_first_fold_are_nan(whiten):
     white = compensator(whiten, cv=TimeSeriesSplit(5)).fit_transform(X)

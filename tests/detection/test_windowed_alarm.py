@@ -230,6 +230,7 @@ def test_sums_over_windows_are_those_of_pandas():
         np.testing.assert_allclose(windows.sums(values), rolling.sum(), atol=1e-12)
 
 
+@pytest.mark.one_case
 @each_rule
 def test_the_order_of_modes_and_their_units_do_not_matter(rule):
     alarm = fitted(rule)
@@ -261,6 +262,7 @@ def test_later_records_do_not_change_earlier_windows(rule):
 # Rates
 
 
+@pytest.mark.one_case
 @each_rule
 def test_false_alarms_are_as_asked_in_spite_of_the_correlation_in_time(rule):
     """More baselines, lengths and gaps: tests/benchmarks/detection_thresholds.py."""
@@ -271,6 +273,7 @@ def test_false_alarms_are_as_asked_in_spite_of_the_correlation_in_time(rule):
     assert 0.05 * 0.75 < np.mean(rates) < 0.05 * 1.25
 
 
+@pytest.mark.one_case
 @each_rule
 def test_damage_is_found_that_single_records_miss(rule):
     damaged = stream(1500, 3, shift=1.6)
@@ -286,6 +289,7 @@ def test_damage_is_found_that_single_records_miss(rule):
     assert wait <= pd.Timedelta("48h")
 
 
+@pytest.mark.one_case
 @each_rule
 def test_a_baseline_with_gaps_teaches_nearly_the_same(rule):
     holed = X.mask(np.random.default_rng(0).random(X.shape) < 0.2)

@@ -67,6 +67,7 @@ def sap2000(folder, job, K, M, labels):
         (folder / f"{job}.{suffix}").write_text("Note: the heading of a version\n" + coordinates_text(matrix))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("program", [abaqus, sap2000])
 def test_a_folder_of_jobs(program, model, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -178,6 +178,7 @@ def job(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.nightly
 def test_calculix(job):
     recipe = run_recipe(PAGE, "recipe-calculix")
     for row, ours in zip(THETA, recipe["model"].frequencies(THETA), strict=True):
@@ -186,6 +187,7 @@ def test_calculix(job):
         np.testing.assert_allclose(ours, np.float64(found[:4]), rtol=5e-7)
 
 
+@pytest.mark.nightly
 def test_calculix_by_hand(job):
     folder = job / "bridge"
     folder.mkdir()

@@ -51,6 +51,7 @@ def test_refining_makes_every_inverse_exact(models, name):
     assert (table["refined"] < table["error"] / 100).all()
 
 
+@pytest.mark.nightly
 def test_with_noise_all_inverses_end_at_the_same_estimate(models):
     table = EXAMPLE.inverse_results(*models["Z24"], noise=0.005, seed=0, size=SIZE)
     np.testing.assert_allclose(table["refined"], table["refined"].mean(), rtol=5e-3)

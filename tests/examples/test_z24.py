@@ -100,6 +100,7 @@ def test_the_chain_predicts_nearly_as_well_as_a_direct_regression(frozen):
             assert ratio[f"{regressor}, chain, {kind}, bounds 0.5"] < 1.1
 
 
+@pytest.mark.nightly
 def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
     records = Z24.Records.of(frozen)
     table = Z24.alarm_table(
@@ -109,6 +110,7 @@ def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
     assert table["damage found"][Z24.WHITENED] > 95
 
 
+@pytest.mark.nightly
 def test_the_parameter_that_was_damaged_falls(frozen):
     measured, names = DAMAGE.in_parameters(Z24.Records.of(frozen))
     fall = DAMAGE.changes(measured, names).damaged.mean()

@@ -139,6 +139,7 @@ def reduced(request):
     return frame.with_parameters(["columns", "beams", "soil"]).reduced(0.3, tol=1e-7, random_state=0)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("severity", [0.95, -2.0])
 def test_a_severely_damaged_model_is_solved_around_its_own_nominal_state(reduced, severity):
     damaged = reduced.damaged({"soil": severity})

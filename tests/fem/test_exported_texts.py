@@ -219,6 +219,7 @@ def test_errors_name_file_and_line(tmp_path, kind, pattern, new, message):
         load_affine(tmp_path / f"K{suffix}")
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("in_process", [False], indirect=True)
 @pytest.mark.parametrize(
     ("name", "text"),

@@ -118,6 +118,7 @@ GUESSES = {
 }
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("kind", GUESSES)
 def test_modes_near_guesses_are_those_of_lapack(kind):
     guesses = GUESSES[kind](nominal_shapes(FRAME, 8))

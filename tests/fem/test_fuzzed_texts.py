@@ -1,16 +1,48 @@
 """Damaged texts of matrices: refused, or read as slow readers that go through them line by line read them."""
 
+import re
+import struct
 import warnings
 
 import numpy as np
 import pytest
 
 from skthermo._io import read_named_matrices
-from tests.benchmarks.fuzz_loaders import mutated
 from tests.fem.exported_files import TEXTS, TOTAL
 from tests.fem.slow_readers import agrees
 
 pytestmark = pytest.mark.usefixtures("in_process")
+
+NUMBERS = [0, 1, 2, 3, 7, 8, 127, 255, 65535, 10**6, 2**24, 2**27, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63 - 1]
+WORDS = [b"-1", b"0", b"1", b"7", b"1000000", b"100000000", b"2147483648", b"99999999999", b"1e300", b"nan", b"inf"]
+BEGINNING = 200  # bytes in which most lengths stand
+
+
+def mutated(content, random):
+    """A copy with one or two of: bytes flipped, cut off, inserted, exchanged, or a length changed."""
+    content = bytearray(content)
+    for _ in range(random.integers(1, 3)):
+        within = len(content) if random.integers(2) else min(len(content), BEGINNING)
+        place = int(random.integers(within or 1))
+        kind = random.integers(6)
+        if kind == 0 and content:
+            content[place] ^= 1 << int(random.integers(8))
+        elif kind == 1:
+            del content[place:]
+        elif kind == 2:
+            content[place:place] = random.bytes(int(random.integers(1, 40)))
+        elif kind == 3:
+            content[place : place + int(random.integers(1, 40))] = b""
+        elif kind == 4:
+            form = "<>"[random.integers(2)] + "IQ"[random.integers(2)]
+            width = struct.calcsize(form)
+            number = NUMBERS[random.integers(len(NUMBERS))] % 2 ** (8 * width)
+            content[place // 4 * 4 : place // 4 * 4 + width] = struct.pack(form, number)
+        else:
+            tokens = list(re.finditer(rb"\d+", content)) or [re.match(rb"", content)]
+            token = tokens[int(random.integers(len(tokens) if random.integers(2) else min(len(tokens), 6)))]
+            content[token.start() : token.end()] = WORDS[random.integers(len(WORDS))]
+    return bytes(content)
 
 
 def outcome(folder, kind, seed):

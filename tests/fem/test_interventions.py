@@ -18,6 +18,7 @@ def rows(model, n_rows=3):
     return np.random.RandomState(0).uniform(0.93, 1.07, size=(n_rows, len(model.parameter_names)))
 
 
+@pytest.mark.one_case
 @each_model
 def test_damage_parameters_give_the_damaged_model(model):
     groups = list(model.groups)[:2]

@@ -52,6 +52,7 @@ MODELS = {
 }
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
 def test_shape_derivatives_equal_central_differences(make):
     model = make()
@@ -92,6 +93,7 @@ def test_unit_modal_mass_is_kept_where_mass_varies():
         np.testing.assert_allclose(np.diag(moved.T @ (mass @ moved)), 1, atol=1e-8)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
 def test_a_rescaled_model_is_the_same_structure_seen_from_another_theta(make):
     model = make()

@@ -74,6 +74,7 @@ def test_samples_fill_the_box_and_repeat_with_their_seed(method):
     np.testing.assert_allclose(unit.mean(axis=0), 0.5, atol=0.06)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     ("model", "backend"),
     [(make_truss(), "threading"), (make_truss(), "loky"), (big_model(400), "threading"), (big_model(3000, 20), "loky")],

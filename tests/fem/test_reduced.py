@@ -41,6 +41,7 @@ def test_the_stated_error_is_that_at_the_check_points():
     assert not (REDUCED.check_points_[:, np.newaxis] == REDUCED.snapshot_points_).all(axis=2).any()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("model", [FRAME, make_z24()], ids=["frame", "Z24"])
 def test_the_tolerance_holds_at_every_corner_of_the_box(model, seed):
@@ -55,6 +56,7 @@ def test_no_point_is_one_of_a_sample_with_the_same_seed():
         assert not np.isclose(points[:, np.newaxis], drawn).all(axis=2).any()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("tol", [1e-3, 1e-7])
 def test_tolerance_sets_the_size(tol):
     reduced = FRAME.reduced(0.3, tol=tol, random_state=0)

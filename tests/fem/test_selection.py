@@ -29,6 +29,7 @@ def model(request, reduced):
     }[request.param]
 
 
+@pytest.mark.one_case
 def test_chosen_modes_are_columns_of_the_model_with_all_modes(model):
     theta = BOX if model.track else sample(TRUSS, 0.05, 12, random_state=0).theta
     chosen = model.with_modes(MODES)
@@ -55,6 +56,7 @@ def test_sorted_columns_are_ranks():
     np.testing.assert_array_equal(TRUSS.with_modes([4, 2]).frequencies(theta), TRUSS.frequencies(theta)[:, [4, 2]])
 
 
+@pytest.mark.one_case
 def test_frozen_parameters_stay_at_one(model):
     names = [model.parameter_names[2], model.parameter_names[0]]
     fewer = model.with_parameters(names)

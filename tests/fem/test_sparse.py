@@ -47,6 +47,7 @@ def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
         assert np.abs(residual).max() < 1e-6 * np.abs(mass @ phi * eigenvalues).max()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("track", [False, True])
 def test_sparse_jacobian_equals_central_differences(track):
     model, step = portal(track=track), 1e-4
@@ -149,6 +150,7 @@ def test_the_exported_building_frame_has_its_reference_frequencies():
     np.testing.assert_allclose(frequencies, np.sqrt(np.sort(eigenvalues)) / (2 * np.pi), rtol=1e-8)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("n_masses", [3, 6, 12, 19, 30, 41, 80])
 @pytest.mark.parametrize("track", [False, True])
 def test_few_masses_on_many_degrees_of_freedom(n_masses, track):

@@ -64,18 +64,19 @@ def changed(factors, n_days=20, start=0):
 SIZES = st.builds(lambda sign, size: float(np.exp(sign * size)), st.sampled_from([-1, 1]), st.floats(0.05, 12.0))
 
 
+@pytest.mark.one_case
+@pytest.mark.parametrize("options", [{}, {"sensors": False}], ids=["with sensors", "without"])
 @settings(
-    max_examples=20, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
 )
 @given(
     factors=st.dictionaries(st.sampled_from(MODES), SIZES | st.just(0.0) | st.just(-1.0), min_size=1),
     window=st.sampled_from([None, "2D"]),
-    sensors=st.booleans(),
     start=st.integers(0, 300),
     n_days=st.integers(4, 20),
 )
-def test_no_change_of_any_size_or_pattern_is_healthy(factors, window, sensors, start, n_days):
-    monitor = fitted(window, sensors=sensors)
+def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, window, start, n_days):
+    monitor = fitted(window, **options)
     answers = monitor.update(changed(factors, n_days, start))[SETTLED:]
     assert set(answers["state"]) <= {"alarm", "not evaluated"}
     assert answers.loc[answers["state"] == "not evaluated", "reason"].ne("").all()
@@ -84,6 +85,7 @@ def test_no_change_of_any_size_or_pattern_is_healthy(factors, window, sensors, s
     assert set(opened["kind"]) & KINDS
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("pattern", [[0.6, 1.0], [0.6, 0.6, 1.0], [0.6, 1.0, 0.6, 0.6, 1.0]])
 def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
     monitor, records = fitted(), changed({}, 20)
@@ -190,6 +192,7 @@ def test_responses_may_have_any_sign_and_unit():
     assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]
 
 
+@pytest.mark.nightly
 def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
     records, targets = with_displacement(), [*MODES, "d"]
     records = records.drop(columns=["e1", "e2"])
@@ -297,13 +300,15 @@ def test_other_targets_than_those_of_the_compensator_are_refused(wanted):
         Monitor(detector(MODES), targets=wanted).fit(truss()[:N_BASELINE])
 
 
-def test_modes_are_named_whatever_the_order_of_targets():
-    for options in ({"targets": MODES[::-1]}, {}):
-        own = MODES if options else ["f6", "f1", "f3", "f2", "f5", "f4"]
-        monitor = Monitor(detector(own), sensors=False, **options).fit(truss()[:N_BASELINE])
-        monitor.update(changed({"f6": 0.9}, 2))
-        assert monitor.targets_ == MODES
-        assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
+@pytest.mark.one_case
+@pytest.mark.parametrize(
+    ("own", "options"), [(["f6", "f1", "f3", "f2", "f5", "f4"], {}), (MODES, {"targets": MODES[::-1]})]
+)
+def test_modes_are_named_whatever_the_order_of_targets(own, options):
+    monitor = Monitor(detector(own), sensors=False, **options).fit(truss()[:N_BASELINE])
+    monitor.update(changed({"f6": 0.9}, 2))
+    assert monitor.targets_ == MODES
+    assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
 
 
 def test_results_do_not_share_the_state():

@@ -34,14 +34,9 @@ def records():
     return truss_records()
 
 
-@pytest.fixture(scope="module")
-def fitted(records):
-    return fitted_monitor(records)
-
-
 @pytest.fixture
-def monitor(fitted):
-    return copy.deepcopy(fitted)
+def monitor(truss_monitor):
+    return copy.deepcopy(truss_monitor)
 
 
 @pytest.fixture

@@ -39,6 +39,7 @@ def monitor_of(regressor=BayesianLogs, **options):
     return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("whiten", [None, "global", "local"])
 def test_any_batches_give_the_decisions_of_one_pass(whiten):
     records = served(0, WEEKS + 120)

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from skthermo.monitoring import load_monitor
-from tests.monitoring.nightly import FIRST, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 from tests.monitoring.test_status import replayed
 
 LEVELS = {"healthy": 0, "not evaluated": 0, "watch": 1, "alarm": 2}
@@ -25,13 +25,14 @@ def records():
 
 
 @pytest.fixture(scope="module")
-def plain(records):
-    return fitted_monitor(records)
+def two_levels(records):
+    return fitted_monitor(records, watch_per_year=12)
 
 
 @pytest.fixture(scope="module")
-def two_levels(records):
-    return fitted_monitor(records, watch_per_year=12)
+def whole(two_levels, records):
+    """The monitor with two levels and its answers, after the truss was damaged for four months."""
+    return served(two_levels, records[FIRST : DAMAGED + 120])
 
 
 def served(monitor, new):
@@ -48,11 +49,11 @@ def lowered(records, share, n_days=31):
     return new
 
 
-def test_the_lower_level_changes_no_alarm(plain, two_levels, records):
-    assert two_levels.threshold_ == plain.threshold_
-    assert plain.watch_threshold_ is None
+def test_the_lower_level_changes_no_alarm(truss_monitor, two_levels, whole, records):
+    assert two_levels.threshold_ == truss_monitor.threshold_
+    assert truss_monitor.watch_threshold_ is None
     assert two_levels.clear_threshold_ <= two_levels.watch_threshold_ < two_levels.threshold_
-    (one, answers), (two, with_watch) = (served(monitor, records[FIRST:]) for monitor in (plain, two_levels))
+    (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST : DAMAGED + 120]), whole
     assert (with_watch["state"] == "alarm").equals(answers["state"] == "alarm")
     pd.testing.assert_series_equal(with_watch["index"], answers["index"])
     events = two.events_[two.events_["kind"] != "watch"].reset_index(drop=True)
@@ -62,8 +63,8 @@ def test_the_lower_level_changes_no_alarm(plain, two_levels, records):
     assert with_watch.loc[is_watch, "event"].isin(two.events_.index[two.events_["kind"] == "watch"]).all()
 
 
-def test_an_alarm_is_also_a_watch(two_levels, records):
-    monitor, _ = served(two_levels, records[FIRST:])
+def test_an_alarm_is_also_a_watch(whole):
+    monitor, _ = whole
     events = monitor.events_
     watch = events[events["kind"] == "watch"]
     for _, alarm in events[events["kind"] == "damage"].iterrows():
@@ -108,10 +109,10 @@ def assert_as_if_never_come(monitor, other):
 
 
 @pytest.mark.parametrize("ahead", [pytest.param("3653D", marks=pytest.mark.nightly), "5D"])
-def test_discarded_records_are_as_if_they_had_never_come(plain, records, ahead, tmp_path):
+def test_discarded_records_are_as_if_they_had_never_come(truss_monitor, records, ahead, tmp_path):
     new = records[FIRST : FIRST + 60]
     wrong = new[40:50].set_axis(new.index[40:50] + pd.Timedelta(ahead)) * [1, 1, 1, *[0.97] * (new.shape[1] - 3)]
-    monitor, _ = served(plain, new[:30])
+    monitor, _ = served(truss_monitor, new[:30])
     monitor.update(wrong, confirm=True)
     assert monitor.last_ == wrong.index[-1]
     with warnings.catch_warnings():
@@ -124,7 +125,7 @@ def test_discarded_records_are_as_if_they_had_never_come(plain, records, ahead, 
     assert monitor.transitions()[-1]["what"] in ("discarded", "withdrawn")
     for start, stop in ((30, 36), (36, 60)):
         monitor.update(new[start:stop])
-    other, _ = served(plain, new)
+    other, _ = served(truss_monitor, new)
     monitor.status_ = replace(monitor.status_, n_too_late=0)  # true records that came meanwhile were refused
     assert_as_if_never_come(monitor, other)
     assert len(monitor.transitions()) >= n_known
@@ -132,10 +133,10 @@ def test_discarded_records_are_as_if_they_had_never_come(plain, records, ahead, 
     assert events == set(monitor.events_.index[monitor.events_["end"].isna()])
 
 
-def test_all_records_since_the_baseline_may_be_discarded_and_those_of_the_baseline_not(plain, records):
-    monitor, _ = served(plain, records[FIRST : FIRST + 100])
+def test_all_records_since_the_baseline_may_be_discarded_and_those_of_the_baseline_not(truss_monitor, records):
+    monitor, _ = served(truss_monitor, records[FIRST : FIRST + 100])
     assert monitor.discard(records.index[FIRST + 10]) == 90
-    assert_as_if_never_come(monitor, served(plain, records[FIRST : FIRST + 10])[0])
+    assert_as_if_never_come(monitor, served(truss_monitor, records[FIRST : FIRST + 10])[0])
     assert monitor.discard(records.index[FIRST]) == 10
     assert monitor.state() == "not evaluated"
     assert monitor.last_ == records.index[FIRST - 1]

@@ -178,6 +178,7 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
     np.testing.assert_allclose(answers["index"], expected[N_BASELINE:], atol=1e-6)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("name", DETECTORS)
 def test_memory_is_what_lags_and_windows_need(name):
     monitor, _, _ = fitted(name)

@@ -21,7 +21,7 @@ SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats 
 @pytest.fixture(scope="module")
 def records():
     """Records with a thermometer that gets stuck for a while, and damage from some day on."""
-    table = truss_records().copy()
+    table = truss_records()[: DAMAGED + 60].copy()
     table.iloc[SPOILT, 0] = table.iloc[SPOILT.start, 0]
     return table
 

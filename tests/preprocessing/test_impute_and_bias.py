@@ -30,7 +30,8 @@ def trees(monkeypatch):
     """Trees even for few rows and small pools."""
     monkeypatch.setattr(_impute, "FEW_PAIRS", 0)
     monkeypatch.setattr(_impute, "PAIRS_PER_POOL", 0.0)
-    monkeypatch.setattr(_impute, "SMALL_POOL", 3)
+    monkeypatch.setattr(_impute, "PAIRS_PER_TREE", 30)
+    monkeypatch.setattr(_impute, "PAIRS_AT_ONCE", 50)
 
 
 def imputed_by_definition(donors, row, column, n_neighbors, weigh):
@@ -74,6 +75,15 @@ def test_trees_give_the_weighted_mean_of_the_nearest(weights, weigh, share):
     for row, column in np.argwhere(np.isnan(new)):
         expected = imputed_by_definition(gappy, new[row], column, 10, weigh)
         assert filled[row, column] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+
+
+@pytest.mark.usefixtures("trees")
+@pytest.mark.parametrize("pairs", [0, 30, 10_000_000])
+def test_neighbours_are_the_same_far_from_zero(pairs, monkeypatch):
+    monkeypatch.setattr(_impute, "PAIRS_PER_TREE", pairs)
+    gappy, new = scattered(0.3)
+    near, far = (KNNGapImputer().fit(gappy + shift).transform(new + shift) - shift for shift in (0.0, 1e7))
+    np.testing.assert_allclose(far, near, rtol=0, atol=1e-7)
 
 
 @pytest.mark.usefixtures("trees")

@@ -262,6 +262,7 @@ def test_halving_takes_a_parameter_as_its_resource(fem):
     assert best.n_features_in_ == 6
 
 
+@pytest.mark.nightly
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"windowedalarm__window": ["1D", "7D"]}
     with warnings.catch_warnings():

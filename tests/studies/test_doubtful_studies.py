@@ -18,6 +18,7 @@ def study(fem, scenarios, **options):
     )
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(("n_repeats", "expected"), [(39, 0.95), (99, 0.95), (10, 9 / 11), (2, 1 / 3)])
 def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expected):
     random, inside = np.random.default_rng(0), []

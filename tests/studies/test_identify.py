@@ -52,6 +52,7 @@ def most_probable(found):
     return found.estimates.loc[found.explanations.index[0], "severity"].to_dict()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     "damage",
     [{"top": 0.05}, {"diagonal": 0.5}, {"bottom": 0.8}, {"bottom": 0.3, "diagonal": 0.2}, dict.fromkeys(GROUPS, 0.1)],
@@ -69,6 +70,7 @@ def test_damage_without_noise_is_found_exactly(fem, damage):
     np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=2e-4)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("severity", [0.5, 0.7, 0.88, 0.92])  # modes of the truss swap places at 0.88
 def test_severe_damage_of_one_group_is_not_something_else(fem, severity):
     F = simulated(fem, {"diagonal": severity})
@@ -87,6 +89,7 @@ def test_a_healthy_structure_has_no_damage(fem):
     assert found.damage == {}
 
 
+@pytest.mark.one_case
 @pytest.mark.filterwarnings("ignore:.*hidden-offsets")
 @pytest.mark.parametrize("method", ["shift", "scale"])
 def test_damage_behind_an_aligner(method):

@@ -203,6 +203,7 @@ def test_explanations_that_are_not_listed_are_counted():
     assert "Explanations that are not listed have a probability of 11 % together." in said(identified(few))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("name", CASES)
 def test_report_summary_and_drawing_say_the_same(name):
     found = CASES[name]

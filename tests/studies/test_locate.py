@@ -34,6 +34,7 @@ def damaged_records(truss, later, group, members, severity):
     return pd.DataFrame(noisy, later.frequencies.index, later.frequencies.columns)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     ("group", "members", "severity"), [("bottom", ["4", "9"], 0.3), ("diagonal", ["22"], 0.35), ("top", ["13"], 0.4)]
 )
@@ -105,6 +106,7 @@ def test_the_structure_must_be_the_models(fem, truss, later):
         located.likely_members(90)
 
 
+@pytest.mark.nightly
 def test_members_that_another_program_assembled_are_located_alike(fem, truss, later):
     """The truss as a structure, and as a matrix of the whole model for each member."""
     year, parameters = make_truss_campaign(random_state=0), fem.model.parameter_names

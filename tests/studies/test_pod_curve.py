@@ -16,6 +16,7 @@ DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])
 RECORDS = np.full(5, 40.0)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("log", [False, True])
 @pytest.mark.parametrize("records", [RECORDS, RECORDS * [0.31, 0.7, 0.55, 1.0, 0.93]])
 def test_agrees_with_a_generalised_linear_model(log, records):
@@ -150,11 +151,13 @@ def test_false_alarms_bend_the_curve_too_little_to_matter():
     assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000) <= 0.01
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("pod", [[0.05, 0.6, 0.65, 0.7, 0.98], [0.3, 0.35, 0.4, 0.97, 0.98]])
 def test_a_curve_beside_its_points_is_said(pod):
     assert warned_share(pod, 500) >= 0.99
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("log", [False, True])
 def test_bounds_hold_a90_as_often_as_they_say(log):
     random = np.random.RandomState(0)
@@ -177,6 +180,7 @@ def decisions(random, rate, correlation, n_repeats, n_records):
     return noise - limits, norm.cdf(limits).mean()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(("n_repeats", "correlation", "rate"), [(20, 0.8, 0.02), (3, 0.5, 0.95), (1, 0.8, 0.3)])
 def test_bounds_hold_the_rate_as_often_as_they_say(n_repeats, correlation, rate):
     random, held = np.random.RandomState(0), []

@@ -249,6 +249,7 @@ def test_records_that_are_not_evaluated_are_said(fem):
     assert f"(neither healthy nor damaged): 'half' {share:.1%}." in study.summary()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
 def test_without_other_noise_nothing_is_significant(fem, options):
     some = {"raw": MahalanobisDetector(), "lines": compensated()}

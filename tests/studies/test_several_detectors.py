@@ -91,6 +91,7 @@ def test_one_row_for_each_detector_and_scenario(study):
         )
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("name", list(detectors()))
 def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
     alone = study_of(fem, detectors()[name], SCENARIOS, n_repeats=3)
@@ -232,6 +233,7 @@ def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
     pd.testing.assert_frame_equal(study.set_params(scenarios=scenarios).run(WEATHER), results)
 
 
+@pytest.mark.nightly
 def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     sees = {
         "raw": (MahalanobisDetector(), MODES),

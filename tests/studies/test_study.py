@@ -363,7 +363,7 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
     scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
-    for tol in (0.2, 0.02, 0.012, 0.001):
+    for tol in (0.2, 0.02, 0.001):
         options = {"uncertainty": "weather", "n_replicates": 2}
         study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
         results = study.run(WEATHER)
@@ -389,7 +389,8 @@ def test_the_time_is_estimated_before_the_work(fem, capsys):
     assert "2 replicates about" in lines[place]
 
 
-@pytest.mark.parametrize("detector", [MahalanobisDetector(), OutlierDetector(IsolationForest()), WindowedAlarm(7)])
+@pytest.mark.one_case
+@pytest.mark.parametrize("detector", [WindowedAlarm(7), MahalanobisDetector(), OutlierDetector(IsolationForest())])
 def test_records_evaluated_together_have_the_decisions_of_each_alone(fem, detector, monkeypatch):
     study = study_of(fem, compensated(detector), sweep(fem, (0.1, 0.2), ["bottom", "top"]))
     together = study.run(WEATHER)

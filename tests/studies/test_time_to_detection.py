@@ -81,6 +81,7 @@ def test_dependence_makes_waits_longer_and_bounds_wider():
     assert widths[0] > 1.2 * widths[1]
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_bounds_hold_the_long_run(memory):
     truth = Waits.of(evaluated(decisions_with(0.1, memory, (2000, 400), seed=99))).found(7, 0.9)[0]

@@ -26,6 +26,7 @@ def inverse(**options):
     )
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("noise", ["auto", 0.0, 0.002])
 def test_a_search_chooses_the_regressor_that_errs_least_on_new_simulations(noise):
     search = GridSearchCV(inverse(noise=noise), REGRESSORS, cv=ONE_FOLD, refit=False).fit(F)

@@ -53,6 +53,7 @@ def test_a_large_model_is_reduced_and_nothing_changes_but_the_time():
     assert full.report_.solved == "Solved by the full model: reduce=False."
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     "model",
     [SMALL, CallableModel(SMALL.frequencies, SMALL.parameter_names, SMALL.n_modes, vectorized=True)],

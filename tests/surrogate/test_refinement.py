@@ -50,6 +50,7 @@ def holed(frequencies, share, seed=3):
 # Exact inversion
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("regressor", [DummyRegressor(), Ridge(), KNeighborsRegressor(1)])
 def test_noise_free_rows_come_back_from_any_regressor(regressor):
     theta = drawn(300)

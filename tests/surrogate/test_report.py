@@ -192,6 +192,7 @@ class TestWarningsOfFit:
         with pytest.warns(UserWarning, match="of 365 .*0.95 to 1.05.*outside-prior"):
             chain(inverse=narrow).fit(T, F)
 
+    @pytest.mark.one_case
     @pytest.mark.parametrize("noise", [0.0, 0.01])
     def test_clean_campaigns_give_no_warning(self, noise):
         year = make_truss_campaign(noise=noise, random_state=3)

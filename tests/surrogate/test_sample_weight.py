@@ -79,6 +79,7 @@ def test_a_record_of_weight_0_counts_as_left_out():
     assert warm.extrapolation_distance(T.iloc[[coldest]])["T1"].item() > 0
 
 
+@pytest.mark.one_case
 @ROUTING
 def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
     with config_context(enable_metadata_routing=routing):

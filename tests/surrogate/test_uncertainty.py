@@ -342,6 +342,7 @@ def test_rows_without_any_temperature_have_no_interval():
         assert table.notna().all(axis=1).sum() == 364
 
 
+@pytest.mark.nightly
 def test_intervals_of_exchangeable_records_hold_the_share_asked():
     temperatures, frequencies = np.vstack([T, LATER.temperatures]), np.vstack([F, LATER.frequencies])
     order = np.random.default_rng(0).permutation(len(temperatures))

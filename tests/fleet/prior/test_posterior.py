@@ -135,6 +135,7 @@ def test_expectation_maximisation_finds_mean_and_covariance():
     assert_allclose(family.Sigma, Sigma, atol=0.05)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("n_bridges", [4, 12])
 def test_other_bridges_of_the_family_are_within_its_bands(n_bridges):
     random = np.random.default_rng(4)

@@ -267,6 +267,7 @@ def test_the_filter_follows_a_drift(ageing):
     assert np.array_equal(follower.next_day(known, None).mean[rates], known.mean[rates])
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     "drift", [{"bottom": 0.02}, dict.fromkeys(("bottom", "top", "diagonal", "vertical"), 0.01), {}]
 )

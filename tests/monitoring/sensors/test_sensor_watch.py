@@ -104,6 +104,7 @@ def test_a_fault_is_named_dated_and_left_out(watch, records, kind):
     assert kept.drop(columns=columns).notna().all(axis=None)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "swapped"])
 def test_a_repaired_sensor_comes_back(watch, records, kind):
     T, F, columns = with_fault(records, kind)
@@ -117,6 +118,7 @@ def test_a_repaired_sensor_comes_back(watch, records, kind):
     pd.testing.assert_frame_equal(kept, pd.concat(records, axis=1))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     "lost", [{"f1": 0.1}, {"f3": 0.1}, {"f1": 0.2, "f2": 0.02}, dict.fromkeys(["f1", "f2", "f3", "f4"], 0.1)]
 )
@@ -129,6 +131,7 @@ def test_damage_is_not_taken_for_a_fault(watch, records, lost):
     pd.testing.assert_frame_equal(masked(watch, state, T, F)[1], F)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("moved", [[6.0, -6.0, 20.0], [-6.0, 20.0, 20.0], [25.0, 25.0, 25.0]])
 def test_where_most_thermometers_depart_none_is_left_out(watch, records, moved):
     T = records[0].copy()
