@@ -17,6 +17,7 @@ from skthermo.monitoring import Monitor
 FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned
 HEAVIEST = 0.9  # shape of a tail: from 1 on it has no mean
 LONGEST = 100_000  # days
+MOST_TAILS = 100  # that are learned, each from all bridges but one or, of more bridges, but one in a hundred
 COLUMNS = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
 
 
@@ -46,10 +47,11 @@ class Discoveries:
     Notes
     -----
     Benjamini and Hochberg's procedure on the bridges' p values, which also holds where common weather makes them
-    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others:
-    a generalised Pareto law of their excesses, each over the mean excess of its own baseline, never lighter than an
-    exponential one. So it allows for outliers that the bridge's own baseline does not show, but not for weather that no
-    baseline shows. With few other bridges, the tail is that of `Monitor.event_p_values`.
+    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others
+    (of more than a hundred bridges, from 99 in 100): a generalised Pareto law of their excesses, each over the mean
+    excess of its own baseline, never lighter than an exponential one. So it allows for outliers that the bridge's own
+    baseline does not show, but not for weather that no baseline shows. With few other bridges, the tail is that of
+    `Monitor.event_p_values`.
 
     References
     ----------
@@ -126,11 +128,14 @@ def discover(
         except Exception:  # damaged files raise errors of every type, which are in the table of errors
             not_evaluated.append(name)
             watched.pop(name, None)
-    tables, p_values, years = [], {}, {}
+    tables, p_values, years, shapes = [], {}, {}, {}
+    parts = {name: number % MOST_TAILS for number, name in enumerate(excesses)}
     for name, (table, since, n_years) in watched.items():
         if len(table):
-            shape = tail_shape([one for other, one in excesses.items() if other != name])
-            p = monitors[name].event_p_values(since, tail_shape=shape)
+            part = parts[name]
+            if part not in shapes:
+                shapes[part] = tail_shape([one for other, one in excesses.items() if parts[other] != part])
+            p = monitors[name].event_p_values(since, tail_shape=shapes[part])
             table = table.assign(p_value=p.reindex(table.index)).reset_index().assign(bridge=name)[COLUMNS]
         is_blind = standings[name]["state"] == "not evaluated" or not n_years
         if (is_blind and not len(table)) or (len(table) and table["p_value"].isna().any()):

@@ -253,6 +253,17 @@ class Monitor(SavesFrames, Estimator):
     def __sklearn_clone__(self) -> Monitor:
         return type(self)(**self.get_params(deep=False) | {"detector": clone(self.detector)})  # the chain is shared
 
+    def __getstate__(self) -> dict[str, Any]:
+        state = super().__getstate__()
+        if "active_" in state and self.active_.trained is self.status_.store.baseline:  # most often: saved once
+            state["active_"] = replace(self.active_, trained=None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        if "active_" in state and self.active_.trained is None:
+            self.active_ = replace(self.active_, trained=self.status_.store.baseline)
+
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
         """Fit the detector to a baseline, and set the threshold of events.
@@ -328,7 +339,8 @@ class Monitor(SavesFrames, Estimator):
                 "placeholders",
             )
         _refuse_meaningless(trained, self.targets_, self.units_)
-        trained, columns = trained[inputs], inputs if compensators else self.targets_
+        trained = trained if len(inputs) == trained.shape[1] else trained[inputs]
+        columns = inputs if compensators else self.targets_
         active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
         active.check()
         store = RecordStore.of(baseline, max_delay, max_jump, retention)
