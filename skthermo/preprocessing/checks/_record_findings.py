@@ -44,7 +44,7 @@ class RecordFindings(SavesFrames):
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
     stuck-sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
-        the last value would be learned as weather; put NaN where it is stuck
+        The last value would be learned as weather. Put NaN where it is stuck
     """
 
     table: pd.DataFrame
@@ -65,7 +65,7 @@ class RecordFindings(SavesFrames):
         lines = [f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."]
         for kind, rows in self.table.groupby("what", sort=False):
             lines += [f"{kind}: {detail}" for detail in rows["detail"]]
-            lines.append(f"    {rows['consequence'].iloc[0]}; {rows['action'].iloc[0]}")
+            lines.append(f"    {rows['consequence'].iloc[0]}. {rows['action'].iloc[0]}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
