@@ -281,7 +281,7 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 # damage: the baseline's pavement is never warmer than 15 °C, and the damaged month has 18 to 41 °C. There this chain
 # expects the first, third and fourth frequency 0.8 to 1.2 % lower than that of all healthy records does, and detectors
 # take its error for damage. With the chain of all healthy records, the same assumed damage gives a rank correlation of
-# 0.96, and all false alarms lie in their bands; of found damage still only 5 of 22 rates do, since the bands hold noise
+# 0.96, and all false alarms lie in their bands; of found damage still only 5 of 22 rates do, since bands include noise
 # alone.
 # :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` warns of such weather.
 #
@@ -330,8 +330,8 @@ memory.cleanup()
 # third of the false alarms or less. On the real damage this order is wrong: the trees find 82 %, the others 91 to 92 %.
 # At equal false alarms, 20 neighbours come first; whitened residuals of the chain and of piecewise-linear regression
 # are 1 point behind, which is not significant, and the trees 8 points. So simulation leaves a handful of good detectors
-# of 22. A margin of 1 or 2 points between them, with bounds that hold noise alone, is no reason to choose; prefer those
-# that stay well below the limit.
+# of 22. A margin of 1 or 2 points between them, with bounds that include noise alone, is no reason to choose; prefer
+# those that stay well below the limit.
 #
 # The local outlier factor finds most, but raises 4.1 % false alarms and is out. Had the weather been the one that the
 # detectors have learned (``choose(bridge, candidates, ahead=False)``), it would have kept the limit and been chosen: it

@@ -1,4 +1,4 @@
-"""How often a study's bands hold what a measured campaign then shows, with the right FE model and with a wrong one.
+"""Coverage of a study's prediction intervals for a measured campaign, with the right FE model and with a wrong one.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/study_bands.py
 
@@ -15,7 +15,8 @@ Bands: of the noise alone; with other weather; with other training records too, 
 study has by default; with an ensemble of models, too, ``models=updater.sample_models(20)``. The model is calibrated to
 the mean of the records by `ModelUpdater`, or only its offset is removed ("aligned"). States of which the measured share
 is between 5 and 95 % are counted apart: of the others, nearly every band holds. The exit code is 1 if the ensemble's
-bands hold less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the share.
+intervals cover less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the
+share.
 """
 
 import argparse
@@ -236,7 +237,7 @@ def realisation(kind, seed, options):
 
 
 def table(found):
-    """Shares that bands hold, in percent, by model, calibration and kind of band."""
+    """Shares that intervals cover, in percent, by model, calibration and kind of band."""
     rows = {}
     for key, part in found.groupby(["model", "calibrated", "band"], sort=False):
         damaged = part[part["state"] != "healthy"]

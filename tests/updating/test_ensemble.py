@@ -155,6 +155,7 @@ def test_same_seed_same_models_whatever_the_number_of_jobs():
     assert not np.allclose(found[0], found[2], rtol=1e-4)
 
 
+@pytest.mark.nightly
 def test_shapes_make_models_alike_as_far_as_their_noise_allows():
     dofs, noise = np.arange(0, 22, 2), 0.01
     frequencies, shapes = (values[0] for values in TRUSS.modes([TRUTH]))
