@@ -81,8 +81,8 @@ print(fem.report_)
 #
 #    2240 of 2240 rows trained the temperature mapper.
 #    Solved by the full model: it has no reduced model.
-#    13 rows have parameters outside the bounds of the inverse.
-#    Errors are in-sample, of 365 rows spread evenly over those that trained.
+#    13 of 2240 rows have parameters outside the bounds of the inverse surrogate.
+#    MAPE is in-sample, of 365 rows spread evenly over the training rows.
 #
 #        offset (%)  MAPE (%)  MAPE of the mean (%)  noise (%)  weather (%)  discrepancy (%)  round trip (%)
 #    f1        2.50     0.400                 1.841      0.454        2.373            0.016             0.0

@@ -14,8 +14,9 @@ from typing import Any
 import pandas as pd
 
 import skthermo
-from skthermo._estimators.warnings import reported_by_caller
+from skthermo._estimators.warnings import reported_by_caller, warn_user
 from skthermo._io import alone_with
+from skthermo._tables.text import counted
 from skthermo.commands._new_records import (
     NewFile,
     Taken,
@@ -28,7 +29,8 @@ from skthermo.commands._new_records import (
 from skthermo.commands._outputs import append_transitions
 from skthermo.commands._record_files import CsvFormat, in_zone, read_file
 from skthermo.commands._settings import Settings, read_settings
-from skthermo.monitoring import Monitor, MonitorStatus, load_monitor
+from skthermo.exceptions import SkthermoWarning
+from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
@@ -139,10 +141,24 @@ class Bridge:
         done.state = done.status.state if state is None else state
         done.code = FAILED if done.errors and done.state != "alarm" else CODES[done.state]
         reason = reason or (done.status.reason if done.state != "alarm" else "")
-        newest = f"newest record {monitor.last_}" if len(monitor.days_) else "no record came yet"
+        newest = f"newest record {monitor.last_}" if len(monitor.days_) else "no record since the baseline"
         why = f"{', as' if done.state == 'not evaluated' else ';'} {reason}" if reason else ""
         done.lines.append(f"state: {done.state} ({newest}){why}")
         done.lines += monitor.summary().splitlines()[1:]
+        self.warn_of_changes()
+
+    def warn_of_changes(self) -> None:
+        """Warn of settings that have changed since the fit, by which the monitor does not go yet."""
+        before = None if self.settings is None else Taken.read(self.taken_file).settings
+        changed = [] if self.settings is None or before is None else self.settings.changed_since(before)
+        if changed:
+            warn_user(
+                f"{self.file}: {counted(len(changed), 'setting')} changed since the monitor was fitted: "
+                f"{', '.join(changed)}; the monitor goes on with those of its fit: expected skthermo fit {self.file} "
+                "--replace, or the settings as they were",
+                SkthermoWarning,
+                "changed-settings",
+            )
 
     def append_transitions(self, monitor: Monitor, done: Done) -> None:
         """Append what has changed to the file of transitions, for whoever holds the lock of the monitor."""
@@ -205,7 +221,8 @@ def fit(bridge: Bridge, done: Done) -> None:
             old = bridge.monitor_file
             old.replace(old.with_name(f"{old.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{old.suffix}"))
         monitor.save(bridge.monitor_file)
-        Taken(bridge.taken_file, layouts, {}, datetime.now(UTC).isoformat(timespec="seconds")).write()
+        fitted = datetime.now(UTC).isoformat(timespec="seconds")
+        Taken(bridge.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
     settings.path(settings.records.folder).mkdir(exist_ok=True)
     done.written.append(bridge.monitor_file)
     done.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
@@ -336,8 +353,8 @@ def _described_update(
     states = {state: int((new["state"] == state).sum()) if len(new) else 0 for state in CODES}
     reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts().to_dict() if len(new) else {}
     n_revised, n_ahead = len(evaluated) - len(new), after["n_ahead"]
-    counted = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
-    shown = f" ({', '.join(counted)})" if len(evaluated) else ""
+    numbers = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
+    shown = f" ({', '.join(numbers)})" if len(evaluated) else ""
     done.lines.append(f"new: {len(new)}{shown}; {others}")
     done.lines += [f"evaluated anew, as records came late: {n_revised}"] if n_revised else []
     done.lines += [f"set aside, stamped too far ahead: {n_ahead}"] if n_ahead else []
@@ -393,18 +410,41 @@ def acknowledge(bridge: Bridge, done: Done) -> None:
         bridge.append_transitions(monitor, done)
 
 
+def refit(bridge: Bridge, done: Done) -> None:
+    """Learn anew from the baseline and the records since, and save the monitor."""
+    options = bridge.options
+    _retrained(bridge, done, lambda monitor: monitor.refit(until=options.until, force=options.force))
+
+
 def rebaseline(bridge: Bridge, done: Done) -> None:
     """Begin a new baseline after a repair, and save the monitor."""
+    options = bridge.options
+    _retrained(bridge, done, lambda monitor: monitor.rebaseline(options.since, until=options.until))
+
+
+def _retrained(bridge: Bridge, done: Done, retrain: Callable[[Monitor], Retraining]) -> None:
     with bridge.alone():
         monitor = bridge.load()
-        retraining = monitor.rebaseline(bridge.options.since, until=bridge.options.until)
+        retraining = retrain(monitor)
         if retraining.accepted:
             monitor.save(bridge.monitor_file)
         done.lines += retraining.summary().splitlines()
         bridge.described(monitor, done)
         done.code = HEALTHY
         if not retraining.accepted:
-            done.failed(ValueError("the new baseline was refused, and the monitor is as it was before"))
+            done.failed(ValueError(f"the {retraining.kind} was refused, and the monitor is as it was before"))
+        bridge.append_transitions(monitor, done)
+
+
+def discard(bridge: Bridge, done: Done) -> None:
+    """Take back records that should not have been taken in, and save the monitor."""
+    with bridge.alone():
+        monitor = bridge.load()
+        number = monitor.discard(bridge.options.since, bridge.options.until)
+        monitor.save(bridge.monitor_file)
+        done.lines.append(f"records taken back: {number}")
+        bridge.described(monitor, done)
+        done.code = HEALTHY
         bridge.append_transitions(monitor, done)
 
 

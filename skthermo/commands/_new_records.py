@@ -36,23 +36,24 @@ class NewFile:
 class Taken:
     """What has been taken in from which files, kept beside the monitor.
 
-    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit. For each
-    file there are its size, the time
-    of its last change, and how many of its first rows are done, with a checksum of these. If a command is killed after
-    it has saved the monitor, rows come again, and the monitor knows them.
+    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit, and
+    ``settings`` are those of the fit. For each file there are its size, the time of its last change, and how many of
+    its first rows are done, with a checksum of these. If a command is killed after it has saved the monitor, rows come
+    again, and the monitor knows them.
     """
 
     file: Path
     layouts: list[list[str]] = field(default_factory=list)
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
     fitted: str = ""
+    settings: dict[str, Any] | None = None
 
     @classmethod
     def read(cls, file: Path) -> Taken:
         """What an earlier call has left in a file beside the monitor; nothing if that cannot be read."""
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            return cls(file, content["layouts"], content["files"], content["fitted"])
+            return cls(file, content["layouts"], content["files"], content["fitted"], content.get("settings"))
         except (OSError, ValueError, KeyError, TypeError):
             return cls(file)
 

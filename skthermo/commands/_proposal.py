@@ -138,7 +138,8 @@ class Proposal:
 
         def monitor(kind: str, chosen: Mapping[str, Any]) -> Monitor:
             detector = class_named(kind, CLASSES["detector"])(**chosen)
-            return Settings(Path(), Files(), self.records, self.form, parts | {"detector": detector}, options).monitor()
+            found = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
+            return found.monitor()
 
         return candidates(self.step, self.baseline, monitor)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import inspect
+import json
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -143,6 +144,9 @@ CLASSES: dict[str, tuple[str, ...]] = {
 }
 """Sections that name the class they call, and the packages of these; ``features`` are several, one after the other."""
 
+OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "monitor", "fem")
+"""Sections of which changes take effect with the next fit."""
+
 
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
     """Parameters of a class or function by name, with their descriptions."""
@@ -174,10 +178,12 @@ def _descriptions(doc: str) -> Iterator[tuple[str, str]]:
 class Settings:
     """Settings of one monitor, checked.
 
-    ``parts`` are unfitted estimators by section, ``options`` the values of the other sections.
+    ``content`` is what the file says, ``parts`` are unfitted estimators by section, ``options`` the values of the other
+    sections.
     """
 
     file: Path
+    content: Mapping[str, Any]
     files: Files
     records: Records
     csv: CsvFormat
@@ -188,6 +194,23 @@ class Settings:
     def name(self) -> str:
         """Name of the bridge."""
         return self.files.name or self.file.resolve().parent.name
+
+    @property
+    def of_a_fit(self) -> dict[str, Any]:
+        """Sections that a fit takes over, as JSON has them."""
+        return json.loads(json.dumps({name: self.content.get(name) for name in OF_A_FIT}, default=str))
+
+    def changed_since(self, before: Mapping[str, Any]) -> list[str]:
+        """Names of settings that were others when the monitor was fitted, such as "[detector] window"."""
+        found = []
+        for section, value in self.of_a_fit.items():
+            known = before.get(section)
+            if isinstance(value, dict) and isinstance(known, dict):
+                keys = [key for key in known | value if known.get(key) != value.get(key) and key != "folder"]
+                found += [f"[{section}] {key}" for key in keys]
+            elif value != known:
+                found.append(f"[{section}]")
+        return found
 
     def path(self, name: str) -> Path:
         """A file that the settings name: beside them, if it has no folder of its own."""
@@ -267,7 +290,7 @@ class _Reader:
         steps = enumerate(self.content.get("features", ()))
         parts["features"] = [self._made("features", n, given) for n, given in steps]
         options = {name: self._values(name) for name in ("compensator", "monitor", "fem", "page")}
-        found = Settings(self.file, files, records, form, parts, options)
+        found = Settings(self.file, self.content, files, records, form, parts, options)
         self._check(found)
         return found
 

@@ -9,6 +9,8 @@
     skthermo report bridge/monitor.toml            write the owner's page
     skthermo acknowledge bridge/monitor.toml 3 --harmless --note "a special transport"
     skthermo rebaseline bridge/monitor.toml --since 2027-05-01
+    skthermo refit bridge/monitor.toml             learn anew, the records since the fit included
+    skthermo discard bridge/monitor.toml --since 2027-05-01 --until 2027-05-03
 
 The folder stands for the monitor.toml in it, and the file of a monitor alone, .skops or .joblib, for settings. Several
 settings in one call are a fleet.
@@ -40,6 +42,7 @@ from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bri
 from skthermo.commands._outputs import as_json, write_metrics
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
+OF_ONE = ("acknowledge", "rebaseline", "refit", "discard")  # commands on a single monitor
 WORST = (ALARM, FAILED, NOT_EVALUATED, HEALTHY)
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
 
@@ -147,6 +150,8 @@ def _parser() -> Parser:
         ("report", "write the page for the owner", _bridge.report),
         ("acknowledge", "say what an event was", _bridge.acknowledge),
         ("rebaseline", "begin a new baseline after a repair", _bridge.rebaseline),
+        ("refit", "learn anew from the baseline and the records since", _bridge.refit),
+        ("discard", "take back records, such as those stamped by a wrong clock", _bridge.discard),
     )
     for name, text, work in works:
         _on_monitors(add(name, text, partial(_on_bridges, work)), name)
@@ -166,7 +171,7 @@ def _on_records(one: argparse.ArgumentParser) -> None:
 
 def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
     """Options of commands on monitors."""
-    many = {} if name in ("acknowledge", "rebaseline") else {"nargs": "+"}
+    many = {} if name in OF_ONE else {"nargs": "+"}
     what = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
     one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
     one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
@@ -195,7 +200,11 @@ def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
     kinds.add_argument("--damage", action="store_true", help="its records may not")
     parsers["acknowledge"].add_argument("--note", default="", help="what was found")
     parsers["rebaseline"].add_argument("--since", required=True, metavar="TIME", help="when the work was complete")
-    parsers["rebaseline"].add_argument("--until", metavar="TIME", help="last moment that may train")
+    for name in ("rebaseline", "refit"):
+        parsers[name].add_argument("--until", metavar="TIME", help="last moment that may train")
+    parsers["refit"].add_argument("--force", action="store_true", help="take over whatever speaks against it")
+    parsers["discard"].add_argument("--since", required=True, metavar="TIME", help="first stamp of the records")
+    parsers["discard"].add_argument("--until", metavar="TIME", help="last stamp (default: all records since)")
 
 
 def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:

@@ -87,7 +87,7 @@ class BridgeOutcome:
     late_warnings: tuple[Warned, ...] = ()  # of the last update
     failures: tuple[Failure, ...] = ()
     seconds: float = 0.0
-    n_bytes: int = 0
+    n_bytes: float = 0
 
     def status_at(self, now: Any, max_age: Any) -> MonitorStatus:
         """How the bridge is at a time; after an error nothing is known of its newest records."""

@@ -17,6 +17,7 @@ from skthermo.monitoring import Monitor
 FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned
 HEAVIEST = 0.9  # shape of a tail: from 1 on it has no mean
 LONGEST = 100_000  # days
+MOST_TAILS = 100  # that are learned, each from all bridges but one or, of more bridges, but one in a hundred
 COLUMNS = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
 
 
@@ -46,10 +47,11 @@ class Discoveries:
     Notes
     -----
     Benjamini and Hochberg's procedure on the bridges' p values, which also holds where common weather makes them
-    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others:
-    a generalised Pareto law of their excesses, each over the mean excess of its own baseline, never lighter than an
-    exponential one. So it allows for outliers that the bridge's own baseline does not show, but not for weather that no
-    baseline shows. With few other bridges, the tail is that of `Monitor.event_p_values`.
+    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others
+    (of more than a hundred bridges, from 99 in 100): a generalised Pareto law of their excesses, each over the mean
+    excess of its own baseline, never lighter than an exponential one. So it allows for outliers that the bridge's own
+    baseline does not show, but not for weather that no baseline shows. With few other bridges, the tail is that of
+    `Monitor.event_p_values`.
 
     References
     ----------
@@ -89,7 +91,7 @@ class Discoveries:
         Returns
         -------
         str
-            Plain sentences.
+            One sentence a line.
         """
         names, is_open = self.bridges, self.table["end"].isna()
         n_open = self.table.loc[is_open, "bridge"].nunique()
@@ -100,11 +102,11 @@ class Discoveries:
             f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
             if n_open
             else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
-            f"If all bridges stay healthy, expect {alarms} a year over all bridges, {false} of them significant; "
-            f"of the significant bridges {percent(self.fdr)} are healthy on average.",
+            f"Expected if all bridges are healthy: {alarms} a year over all bridges, {false} of them significant.",
+            f"False discovery rate: {percent(self.fdr)} of the significant bridges are healthy on average.",
         ]
         if self.not_evaluated:
-            lines.append(f"Not evaluated, and so not known to be healthy: {listed(self.not_evaluated)}.")
+            lines.append(f"Not evaluated, state not known: {listed(self.not_evaluated)}.")
         return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -126,11 +128,14 @@ def discover(
         except Exception:  # damaged files raise errors of every type, which are in the table of errors
             not_evaluated.append(name)
             watched.pop(name, None)
-    tables, p_values, years = [], {}, {}
+    tables, p_values, years, shapes = [], {}, {}, {}
+    parts = {name: number % MOST_TAILS for number, name in enumerate(excesses)}
     for name, (table, since, n_years) in watched.items():
         if len(table):
-            shape = tail_shape([one for other, one in excesses.items() if other != name])
-            p = monitors[name].event_p_values(since, tail_shape=shape)
+            part = parts[name]
+            if part not in shapes:
+                shapes[part] = tail_shape([one for other, one in excesses.items() if parts[other] != part])
+            p = monitors[name].event_p_values(since, tail_shape=shapes[part])
             table = table.assign(p_value=p.reindex(table.index)).reset_index().assign(bridge=name)[COLUMNS]
         is_blind = standings[name]["state"] == "not evaluated" or not n_years
         if (is_blind and not len(table)) or (len(table) and table["p_value"].isna().any()):

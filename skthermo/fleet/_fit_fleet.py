@@ -15,7 +15,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo.exceptions import SkthermoWarning
-from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of, unpickled
+from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of
 from skthermo.fleet._fleet import Fleet, named, warn_of_bridges
 from skthermo.fleet._storage import Storage
 from skthermo.fleet._workers import run_tasks
@@ -156,10 +156,9 @@ def fit_fleet(
 
 def _restore(storage: Storage, name: Hashable) -> None:
     """Take back what was said of a bridge while its records could not be had."""
-    fitted = storage.fitted(name)
-    watch = unpickled(fitted)[1]
+    watch = storage.objects(name)[1]
     standing = {} if watch is None else {"standing": standing_of(watch)}
-    storage.put(replace(storage.outcomes[name], failures=(), **standing), fitted)
+    storage.put(replace(storage.outcomes[name], failures=(), **standing), None)
 
 
 def _base(random_state: Any) -> int:

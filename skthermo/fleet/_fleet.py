@@ -48,27 +48,27 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
     fitted = table[table["is_fitted"]]
     watched = fitted[fitted["state"] != ""]
     if len(watched) < len(fitted):
-        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor: nothing is known of their state."
+        yield f"{len(fitted) - len(watched)} fitted bridges have no monitor; their state is not known."
     if len(watched):
         begun = watched["last"].notna()
         if not begun.all():
             yield (
-                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted: nothing is "
-                "known of their bridges."
+                f"{(~begun).sum()} of {len(watched)} monitors have had no record since they were fitted; the state of "
+                "their bridges is not known."
             )
         watched = watched[begun]
     if len(watched):
         state = watched["state"]
         yield (
-            f"Of {len(watched)} monitors {(state == 'alarm').sum()} are in alarm, {(state == 'not evaluated').sum()} "
-            f"cannot evaluate it, {(state == 'healthy').sum()} saw no change in their newest record."
+            f"Newest records of {len(watched)} monitors: {(state == 'alarm').sum()} in alarm, "
+            f"{(state == 'healthy').sum()} healthy, {(state == 'not evaluated').sum()} not evaluated."
         )
         if (state == "alarm").any():
             yield f"In alarm: {named(watched.index[state == 'alarm'])}."
         if (state == "watch").any():
-            yield f"To be watched, with a raised index but no alarm: {named(watched.index[state == 'watch'])}."
+            yield f"Raised damage index without an alarm (watch): {named(watched.index[state == 'watch'])}."
         if (state == "not evaluated").any():
-            yield f"Not evaluated, and so not known to be healthy: {named(watched.index[state == 'not evaluated'])}."
+            yield f"Not evaluated, state not known: {named(watched.index[state == 'not evaluated'])}."
         silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
         if len(silent):
             yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."
@@ -137,7 +137,7 @@ class Fleet:
     from it to the newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``;
     ``alarm_rate``, the share of evaluated records in an event; ``n_events`` of damage, and those that are open,
     ``n_open``; ``drift``, the largest change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit;
-    ``megabytes`` of the fitted objects.
+    ``megabytes`` of the fitted objects, NaN where they are kept elsewhere.
 
     A bridge whose new records could not be evaluated is "not evaluated", or "alarm" while an event is open.
 
@@ -174,7 +174,8 @@ class Fleet:
         Parameters
         ----------
         monitors : mapping of name to Monitor
-            Fitted monitors, copies of which are kept; a mapping may read each when it is asked for.
+            Fitted monitors. Copies of those of a dict are kept; any other mapping is asked again each time, so that it
+            may read each from its file, and none stays in memory.
         errors : mapping of name to exception, optional
             Bridges whose newest records, or whose monitor, could not be used, and why.
 
@@ -190,15 +191,21 @@ class Fleet:
         NotFittedError
             If a monitor is not fitted.
         """
-        storage = Storage()
+        is_copied = isinstance(monitors, dict)
+        storage = Storage(elsewhere={} if is_copied else monitors)
         failures = {name: Failure.of("update", error) for name, error in (errors or {}).items()}
         for name in monitors:
             monitor = monitors[name]
-            fitted = pickled((None, monitor))
-            facts = {"n_records": len(monitor.baseline_)}
-            outcome = BridgeOutcome(name, is_fitted=True, facts=facts, **known_of(monitor), n_bytes=len(fitted))
+            outcome = BridgeOutcome(
+                name, is_fitted=True, facts={"n_records": len(monitor.baseline_)}, **known_of(monitor)
+            )
             failure = failures.pop(name, None)
-            storage.put(outcome if failure is None else not_evaluated(outcome, failure), fitted)
+            outcome = outcome if failure is None else not_evaluated(outcome, failure)
+            if is_copied:
+                fitted = pickled((None, monitor))
+                storage.put(replace(outcome, n_bytes=len(fitted)), fitted)
+            else:
+                storage.outcomes[name] = replace(outcome, n_bytes=np.nan)
         for name, failure in failures.items():
             storage.put(BridgeOutcome(name, failures=(failure,)), None)
         if not storage.outcomes:
@@ -448,7 +455,7 @@ class ReadWhenAsked(Mapping):
 
     def __getitem__(self, name: Hashable) -> Any:
         storage, place = self._places[name]
-        return unpickled(storage.fitted(name))[place]
+        return storage.objects(name)[place]
 
     def __iter__(self) -> Iterator[Hashable]:
         return iter(self._places)

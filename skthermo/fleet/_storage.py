@@ -5,14 +5,16 @@ from __future__ import annotations
 import pickle
 import re
 import zlib
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from skthermo._io import alone_with, write_when_complete
-from skthermo.fleet._bridge import BridgeOutcome, Failure
+from skthermo.fleet._bridge import BridgeOutcome, Failure, pickled, unpickled
+from skthermo.monitoring import Monitor
 
 ENDING, REPLACED = ".bridge", ".replaced"
 LONGEST = 40  # letters of a name that its file shows
@@ -21,11 +23,12 @@ SECONDS_TO_WAIT = 60.0  # for another process that works on the same folder
 
 @dataclass
 class Storage:
-    """Outcomes by name, at hand; fitted objects as bytes, in memory or in a folder."""
+    """Outcomes by name, at hand; fitted objects as bytes in a folder or in memory, or monitors read elsewhere."""
 
     folder: Path | None = None
     outcomes: dict[Hashable, BridgeOutcome] = field(default_factory=dict)
     in_memory: dict[Hashable, bytes] = field(default_factory=dict)
+    elsewhere: Mapping[Hashable, Monitor] = field(default_factory=dict)
 
     def read(self) -> None:
         """Read what the folder holds; a file that cannot be read is a bridge that is not fitted."""
@@ -55,7 +58,15 @@ class Storage:
 
     def fitted(self, name: Hashable) -> bytes:
         """Fitted objects of a bridge as bytes."""
-        return self.in_memory[name] if self.folder is None else _content(self._file(name))[1]
+        if self.folder is not None:
+            return _content(self._file(name))[1]
+        return self.in_memory[name] if name in self.in_memory else pickled(self.objects(name))
+
+    def objects(self, name: Hashable) -> tuple[Any, Monitor | None]:
+        """The fitted estimator of a bridge, None elsewhere, and its monitor."""
+        if self.folder is None and name not in self.in_memory:
+            return None, self.elsewhere[name]
+        return unpickled(self.fitted(name))
 
     @contextmanager
     def alone(self) -> Iterator[None]:

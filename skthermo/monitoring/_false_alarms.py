@@ -221,8 +221,8 @@ class FalseAlarmEstimate:
     def __str__(self) -> str:
         expected = counted_number(self.expected, "false alarm")
         return (
-            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year (90 %); {self.method}"
-            + (f"; no estimate for {self.missing_season}" if self.missing_season else "")
+            f"{expected} a year on average, {self.lowest} to {self.highest} in a single year with probability 90 %; "
+            f"{self.method}" + (f"; no estimate for {self.missing_season}" if self.missing_season else "")
         )
 
     def p_value(self, peak: float, n_years: float, shape: float | None = None) -> float:
@@ -312,8 +312,9 @@ def estimate_false_alarms(
         _days_without_records(known.index),
     )
     lowest, highest = tail.numbers(asked, n_years)
-    method = f"by the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline" + (
-        ", extrapolated" if asked < FAR else ""
+    method = (
+        f"from the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline"
+        + (", extrapolated" if asked < FAR else "")
     )
     seen = None if smallest_at is None else smallest_at(rule.threshold)
     _warn_of_baseline(excursions, tail, rule, asked, per_year, years, missing_season, seen)

@@ -253,6 +253,17 @@ class Monitor(SavesFrames, Estimator):
     def __sklearn_clone__(self) -> Monitor:
         return type(self)(**self.get_params(deep=False) | {"detector": clone(self.detector)})  # the chain is shared
 
+    def __getstate__(self) -> dict[str, Any]:
+        state = super().__getstate__()
+        if "active_" in state and self.active_.trained is self.status_.store.baseline:  # most often: saved once
+            state["active_"] = replace(self.active_, trained=None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        if "active_" in state and self.active_.trained is None:
+            self.active_ = replace(self.active_, trained=self.status_.store.baseline)
+
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
         """Fit the detector to a baseline, and set the threshold of events.
@@ -328,7 +339,8 @@ class Monitor(SavesFrames, Estimator):
                 "placeholders",
             )
         _refuse_meaningless(trained, self.targets_, self.units_)
-        trained, columns = trained[inputs], inputs if compensators else self.targets_
+        trained = trained if len(inputs) == trained.shape[1] else trained[inputs]
+        columns = inputs if compensators else self.targets_
         active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
         active.check()
         store = RecordStore.of(baseline, max_delay, max_jump, retention)
@@ -586,7 +598,7 @@ class Monitor(SavesFrames, Estimator):
         return number
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
-        """Learn anew from the baseline and the records since, if the new detector is not clearly worse.
+        """Learn anew from the baseline and the records since, if the new detector is not significantly worse.
 
         Parameters
         ----------
@@ -747,29 +759,30 @@ class Monitor(SavesFrames, Estimator):
         evaluations = self.status_.evaluations
         newest = [f"newest record {self.last_}", evaluations["reason"].iloc[-1]] if len(evaluations) else []
         lines = [
-            f"state: {self.state()} ({'; '.join(filter(None, newest)) or 'no record came yet'})",
+            f"state: {self.state()} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})",
             f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
             f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
             f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
-            f"damage events: open with {self.persistence} of {2 * self.persistence - 1} records above "
-            f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}; {self.false_alarm_estimate_}",
+            f"damage events: open when {self.persistence} of {2 * self.persistence - 1} damage indices exceed "
+            f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}",
+            f"expected: {self.false_alarm_estimate_}",
             *_watch_in_words(self.watch_threshold_, self.watch_per_year, self.events_),
-            f"smallest change: {self.smallest_changes_}, in weather of the baseline",
+            f"smallest change: {self.smallest_changes_} in weather of the baseline",
             *_events_in_words(self.events_[self.events_["kind"] != WATCH]),
         ]
         faults = self.faults_
         for _, fault in faults[faults["until"].isna()].iterrows():
             lines.append(f"sensor: {fault['column']} {fault['kind']} since {fault['since']}")
         if drift is not None:
-            found = "the structure drifts" if drift["significant"].any() else "none is seen"
-            lines.append(f"drift: {found} (probability by chance {probability_text(drift['p_value'].iloc[0])})")
+            found = "significant" if drift["significant"].any() else "not significant"
+            lines.append(f"drift: {found} (p value {probability_text(drift['p_value'].iloc[0])})")
             lines += [
                 f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
                 f"{'; beyond the limit' if one['beyond_limit'] else ''}"
                 for group, one in drift[drift["significant"]].iterrows()
             ]
             n_days = self.status_.corrections.drift.n_left_out
-            lines += [f"drift: not followed for {counted(n_days, 'day')}, as responses changed at once"] * (n_days > 0)
+            lines += [f"drift: {counted(n_days, 'day')} left out, on which responses changed abruptly"] * (n_days > 0)
         return "\n".join(lines)
 
     @property
@@ -951,7 +964,7 @@ def _watch_in_words(threshold: float | None, per_year: float | None, events: pd.
     opened = [
         f"event {number} is open since {event['start']}" for number, event in events.iterrows() if pd.isna(event["end"])
     ]
-    said = [f"opens above {threshold:.4g}", f"{per_year:g} false ones a year", f"{len(events)} so far", *opened]
+    said = [f"opens above {threshold:.4g}", f"{per_year:g} false a year expected", f"{len(events)} so far", *opened]
     return [f"watch: {'; '.join(said)}"]
 
 

@@ -307,7 +307,7 @@ class MemoryFindings(SavesFrames):
     >>> from skthermo.preprocessing import find_memory
     >>> memory = find_memory([[4.0], [5.0]], [[2.1], [2.0]])
     >>> print(memory.summary())
-    No memory found: means of earlier temperatures do not explain the frequencies clearly better.
+    No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough.
     >>> memory.fall
     0.0
     """
@@ -325,11 +325,11 @@ class MemoryFindings(SavesFrames):
             The means that explain the frequencies, and by how much the error falls.
         """
         if self.features is None:
-            return "No memory found: means of earlier temperatures do not explain the frequencies clearly better."
+            return "No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough."
         means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
         return (
-            f"The frequencies remember the weather: with exponentially weighted means over {means}, the out-of-fold "
-            f"error falls by {self.fall:.0%}."
+            "The frequencies depend on earlier temperatures: exponentially weighted means over "
+            f"{means} reduce the out-of-fold error by {self.fall:.0%}."
         )
 
     @property

@@ -198,18 +198,18 @@ class Identifiability(Bunch):
         if self.rank < len(names):
             more = "more degrees of freedom" if self.n_dofs else "shapes"
             yield (
-                f"At most {self.rank} of the {len(names)} parameters can be found together. Records in other weather "
-                f"do not help, since weather changes the parameters: expected fewer parameters, more modes, {more}, or "
-                "a prior."
+                f"At most {self.rank} of the {len(names)} parameters are identifiable together. Records in other "
+                f"weather do not help, since weather changes the parameters; expected fewer parameters, more modes, "
+                f"{more}, or a prior."
             )
         for group in self.collinear:
             yield f"Cannot be distinguished: {listed(group)}."
-        within = f"within {100 * ACCURATE:g} % with this noise"
+        within = f"a standard deviation of at most {100 * ACCURATE:g} % at this noise"
         if self.recommended:
-            others = ", the others being known" if len(self.recommended) < len(names) else ""
-            yield f"Can be found together {within}{others}: {listed(self.recommended)}."
+            others = " if the others are known" if len(self.recommended) < len(names) else ""
+            yield f"Identifiable together with {within}{others}: {listed(self.recommended)}."
         else:
-            yield f"No parameter can be found {within}."
+            yield f"No parameter is identifiable with {within}."
 
 
 def identifiability(
@@ -242,7 +242,7 @@ def identifiability(
     Bunch
         With the method ``summary()``, which says the same in sentences, and the attributes
 
-        - ``rank``: number of parameters that can be found together, at most that of modes where no shapes are measured;
+        - ``rank``: number of parameters identifiable together, at most that of modes where no shapes are measured;
         - ``n_modes``, ``n_dofs``: number of modes, and of degrees of freedom where their shapes are measured;
         - ``sensitivity``: d ln f / d ln theta, a frame of shape (n_modes, n_parameters);
         - ``singular_values``, ``condition_number``: of the sensitivities, each row multiplied by the root mean square
@@ -283,13 +283,14 @@ def identifiability(
     >>> identifiability(make_truss(), noise=0.001).recommended
     ['diagonal', 'bottom', 'top']
 
-    Four parameters cannot be found from three modes:
+    Three modes do not identify four parameters:
 
     >>> print(identifiability(make_truss(n_modes=3), noise=0.001).summary())
     4 parameters, 3 modes.
-    At most 3 of the 4 parameters can be found together. Records in other weather do not help, since weather changes the
-    parameters: expected fewer parameters, more modes, shapes, or a prior.
-    Can be found together within 10 % with this noise, the others being known: bottom, diagonal and top.
+    At most 3 of the 4 parameters are identifiable together. Records in other weather do not help, since weather changes
+    the parameters; expected fewer parameters, more modes, shapes, or a prior.
+    Identifiable together with a standard deviation of at most 10 % at this noise if the others are known: bottom,
+    diagonal and top.
     """
     check_model(model)
     names = list(model.parameter_names)

@@ -184,6 +184,34 @@ def test_commands_that_an_engineer_uses(bridge, records):
     assert valid(report.json)["bridges"][0]["written"] == [str(bridge / "other.html")]
 
 
+def test_records_are_taken_back_and_learned(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 40)
+    run("update", settings(bridge), "--now", now)
+    last = records.index[FIRST + 30]
+    back = run("discard", settings(bridge), "--since", records.index[FIRST + 31], "--now", now, "--json")
+    (said,) = valid(back.json)["bridges"]
+    assert (back.code, said["transitions"][0]["what"]) == (0, "discarded")
+    expected = load_monitor(bridge / "monitor.joblib")
+    assert expected.last_ == last
+    learned = run("refit", settings(bridge), "--force", "--now", now, "--json")
+    assert (learned.code, valid(learned.json)["bridges"][0]["transitions"][0]["what"]) == (0, "refit")
+    expected.refit(force=True)
+    assert load_monitor(bridge / "monitor.joblib").threshold_ == expected.threshold_
+    assert run("discard", settings(bridge), "--since", "2040-01-01").code == FAILED
+
+
+def test_settings_that_change_after_a_fit_are_reported_until_the_next_fit(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 10)
+    assert "changed-settings" not in run("update", settings(bridge), "--now", now).err
+    edit(settings(bridge), "watch_per_year = 12.0", "watch_per_year = 6.0")
+    changed = run("status", settings(bridge), "--now", now, "--json")
+    assert any(
+        "[monitor] watch_per_year" in one and "changed-settings" in one for one in valid(changed.json)["warnings"]
+    )
+    assert "changed-settings" not in run("fit", settings(bridge), "--replace").err
+    assert "changed-settings" not in run("status", settings(bridge), "--now", now).err
+
+
 def test_status_by_the_clock_says_what_the_page_says(bridge, records):
     now = write_day(records, bridge, FIRST, FIRST + 10)
     assert run("update", settings(bridge), "--now", now).code == HEALTHY

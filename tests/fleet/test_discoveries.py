@@ -135,3 +135,27 @@ def test_significant_bridges_are_in_alarm_and_ended_events_wait_for_an_explanati
     assert found.p_values.to_dict() == {"damaged": 1e-6, "by chance": 0.5, "ended": 1.0, "explained": 1.0}
     assert found.summary().startswith("2 of 4 evaluated bridges are in alarm, 1 of them significantly")
     assert found.false_alarms_per_year == 4.0
+
+
+def test_the_tail_of_a_bridge_is_learned_from_others(monkeypatch):
+    monkeypatch.setattr("skthermo.fleet._discoveries.MOST_TAILS", 4)
+    asked, found = [], {}
+
+    class Asks(Watched):
+        def event_p_values(self, since, *, tail_shape):
+            found[id(self)] = tail_shape
+            return super().event_p_values(since, tail_shape=tail_shape)
+
+    def total(excesses):
+        asked.append(excesses)
+        return sum(one[0] for one in excesses)
+
+    monkeypatch.setattr("skthermo.fleet._discoveries.tail_shape", total)
+    monitors = {name: Asks(0.5) for name in range(10)}
+    for name, one in monitors.items():
+        one.false_alarm_estimate_.tail = Tail(10.0, (2.0**name,))
+    discover(monitors, {name: {"last": one.last_, "state": "healthy"} for name, one in monitors.items()}, 0.1, 365.25)
+    assert len(asked) == 4
+    for name, one in monitors.items():
+        of_others = [2.0**other for other in monitors if (other - name) % 4]
+        assert found[id(one)] == sum(of_others)

@@ -10,6 +10,7 @@ from collections import Counter
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 
 import joblib
 import numpy as np
@@ -130,7 +131,7 @@ def test_nothing_known_is_never_healthy(fleet):
     text = fleet.summary()
     assert "5 of 6 bridges are fitted." in text
     assert "Not fitted: broken." in text
-    assert "5 of 5 monitors have had no record since they were fitted: nothing is known of their bridges." in text
+    assert "5 of 5 monitors have had no record since they were fitted; the state of their bridges is not known." in text
     assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not evaluated)"
 
 
@@ -359,6 +360,13 @@ def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
     pd.testing.assert_frame_equal(made.table[columns], fitted.table[columns])
     pd.testing.assert_frame_equal(made.events, fitted.events)
     assert made.discoveries().bridges == fitted.discoveries().bridges == ["b"]
+    elsewhere = Fleet.of_monitors(MappingProxyType(single))  # asked for each monitor again
+    pd.testing.assert_frame_equal(elsewhere.table.drop(columns="megabytes"), made.table.drop(columns="megabytes"))
+    pd.testing.assert_frame_equal(elsewhere.discoveries().table, made.discoveries().table)
+    for both in (elsewhere, made):
+        both.acknowledge("b", 1, harmless=True)
+        assert both.events.loc[both.events["bridge"] == "b", "harmless"].tolist() == [True]
+    assert not single["b"].events_["harmless"].any()
     broken = Fleet.of_monitors(single, {"a": ValueError("no sensor"), "b": OSError("no file"), "d": OSError("lost")})
     assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "alarm", "c": "healthy", "d": ""}
     assert set(broken.errors["bridge"]) == {"a", "b", "d"}

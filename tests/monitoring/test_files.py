@@ -163,6 +163,15 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
         load_monitor(path)
 
 
+@each_form
+def test_a_baseline_that_has_trained_the_detector_is_saved_once(monitor, path):
+    monitor.save(path)
+    loaded = load_monitor(path)
+    assert loaded.active_.trained is loaded.status_.store.baseline
+    pd.testing.assert_frame_equal(loaded.trained_, monitor.trained_)
+    assert monitor.active_.trained is monitor.status_.store.baseline
+
+
 def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
     pytest.importorskip("skops.io")
     monitor = fitted_monitor(records, OwnRegression())

@@ -83,7 +83,7 @@ def test_a_healthy_year_joins_the_baseline(monitor, records):
     assert not found.reasons
     assert len(found.excluded) == 0
     pd.testing.assert_frame_equal(monitor.trained_, healthy[: 2 * YEAR], **SAME)
-    assert (found.table.loc["smallest change found", ["old", "new"]] > 0).all()
+    assert (found.table.loc["smallest detected change", ["old", "new"]] > 0).all()
     assert found.summary().startswith("Refit: accepted")
 
 

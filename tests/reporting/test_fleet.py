@@ -124,7 +124,7 @@ def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert f"ValueError: {QUOTED}" in page.text
     for what in ("Its model could not be fitted to its records", "Its new records could not be evaluated"):
         assert page.text.count(what) == 2  # as a state, and beside its message
-    assert "expect 11 false alarms a year" in page.text
+    assert "11 false alarms a year over all bridges" in page.text
     assert all(line in page.text for line in fleet.discoveries(0.1).summary().splitlines())
     fitted = Page((file.parent / "all of #1_pages" / "only_fitted.html").read_text(encoding="utf-8"))
     broken = Page((file.parent / "all of #1_pages" / "broken_file.html").read_text(encoding="utf-8"))

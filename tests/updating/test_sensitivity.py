@@ -74,7 +74,7 @@ def test_shapes_tell_more_parameters_apart_than_there_are_modes(n_modes):
     with_shapes = identifiability(model, noise=0.001, dofs=[3, 8, 13, 18], shape_noise=0.01)
     assert with_shapes.rank == 4
     assert with_shapes.summary().startswith(f"4 parameters, {n_modes} mode{'s' * (n_modes > 1)} with their shapes at 4")
-    assert "can be found together." not in with_shapes.summary()
+    assert "are identifiable together." not in with_shapes.summary()
 
 
 def test_what_only_some_parameters_share_leaves_the_others_known():
@@ -86,7 +86,7 @@ def test_what_only_some_parameters_share_leaves_the_others_known():
     known = identifiability(model, noise=0.001)
     assert np.isinf(known.deviations[["a", "twin"]]).all()
     assert known.rank == 2
-    assert "At most 2 of the 3 parameters can be found together." in known.summary()
+    assert "At most 2 of the 3 parameters are identifiable together." in known.summary()
     assert known.deviations["b"] == pytest.approx(2 * 0.001 / np.sqrt(2))
     assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
 

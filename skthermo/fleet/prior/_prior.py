@@ -257,14 +257,14 @@ class FleetPrior(Estimator):
         lines = []
         for name, row in self.comparison_.iterrows():
             n_bridges = counted(row["n_bridges"], "bridge")
-            gain = f"{row['gain']:+.3g} +- {row['standard_error']:.2g}"
+            gain = f"gain in log likelihood {row['gain']:+.3g} (standard error {row['standard_error']:.2g})"
             if row["is_pooled"]:
-                lines.append(f"{name}: pooled over {n_bridges}, a gain of {gain} in log likelihood")
+                lines.append(f"{name}: pooled over {n_bridges}, {gain}")
             elif row["n_bridges"] < LEAST_BRIDGES:
                 lines.append(f"{name}: not pooled, {n_bridges}; expected at least {LEAST_BRIDGES}")
             else:
                 lines.append(
-                    f"{name}: not pooled: {n_bridges} predict each other no better than chance allows (a gain of "
-                    f"{gain} in log likelihood); a new bridge learns it alone"
+                    f"{name}: not pooled over {n_bridges}, {gain}, not significant; a new bridge learns it from its "
+                    "own records alone"
                 )
         return "\n".join(lines)

@@ -74,7 +74,7 @@ class ParameterHistory:
     lookalikes : mapping of str to list of str
         Groups of which a drift of 5 % would look like a drift of others, with these.
     unobservable : list of str
-        Groups of which a loss of 5 % over the records would not be seen.
+        Groups of which a loss of 5 % over the records would not be detected.
     noticed_from : Series
         Change a year, by group, from which a steady drift is found in 9 of 10 cases.
     modes : DataFrame
@@ -304,48 +304,42 @@ class ParameterHistory:
         chance, rates = probability_text(self.p_value), self.rates
         first, last = f"{self.days[0]:%Y-%m-%d}", f"{self.days[-1]:%Y-%m-%d}"
         if not self.has_drift:
-            yield f"No drift of stiffness is seen from {first} to {last} (probability by chance {chance})."
+            yield f"No significant drift of stiffness from {first} to {last} (p value {chance})."
             return
-        yield f"The structure drifts (probability by chance {chance})."
+        yield f"The drift of stiffness from {first} to {last} is significant (p value {chance})."
         for group, others in self.rivals.items():
             rate = rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
-            yield (
-                f"{group} {verb} {_yearly(rate)} of its stiffness a year: {percent(rate['change'], '+.2g')} from "
-                f"{first} to {last}."
-            )
+            yield (f"{group} {verb} {_yearly(rate)} of its stiffness a year, {percent(rate['change'], '+.2g')} in all.")
             others = [other for other in others if other != group]
             if others:
                 each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
-                yield f"It may as well be {listed(others)} ({each}): these frequencies cannot distinguish them."
+                yield f"A drift of {listed(others)} ({each}) explains these frequencies equally well."
 
     def _limits(self) -> Iterator[str]:
         known = [one for one in self.groups if one not in self.unobservable]
         if not self.has_drift and known:
             each = ", ".join(f"{group} {_share(self.noticed_from[group])}" for group in known)
-            yield f"A steady drift would be found in 9 of 10 cases from these rates a year on: {each}."
+            yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
         if self.unobservable:
-            yield f"These modes do not show {listed(self.unobservable)}: a loss of 5{SPACE}% would not be seen."
+            yield f"A loss of 5{SPACE}% of stiffness in {listed(self.unobservable)} is unobservable in these modes."
         n_groups = sum(group != ALL_GROUPS for group in self.groups)
         if n_groups > len(self.modes):
             yield (
-                f"There are {n_groups} groups and {counted(len(self.modes), 'mode')}: which group "
-                "drifts depends on the stiffness in the chain, which these modes do not determine, and may be "
-                "named wrongly, such as the "
-                "mirror image of the one that drifts."
+                f"{n_groups} groups and {counted(len(self.modes), 'mode')} do not determine which group drifts: the "
+                "named group may be wrong, such as the mirror image of the right one."
             )
         for group, others in self.lookalikes.items():
             if group not in self.rivals:
-                yield f"A drift of {group} would look like one of {' or '.join(others)}."
+                yield f"A drift of {group} cannot be distinguished from one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
-                f"The records are {self.years:.1f} years long: season and drift are hardly distinguished, and "
-                "the bands are wide."
+                f"Records of {self.years:.1f} years hardly distinguish season and drift: confidence intervals are wide."
             )
         if self.misfit_p_value < self.significance:
             yield (
-                "The frequencies also change in a way that no one or two groups explain, as by added mass; the errors "
-                f"are {significant(np.sqrt(self.widening))} times as wide for that."
+                "One or two groups do not explain all changes of the frequencies, as with added mass: standard errors "
+                f"were multiplied by {significant(np.sqrt(self.widening))}."
             )
         missing = self.modes.index[self.modes["measured"].isna()]
         if len(missing):

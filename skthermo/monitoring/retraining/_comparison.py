@@ -18,8 +18,8 @@ from skthermo.residuals.weather import BEYOND, TrainingRange
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
 STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
 CLEAR = 3.0  # standard errors from which a difference is one
-WORSE = np.log(1.1)  # of the smallest change found, from which it counts
-FALSE, SMALLEST = "records above the threshold", "smallest change found"  # rows that decide
+WORSE = np.log(1.1)  # of the smallest detected change, from which it counts
+FALSE, SMALLEST = "records above the threshold", "smallest detected change"  # rows that decide
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class DetectorComparison:
     """The old detector and the one that may follow it, on the records that the old one has not learned from.
 
     ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its
-    ``standard_error`` from blocks of time, and ``worse``: whether the new one is clearly worse in it.
+    ``standard_error`` from blocks of time, and ``worse``: whether the new one is significantly worse in it.
     """
 
     table: pd.DataFrame
@@ -65,7 +65,7 @@ class DetectorComparison:
         return bool(row["difference"] < -CLEAR * row["standard_error"])
 
     def worse(self) -> list[str]:
-        """Measures in which the new detector is clearly worse, and which count."""
+        """Measures in which the new detector is significantly worse, and which count."""
         found = list(self.table.index[self.table["worse"]])
         # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
         return [name for name in found if not (name == SMALLEST and self.fewer_false)]

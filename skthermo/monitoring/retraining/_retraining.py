@@ -48,11 +48,11 @@ class Retraining:
     table : DataFrame
         For a refit, the old and the new detector on the records that the old one has not learned from, with columns
         ``old``, ``new``, ``difference``, ``standard_error`` (of the difference, from weeks) and ``worse``: records
-        above the threshold (share), median index over threshold, smallest change found (relative change of one mode by
-        which half of the records come above the threshold; differences are of logarithms), records in unknown
+        above the threshold (share), median index over threshold, smallest detected change (relative change of one mode
+        by which half of the records come above the threshold; differences are of logarithms), records in unknown
         weather (share), and peaks of past events over the threshold. For a new baseline, by mode: ``change`` of the
         level (relative; of responses that are not positive, in their unit), its ``standard_error``, ``n_records``
-        since, and the smallest change found, ``old`` and ``new``.
+        since, and the smallest detected change, ``old`` and ``new``.
     excluded : DataFrame
         What did not train: ``start``, ``end`` (NaT: up to the last record), ``columns``, ``n_records`` and ``reason``.
     baseline : DataFrame or None
@@ -110,11 +110,11 @@ class Retraining:
         Returns
         -------
         str
-            Plain English, several lines.
+            Several lines.
         """
         outcome = "accepted" if self.accepted else "refused; the old detector stays in use"
         lines = [f"{self.kind.capitalize()}: {outcome}."]
-        lines += [f"{'In spite of' if self.accepted else 'Because'}: {reason}." for reason in self.reasons]
+        lines += [f"{'Accepted despite' if self.accepted else 'Reason'}: {reason}." for reason in self.reasons]
         for row in self.excluded.itertuples():
             until = "the last record" if pd.isna(row.end) else f"{row.end:%Y-%m-%d %H:%M}"
             what = "records" if row.columns == "all" else f"values of {row.columns}"
@@ -146,17 +146,15 @@ def retrained(
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * free.scale
     found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
-    reasons, notes = [f"clearly worse: {name}" for name in found.worse()], []
+    reasons, notes = [f"the new detector is significantly worse in {name!r}" for name in found.worse()], []
     clearest = changes.clearest
     if clearest.matters:
         what = "the new records are not those of the baseline's structure"
-        reasons.insert(0, f"{what}: {clearest.sentence()}; a detector that learned them would not see that change")
+        reasons.insert(0, f"{what}: {clearest.sentence()}; a detector fitted to them would not detect that change")
     elif clearest.is_real:
-        notes.append(f"there is a small change: {clearest.sentence()}")
+        notes.append(f"small but significant change: {clearest.sentence()}")
     if np.isnan(clearest.p_value):
-        notes.append(
-            "there are too few weeks to say whether the new records differ from the baseline beyond the weather"
-        )
+        notes.append("the records cover too few weeks to test whether they differ from the baseline beyond the weather")
     elif changes.step.is_hidden:
         error = 100 * changes.step.standard_error.median()
         notes.append(
@@ -210,7 +208,7 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
         f"{counted(len(moved), 'older record')}, moved to the new level, stand for weather not met since"
     ]
     ratio = float(np.exp(np.nanmean(np.log(found[1] / found[0])))) if np.isfinite(found).any() else np.nan
-    notes.append(f"the smallest change found is {ratio:.2f} times that of the baseline before")
+    notes.append(f"the smallest detected change is {ratio:.2f} times that with the baseline before")
     learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector}
     return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
 

@@ -164,7 +164,7 @@ class LevelShift:
         return (
             f"{self.what}, with the weather taken out, {worst} changes by {factor * self.change[worst]:+.2g} +- "
             f"{factor * self.standard_error[worst]:.1g}{unit}, all modes together by {self.size:.2g} standard "
-            f"deviations of a record (probability by chance {probability_text(self.p_value)})"
+            f"deviations of a record (p value {probability_text(self.p_value)})"
         )
 
 

@@ -263,18 +263,19 @@ class FitReport(SavesFrames):
                 "of them."
             )
         if self.n_outside is not None:
-            lines.append(f"{self.n_outside} rows have parameters outside the bounds of the inverse.")
+            lines.append(
+                f"{self.n_outside} of {self.n_rows} rows have parameters outside the bounds of the inverse surrogate."
+            )
         if self.n_unconverged:
-            lines.append(f"The parameters of {self.n_unconverged} rows have not converged in refining.")
+            lines.append(f"The refined parameters of {self.n_unconverged} of {self.n_rows} rows have not converged.")
         if self.n_by_full_model:
             lines.append(
-                f"The parameters of {self.n_by_full_model} rows are outside the box of the reduced model: the full one "
-                f"was solved {self.n_full_solves} times."
+                f"The parameters of {self.n_by_full_model} of {self.n_rows} rows are outside the box of the reduced "
+                f"model; the full model was solved {self.n_full_solves} times."
             )
         if self.fleet is not None:
             lines.append(
-                "In weather that these records have not seen, predictions are based on a fleet: "
-                f"{self._listed_weather()}."
+                f"Outside the weather of these records, predictions are based on the fleet: {self._listed_weather()}."
             )
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
@@ -283,7 +284,7 @@ class FitReport(SavesFrames):
             lines.append(self.findings.memory.summary())
         if self.findings is not None and len(self.findings.table):
             lines.append(self.findings.summary())
-        return [*lines, f"Errors are in-sample, of {self.n_scored} rows spread evenly over those that trained."]
+        return [*lines, f"MAPE is in-sample, of {self.n_scored} rows spread evenly over the training rows."]
 
     @property
     def has_hidden_offsets(self) -> bool:
