@@ -137,7 +137,9 @@ test = sample(bridge(), 0.3, 200, random_state=1)
 with quiet():
     found = paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES))
 true = pd.DataFrame(test.theta, columns=PARAMETERS)
-PredictionDisplay.from_predictions(true, found, labels=("true", "by M1"), kind="scatter", unit="")
+PredictionDisplay.from_predictions(
+    true, found, labels=("true", "by M1"), kind="scatter", quantity="multiple of nominal", unit=""
+)
 
 # %%
 # Table 5, mean absolute percentage errors. A network alone is a first guess; steps on the FE model make it exact where
@@ -155,7 +157,9 @@ with quiet():
     history = paper.fem.estimate_parameters(filled.frequencies[:BASELINE])
     mapped = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
 labels = ("from frequencies", "from temperatures")
-PredictionDisplay.from_predictions(paper.test(history), mapped, labels=labels, unit="", n_columns=1)
+PredictionDisplay.from_predictions(
+    paper.test(history), mapped, labels=labels, quantity="multiple of nominal", unit="", n_columns=1
+)
 
 # %%
 # Table 7, their mean absolute percentage differences:
