@@ -158,7 +158,7 @@ with quiet():
     mapped = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
 labels = ("from frequencies", "from temperatures")
 PredictionDisplay.from_predictions(
-    paper.test(history), mapped, labels=labels, quantity="multiple of nominal", unit="", n_columns=1
+    paper.test(history), mapped, labels=labels, quantity="over nominal", unit="", n_columns=1
 )
 
 # %%
