@@ -116,7 +116,7 @@ change = 100 * (history.table - 1)
 estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "ci_low", "ci_high"))
 labels = {"labels": ("estimate", ""), "interval_label": "interval, 95 %"}
 PredictionDisplay.from_predictions(
-    estimate, None, *band, kind="lines", quantity="change of stiffness from nominal", unit="%", **labels
+    estimate, None, *band, kind="lines", quantity="change of stiffness", unit="%", **labels
 )
 
 save_figures(options.figures)

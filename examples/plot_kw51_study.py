@@ -131,15 +131,13 @@ print((100 * known.deviations).round(2).to_frame().T.to_string(index=False))
 # %%
 # M1: from frequencies to parameters
 # ----------------------------------
-# Parameters of test samples, and as M1 finds them with the paper's network.
+# Parameters of test samples, as multiples of nominal, and as M1 finds them with the paper's network.
 
 test = sample(bridge(), 0.3, 200, random_state=1)
 with quiet():
     found = paper.fem.inverse_.transform(pd.DataFrame(test.frequencies, columns=MODES))
 true = pd.DataFrame(test.theta, columns=PARAMETERS)
-PredictionDisplay.from_predictions(
-    true, found, labels=("true", "by M1"), kind="scatter", quantity="multiple of nominal", unit=""
-)
+PredictionDisplay.from_predictions(true, found, labels=("true", "by M1"), kind="scatter", unit="")
 
 # %%
 # Table 5, mean absolute percentage errors. A network alone is a first guess; steps on the FE model make it exact where
