@@ -55,7 +55,7 @@ def _within(**changes: Any) -> Iterator[None]:
 
 def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
     """Warn at the nearest line outside skthermo, scikit-learn and joblib, once for all folds of a cross-validation or
-    search; a worker process, which sees only its own folds, warns once in its life."""
+    search; a worker process, which sees only its own folds, warns once in its life. The text ends with the kind."""
     warn_each([category(message, kind)])
 
 

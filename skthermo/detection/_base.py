@@ -78,7 +78,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """Hook: refuse gross errors of a baseline, and warn of what is doubtful."""
         findings = gross_errors(frequencies=F, unit="")
         findings.refuse_meaningless()
-        warn_each(findings.warnings(but=OF_ORDER))
+        warn_each(findings.warnings(exclude=OF_ORDER))
 
     def _records(self, X: Any, F: Array) -> Any:
         """Hook: preprocess validated rows."""

@@ -23,7 +23,7 @@ from skthermo.monitoring import Monitor
 
 
 def fit_fleet(
-    makers: Mapping[Hashable, BaseEstimator | Callable[[], BaseEstimator]],
+    estimators: Mapping[Hashable, BaseEstimator | Callable[[], BaseEstimator]],
     records: Mapping[Hashable, Any],
     *,
     monitor: Callable[[BaseEstimator], Monitor] | None = None,
@@ -36,7 +36,7 @@ def fit_fleet(
 
     Parameters
     ----------
-    makers : mapping of name to estimator or function
+    estimators : mapping of name to estimator or function
         An unfitted estimator for each bridge, such as a `~skthermo.surrogate.DataInformedFEM`, or a function without
         arguments that makes one; a worker calls it, so that its model never is in this process.
     records : mapping of name to (T, F) or function
@@ -64,7 +64,8 @@ def fit_fleet(
     Raises
     ------
     ValueError
-        If the names of makers and records differ; if a maker, records or the monitor cannot be sent to another process.
+        If the names of estimators and records differ; if an estimator, records or the monitor cannot be sent to another
+        process.
     TimeoutError
         If another process works on the same folder.
 
@@ -105,7 +106,7 @@ def fit_fleet(
     >>> fleet.table["n_records"].to_dict()
     {'north': 365, 'south': 365}
     """
-    _check_names(makers, records)
+    _check_names(estimators, records)
     check_jobs(n_jobs)
     if monitor is not None and not callable(monitor):
         raise ValueError(
@@ -116,10 +117,12 @@ def fit_fleet(
     with storage.alone():
         storage.read()
         tasks = {
-            name: BridgeFit(name, makers[name], records[name], monitor, seed_of(base, name), storage.outcomes.get(name))
-            for name in makers
+            name: BridgeFit(
+                name, estimators[name], records[name], monitor, seed_of(base, name), storage.outcomes.get(name)
+            )
+            for name in estimators
         }
-        storage.outcomes = {name: storage.outcomes[name] for name in makers if name in storage.outcomes}
+        storage.outcomes = {name: storage.outcomes[name] for name in estimators if name in storage.outcomes}
         n_done, begun_again = 0, []
         try:
             work = run_tasks(tasks, n_jobs)
@@ -140,12 +143,12 @@ def fit_fleet(
         except KeyboardInterrupt as interrupt:
             interrupt.add_note(_where_to_go_on(n_done, len(tasks), storage.folder))
             raise
-    storage.outcomes = {name: storage.outcomes[name] for name in makers}
+    storage.outcomes = {name: storage.outcomes[name] for name in estimators}
     fleet = Fleet._of(storage)
     warn_of_bridges(fleet)
     if begun_again:
         warn_user(
-            f"{len(begun_again)} of {len(makers)} bridges were fitted anew, because their records, estimator or "
+            f"{len(begun_again)} of {len(estimators)} bridges were fitted anew, because their records, estimator or "
             f"monitor have changed ({named(begun_again)}). Their monitors restart without earlier records and events, "
             "which files ending in .replaced keep. To continue with monitors as they were, use Fleet(folder)",
             SkthermoWarning,
@@ -173,19 +176,19 @@ def _base(random_state: Any) -> int:
     return int(source.randint(np.iinfo(np.int32).max))
 
 
-def _check_names(makers: Any, records: Any) -> None:
+def _check_names(estimators: Any, records: Any) -> None:
     """Raise an error unless both are mappings of the same names."""
-    for what, given in (("makers", makers), ("records", records)):
+    for what, given in (("estimators", estimators), ("records", records)):
         if not isinstance(given, Mapping):
             raise ValueError(f"{what} are {type(given).__name__!r}; expected a mapping of names of bridges")
-    missing, unknown = [n for n in makers if n not in records], [n for n in records if n not in makers]
+    missing, unknown = [n for n in estimators if n not in records], [n for n in records if n not in estimators]
     if missing or unknown:
         raise ValueError(
-            f"{len(missing)} bridges have no records ({missing!r:.200}) and {len(unknown)} have no maker "
+            f"{len(missing)} bridges have no records ({missing!r:.200}) and {len(unknown)} have no estimator "
             f"({unknown!r:.200}); expected the same names in both"
         )
-    if not makers:
-        raise ValueError("makers are empty; expected at least one bridge")
+    if not estimators:
+        raise ValueError("estimators are empty; expected at least one bridge")
 
 
 def _where_to_go_on(n_done: int, total: int, folder: Path | None) -> str:

@@ -636,7 +636,7 @@ class Monitor(SavesFrames, Estimator):
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
             records = self.active_.corrections.cleaned(records)
-            _refuse_meaningless(records, self.targets_, self.units_, but=OF_TRAINING)
+            _refuse_meaningless(records, self.targets_, self.units_, exclude=OF_TRAINING)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -918,17 +918,17 @@ class Monitor(SavesFrames, Estimator):
 
 
 def _refuse_meaningless(
-    baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], but: Collection[str] = ()
+    baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], exclude: Collection[str] = ()
 ) -> None:
     """Raise an error that lists all that makes records useless for training: gross errors, responses of another size.
 
-    ``but`` are kinds of gross errors that do no harm.
+    ``exclude`` are kinds of gross errors that do no harm.
     """
     F, T = baseline[targets], baseline.drop(columns=targets)
     unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
     wrong = []
     try:
-        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless(but=but)
+        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless(exclude=exclude)
     except ValueError as error:
         wrong.append(str(error))
     values = F.to_numpy()

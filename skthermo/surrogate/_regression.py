@@ -443,7 +443,7 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        gross_errors(frame_like(X, T)).refuse_meaningless(but={"no-rows"})
+        gross_errors(frame_like(X, T)).refuse_meaningless(exclude={"no-rows"})
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)

@@ -129,7 +129,7 @@ NOT_CALLED |= {
     "monitoring.Retraining": "made by a monitor's refit",
 }
 
-MAKERS = dict.fromkeys("ab", LinearRegression())
+ESTIMATORS = dict.fromkeys("ab", LinearRegression())
 RECORDS = {"a": (T, F), "b": (T, F * 1.01)}
 
 
@@ -143,14 +143,14 @@ def tables(given):
     return [given.table.drop(columns=["seconds", "megabytes"]), given.errors]
 
 
-WATCHED = fleet.fit_fleet(MAKERS, RECORDS, monitor=watch, folder=FOLDER / "fleet")
+WATCHED = fleet.fit_fleet(ESTIMATORS, RECORDS, monitor=watch, folder=FOLDER / "fleet")
 WATCHED.update({"a": NEW})
 MAPPING = bad(3, None, True, "a", ["a"], {"no such name": 3}, str)
 use(
     "fleet.fit_fleet",
     lambda **a: tables(fleet.fit_fleet(**a)),
     usual="random_state",
-    makers=(MAKERS, MAPPING),
+    estimators=(ESTIMATORS, MAPPING),
     records=(RECORDS, MAPPING),
     monitor=(watch, bad(3, True, "watch", [watch], MONITOR)),
     folder=(FOLDER / "another fleet", bad(3, True, ["a"], b"a", str)),

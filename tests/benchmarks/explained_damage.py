@@ -1,4 +1,4 @@
-"""How often `identify_damage` names the damage that there is, and whether its probabilities and bands hold.
+"""How often `identify_damage` names the damage that there is, and the calibration of its probabilities and intervals.
 
     OMP_NUM_THREADS=1 SKTHERMO_DATA=folder python tests/benchmarks/explained_damage.py
 

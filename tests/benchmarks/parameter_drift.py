@@ -60,7 +60,7 @@ def tracked(fem, T, F):
     table = history.table
     estimates = np.log(table.xs("estimate", axis=1, level=1))
     errors = np.log(table.xs("ci_high", axis=1, level=1)).sub(estimates) / BAND
-    first = {group for rivals in history.rivals.values() for group in rivals}
+    first = {group for alternatives in history.alternatives.values() for group in alternatives}
     return estimates, errors, history.has_drift, first, estimates.index[0]
 
 
@@ -172,7 +172,7 @@ def misses(table):
             if len(ageing) and ageing[what].mean() < 0.9:
                 yield f"{bridge}, 1 % a year: {what} {100 * ageing[what].mean():.0f} %; at least 90"
         if not 90 <= band <= 97:
-            yield f"{bridge}: bands hold the truth on {band:.1f} % of days; 90 to 97"
+            yield f"{bridge}: intervals cover the truth on {band:.1f} % of days; 90 to 97"
 
 
 def main():

@@ -300,7 +300,7 @@ def test_monitors_evaluate_new_records_each_alone(fleet):
 
 def test_wrong_arguments_are_named(fleet, tmp_path):
     makers, records = asked()
-    with pytest.raises(ValueError, match=r"1 bridges have no records \(\['e'\]\) and 0 have no maker"):
+    with pytest.raises(ValueError, match=r"1 bridges have no records \(\['e'\]\) and 0 have no estimator"):
         fit_fleet(makers | {"e": LinearRegression()}, records)
     with pytest.raises(ValueError, match="expected a mapping of names"):
         fit_fleet(list(makers), records)

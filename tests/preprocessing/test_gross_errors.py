@@ -246,7 +246,7 @@ class TestFindings:
     def test_each_kind_says_what_follows_and_what_to_do(self):
         assert set(WARNINGS) >= ARE_MEANINGLESS
         for text in WARNINGS.values():
-            what, consequence, action = text.split("; ")
+            what, consequence, action = text.split(". ")
             assert what.endswith(": {}")
             assert min(map(len, (consequence, action))) > 10
 

@@ -308,7 +308,7 @@ class FleetMapper(RegressorMixin, Estimator):
         values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
-        gross_errors(frame_like(X, inputs)).refuse_meaningless(but={"no-rows", "constant"})
+        gross_errors(frame_like(X, inputs)).refuse_meaningless(exclude={"no-rows", "constant"})
         self._check_inputs(X)
         self.y_is_vector_ = values.ndim == 1
         self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None

@@ -198,7 +198,7 @@ def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     values = as_columns(check_array(Y, ensure_2d=False, **options))
     check_same_rows(T, Y, ("temperatures", "quantities"))
     inputs = as_columns(inputs)
-    gross_errors(frame_like(T, inputs)).refuse_meaningless(but={"no-rows"})
+    gross_errors(frame_like(T, inputs)).refuse_meaningless(exclude={"no-rows"})
     if isinstance(Y, pd.Series):
         names = ["f1" if Y.name is None else Y.name]
     else:

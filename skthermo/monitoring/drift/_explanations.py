@@ -100,7 +100,7 @@ class Explanations:
 
     ``evidence`` is the logarithm of how many times likelier the trends are with each than without any drift, and
     ``walk`` the standard deviation of each set's random walk in a year. ``p_value`` is the probability that trends
-    without drift give one group as much evidence. ``lookalikes`` are the groups of which a drift would give as good an
+    without drift give one group as much evidence. ``confounded`` are the groups of which a drift would give as good an
     account of a notable drift of a group.
     """
 
@@ -109,14 +109,14 @@ class Explanations:
     walk: Array
     p_value: float
     widening: float
-    lookalikes: dict[int, list[int]]
+    confounded: dict[int, list[int]]
     unobservable: NDArray[np.bool_]
 
     @classmethod
     def of(
         cls, trends: ModeTrends, freedom: float, random: np.random.RandomState, even: Sequence[int] = ()
     ) -> Explanations:
-        """Weigh all sets of one or two groups, and ``even`` changes alone; draws give the probability by chance."""
+        """Weigh all sets of one or two groups, and ``even`` changes alone; draws give the p value."""
         unobservable = _structure(trends)[1]
         seen = np.flatnonzero(~unobservable).tolist() or list(range(trends.n_groups))
         singles = [(group,) for group in seen]
@@ -134,9 +134,9 @@ class Explanations:
         order = np.argsort(-(evidence + prior), kind="stable")
         observed = table[: len(singles)].max()
         p_value = _chance(trends, singles, observed, freedom, random)
-        lookalikes, unobservable = _structure(trends)
+        confounded, unobservable = _structure(trends)
         found = evidence + prior
-        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, lookalikes, unobservable)
+        return cls([sets[i] for i in order], found[order], walk[order], p_value, widening, confounded, unobservable)
 
     @property
     def probabilities(self) -> Array:

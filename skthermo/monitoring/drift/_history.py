@@ -69,14 +69,14 @@ class ParameterHistory:
         drifts; ``log_evidence`` against no drift.
     indistinguishable : list of tuple of str
         Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes.
-    rivals : mapping of str to list of str
+    alternatives : mapping of str to list of str
         Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
-    lookalikes : mapping of str to list of str
-        Groups of which a drift of 5 % would look like a drift of others, with these.
+    confounded : mapping of str to list of str
+        Groups of which a drift of 5 % is confounded with a drift of others, with these.
     unobservable : list of str
         Groups of which a loss of 5 % over the records would not be detected.
-    noticed_from : Series
-        Change a year, by group, from which a steady drift is found in 9 of 10 cases.
+    detectable_rates : Series
+        Change a year, by group, from which a steady drift is detected with probability 90 %.
     modes : DataFrame
         One row a mode: relative shift over the records, ``measured`` (apart from the weather) and ``explained`` by the
         drift, and ``standard_error`` of the measured one.
@@ -111,10 +111,10 @@ class ParameterHistory:
     significance: float
     explanations: pd.DataFrame = field(repr=False)
     indistinguishable: list[tuple[str, ...]]
-    rivals: Mapping[str, list[str]]
-    lookalikes: Mapping[str, list[str]]
+    alternatives: Mapping[str, list[str]]
+    confounded: Mapping[str, list[str]]
     unobservable: list[str]
-    noticed_from: pd.Series = field(repr=False)
+    detectable_rates: pd.Series = field(repr=False)
     modes: pd.DataFrame = field(repr=False)
     misfit_p_value: float
     widening: float
@@ -129,7 +129,7 @@ class ParameterHistory:
     @property
     def groups(self) -> list[str]:
         """Names of the groups."""
-        return list(self.noticed_from.index)
+        return list(self.detectable_rates.index)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -146,7 +146,7 @@ class ParameterHistory:
 
         ``change`` over the records, relative, and ``change_error``; ``per_year`` and ``standard_error``; ``p_value`` of
         no change in this group; ``probability`` that it drifts if any group does; ``drifts``: "yes", "perhaps" (or
-        another one of its set), "no sign", or "unobservable"; ``noticed_from``.
+        another one of its set), "no sign", or "unobservable"; ``detectable_rates``.
         """
         levels, deviations = np.array([(one.mean[-1], one.deviation[-1]) for one in self.trajectories.values()]).T
         change, errors = np.expm1(levels), np.exp(levels) * deviations
@@ -165,7 +165,7 @@ class ParameterHistory:
             "p_value": 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, np.finfo(float).tiny)),
             "probability": shares,
             "drifts": [self._drifts(name) for name in names],
-            "noticed_from": self.noticed_from.reindex(names).to_numpy(),
+            "detectable_rates": self.detectable_rates.reindex(names).to_numpy(),
         }
         return pd.DataFrame(columns, index=pd.Index(names, name="group"))
 
@@ -227,7 +227,7 @@ class ParameterHistory:
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
         found = gross_errors(frequencies=F)
-        found.refuse_meaningless(but=OF_TRAINING)
+        found.refuse_meaningless(exclude=OF_TRAINING)
         warn_each(found.warnings())
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
         return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
@@ -273,10 +273,10 @@ class ParameterHistory:
     def _drifts(self, name: str) -> str:
         if name in self.unobservable:
             return "unobservable"
-        members = [others for others in self.rivals.values() if name in others]
+        members = [others for others in self.alternatives.values() if name in others]
         if members:
             return "yes" if len(members[0]) == 1 else "perhaps"
-        is_set = any(" and ".join(others) == name for others in self.rivals.values())
+        is_set = any(" and ".join(others) == name for others in self.alternatives.values())
         return "perhaps" if is_set else "no sign"
 
     def _first_passages(self, trajectory: GroupTrajectory, level: float, random: np.random.RandomState) -> Array:
@@ -307,7 +307,7 @@ class ParameterHistory:
             yield f"No significant drift of stiffness from {first} to {last} (p value {chance})."
             return
         yield f"The drift of stiffness from {first} to {last} is significant (p value {chance})."
-        for group, others in self.rivals.items():
+        for group, others in self.alternatives.items():
             rate = rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
             yield (f"{group} {verb} {_yearly(rate)} of its stiffness a year, {percent(rate['change'], '+.2g')} in all.")
@@ -319,7 +319,7 @@ class ParameterHistory:
     def _limits(self) -> Iterator[str]:
         known = [one for one in self.groups if one not in self.unobservable]
         if not self.has_drift and known:
-            each = ", ".join(f"{group} {_share(self.noticed_from[group])}" for group in known)
+            each = ", ".join(f"{group} {_share(self.detectable_rates[group])}" for group in known)
             yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
         if self.unobservable:
             yield f"A loss of 5{SPACE}% of stiffness in {listed(self.unobservable)} is unobservable in these modes."
@@ -329,8 +329,8 @@ class ParameterHistory:
                 f"{n_groups} groups and {counted(len(self.modes), 'mode')} do not determine which group drifts: the "
                 "named group may be wrong, such as the mirror image of the right one."
             )
-        for group, others in self.lookalikes.items():
-            if group not in self.rivals:
+        for group, others in self.confounded.items():
+            if group not in self.alternatives:
                 yield f"A drift of {group} cannot be distinguished from one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (

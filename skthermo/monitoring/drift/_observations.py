@@ -204,7 +204,7 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
         raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but=OF_TRAINING)
+    gross_errors(T, F, model=fem.model).refuse_meaningless(exclude=OF_TRAINING)
 
 
 def length_of(freq: str) -> float:

@@ -192,15 +192,15 @@ class Followed:
 
 
 def indistinguishable_sets(
-    found: Explanations, rivals: Mapping[int, Sequence[int]], even: Sequence[int]
+    found: Explanations, alternatives: Mapping[int, Sequence[int]], even: Sequence[int]
 ) -> list[tuple[int, ...]]:
     """Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes."""
-    sets = [tuple(one for one in others if one not in even) for others in rivals.values()]
+    sets = [tuple(one for one in others if one not in even) for others in alternatives.values()]
     sets = [others for others in sets if len(others) > 1]
-    for group, others in found.lookalikes.items():
-        both = [group, *(one for one in others if group in found.lookalikes.get(one, []))]
+    for group, others in found.confounded.items():
+        both = [group, *(one for one in others if group in found.confounded.get(one, []))]
         alike = tuple(sorted(one for one in both if one not in even))
-        if len(alike) > 1 and not set(alike) & set(rivals) and alike not in sets:
+        if len(alike) > 1 and not set(alike) & set(alternatives) and alike not in sets:
             sets.append(alike)
     return sets
 
@@ -233,14 +233,14 @@ def history_of(
     """What was found, by the names of groups and modes."""
     found, names = followed.found, effects.names
     best, has_drift = found.sets[0], found.p_value <= significance
-    rivals = {group: found.instead(group) for group in best} if has_drift else {}
+    alternatives = {group: found.instead(group) for group in best} if has_drift else {}
     trajectories = followed.best() if has_drift else {}
     for group in range(len(names)):
         if group not in trajectories:
-            replaced = {member for member, others in rivals.items() if group in others}
+            replaced = {member for member, others in alternatives.items() if group in others}
             others = [member for member in best if member not in replaced] if has_drift else []
             trajectories[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
-    sets = indistinguishable_sets(found, rivals, effects.even)
+    sets = indistinguishable_sets(found, alternatives, effects.even)
     named = {names[group]: trajectories[group] for group in range(len(names))}
     for one in sets:
         others = [member for member in best if member not in one] if has_drift else []
@@ -267,10 +267,10 @@ def history_of(
             }
         ),
         indistinguishable=[tuple(names[group] for group in one) for one in sets],
-        rivals={names[group]: [names[other] for other in others] for group, others in rivals.items()},
-        lookalikes={names[one]: [names[other] for other in others] for one, others in found.lookalikes.items()},
+        alternatives={names[group]: [names[other] for other in others] for group, others in alternatives.items()},
+        confounded={names[one]: [names[other] for other in others] for one, others in found.confounded.items()},
         unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
-        noticed_from=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
+        detectable_rates=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
         modes=mode_table(
             fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes)), is_measured
         ),

@@ -63,7 +63,7 @@ def gross_errors(
     >>> print(gross_errors(np.linspace(260, 310, 365)[:, np.newaxis]))
     1 finding in 365 records.
     kelvin: 'T1' lies between 260 and 310 in 365 rows, row 0 to row 364
-        bounds and reports are in degrees Celsius; subtract 273.15
+        Bounds and reports are in degrees Celsius. Subtract 273.15
     """
     tables = {"temperatures": temperatures, "frequencies": frequencies}
     given = {what: table for what, table in tables.items() if table is not None}

@@ -44,7 +44,7 @@ class RecordFindings(SavesFrames):
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
     stuck-sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
-        the last value would be learned as weather; put NaN where it is stuck
+        The last value would be learned as weather. Put NaN where it is stuck
     """
 
     table: pd.DataFrame
@@ -65,18 +65,18 @@ class RecordFindings(SavesFrames):
         lines = [f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."]
         for kind, rows in self.table.groupby("what", sort=False):
             lines += [f"{kind}: {detail}" for detail in rows["detail"]]
-            lines.append(f"    {rows['consequence'].iloc[0]}; {rows['action'].iloc[0]}")
+            lines.append(f"    {rows['consequence'].iloc[0]}. {rows['action'].iloc[0]}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
         return self.summary()
 
-    def warnings(self, *, but: Collection[str] = ()) -> Iterator[RecordsWarning]:
+    def warnings(self, *, exclude: Collection[str] = ()) -> Iterator[RecordsWarning]:
         """One warning for each kind of finding.
 
         Parameters
         ----------
-        but : collection of str, default=()
+        exclude : collection of str, default=()
             Kinds of findings of which there is no warning.
 
         Yields
@@ -85,15 +85,15 @@ class RecordFindings(SavesFrames):
             Its ``kind`` is what was found.
         """
         for kind, rows in self.table.groupby("what", sort=False):
-            if kind not in UNWARNED.union(but):
+            if kind not in UNWARNED.union(exclude):
                 yield RecordsWarning(WARNINGS[kind].format(_listed(rows["detail"])), kind)
 
-    def refuse_meaningless(self, *, but: Collection[str] = ()) -> None:
+    def refuse_meaningless(self, *, exclude: Collection[str] = ()) -> None:
         """Raise an error that lists everything with which results of a fit would be meaningless.
 
         Parameters
         ----------
-        but : collection of str, default=()
+        exclude : collection of str, default=()
             Kinds of findings that do no harm to what is done with the records.
 
         Raises
@@ -101,7 +101,7 @@ class RecordFindings(SavesFrames):
         ValueError
             If the severity of a finding is "meaningless".
         """
-        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(but))]
+        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(exclude))]
         if len(severe):
             kinds = severe.groupby("what", sort=False)
             texts = [WARNINGS[kind].format(_listed(rows["detail"])) for kind, rows in kinds]

@@ -403,10 +403,10 @@ class IdentifiedDamage:
         most probable severities; ``text``, such as "side span 12 %, main stays 4 %".
     estimates : DataFrame
         Amount of each cause in each explanation, by explanation and cause, if that explanation is right: mean
-        ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which hold it with a probability of 90 %.
+        ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which cover it with a probability of 90 %.
     table : DataFrame
         One row a cause: ``probability`` that it is among the causes; ``severity``, its mean over all explanations,
-        where those without it count as 0, with ``standard_error``; ``ci_low`` and ``ci_high``, which hold it with a
+        where those without it count as 0, with ``standard_error``; ``ci_low`` and ``ci_high``, which cover it with a
         probability of 90 %; ``if_damaged``, its mean where it is among the causes, and ``highest_if_damaged``, which it
         then does not exceed with a probability of 95 %; ``error_alone``, the standard error
         if nothing else could have changed and the amount could have either sign; ``kind``: "damage", "stiffening",

@@ -211,7 +211,7 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    gross_errors(T, F, model=fem.model).refuse_meaningless(but={"no-rows", "missing-column", "constant"})
+    gross_errors(T, F, model=fem.model).refuse_meaningless(exclude={"no-rows", "missing-column", "constant"})
     return frequencies
 
 

@@ -17,7 +17,7 @@ FEWEST_TO_COMPARE = 8  # records among which one may be called far from the othe
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
 FAR = 6.0  # standard deviations beyond which a record is far from the others
 MAD_TO_DEVIATION = 1.4826
-WIDER = 0.01  # probability by chance below which new records count as scattering more widely than the training records
+WIDER = 0.01  # p value below which new records count as scattering more widely than the training records
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ def test_without_drift_none_is_claimed(healthy):
     found = track_parameters(fem, campaign.temperatures, campaign.frequencies, GROUPS, WEEK, random_state=0)
     assert not found.has_drift
     assert set(found.rates["drifts"]) == {"no sign"}
-    assert (found.noticed_from > 0).all()
+    assert (found.detectable_rates > 0).all()
     assert found.summary().startswith("No significant drift")
     pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
     bands = found.table.iloc[-1].unstack()
@@ -226,7 +226,7 @@ def test_groups_with_like_effects_are_named_together():
     found = Explanations.of(trends_of([-0.04, 0, 0], slopes), 100.0, np.random.RandomState(0))
     assert found.p_value < 0.01
     assert found.instead(found.sets[0][0]) == [0, 1]
-    assert found.lookalikes == {0: [1], 1: [0]}
+    assert found.confounded == {0: [1], 1: [0]}
     apart = Explanations.of(trends_of([0, 0, -0.04], slopes), 100.0, np.random.RandomState(0))
     assert apart.sets[0] == (2,)
     assert apart.instead(2) == [2]
