@@ -227,7 +227,7 @@ def run(study):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("as_frames", [True, False], ids=["frames", "arrays"])
+@pytest.mark.parametrize("as_frames", [True, pytest.param(False, marks=pytest.mark.nightly)], ids=["frames", "arrays"])
 @pytest.mark.parametrize(
     ("estimator", "data"),
     [*((estimator, (RECORDS,)) for estimator in TRANSFORMERS_AND_DETECTORS), *BOUND],

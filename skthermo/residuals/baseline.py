@@ -21,6 +21,7 @@ from skthermo.residuals.weather import (
     NearestPlaces,
     TrainingRange,
     WeatherFunctions,
+    mean_of_nearest,
     nearest_in_parts,
     one_in_each_part,
     order_statistic,
@@ -317,14 +318,11 @@ class BaselineResiduals:
 
     def _local_mean(self, values: Array, weather: Array, number: int, most: int) -> Array:
         """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
-        wanted, means = self.coordinates.transform(weather), np.full((len(weather), values.shape[1]), np.nan)
+        wanted, used = self.coordinates.transform(weather), np.zeros(values.shape, dtype=bool)
         for modes, known in self._present(values, most):
-            of_known = values[np.ix_(known, modes)]
-            for part, _, near in nearest_in_parts(self.places[known], wanted, number):
-                ends = np.arange(0, near.size + 1, near.shape[1])
-                sums = scipy.sparse.csr_array((np.ones(near.size), near.ravel(), ends), (len(near), len(known)))
-                means[part, modes] = sums @ of_known / near.shape[1]
-        return means
+            used[np.ix_(known, modes)] = True
+        rows = used.any(axis=1)
+        return mean_of_nearest(self.places[rows], values[rows], used[rows], wanted, number)
 
     def _present(self, values: Array, most: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Modes that are there in the same records, and positions of these records, or of so many of them."""

@@ -23,6 +23,10 @@ from skthermo.residuals.gaussian import Gaussian
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
+SPARE, LEAST_SHARE = (
+    1.25,
+    1 / 3,
+)  # a search for columns with gaps finds so many times as many places, for so large a share
 MOST_KEPT = 4_000_000  # distances to nearest places that are kept, and as many positions
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
@@ -428,12 +432,39 @@ def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[n
     return NearestPlaces(places, number).of(wanted)
 
 
-def nearest_in_parts(places: Array, wanted: Array, number: int) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
-    """Distances and positions of the nearest places for some of the wanted ones after others: memory is bounded."""
+def nearest_in_parts(
+    places: Array, wanted: Array, number: int, n_columns: int = 1
+) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
+    """Distances and positions of the nearest places for some of the wanted ones after others: memory is bounded, also
+    where each place has several columns."""
     number = min(number, len(places))
     tree = NearestNeighbors(n_neighbors=number).fit(places)
-    for part in parts(len(wanted), number):
+    for part in parts(len(wanted), number * n_columns):
         yield part, *tree.kneighbors(wanted[part])
+
+
+def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, number: int) -> Array:
+    """Mean of each column's values at the places nearest to each wanted one, among those where the column is used.
+
+    One search for all columns finds enough places for most rows; the others have a search for each column.
+    """
+    means, shares = np.full((len(wanted), values.shape[1]), np.nan), used.mean(axis=0) if len(used) else np.zeros(0)
+    if not len(places):
+        return means
+    enough = number if shares.min() == 1 else int(np.ceil(SPARE * number / max(shares.min(), LEAST_SHARE)))
+    filled = np.where(used, values, 0.0)
+    for part, _, near in nearest_in_parts(places, wanted, enough, n_columns=values.shape[1]):
+        known = used[near]
+        known &= known.cumsum(axis=1, dtype=np.int32) <= number
+        is_enough = known.sum(axis=1) == number
+        means[part] = np.where(is_enough, np.einsum("nkm,nkm->nm", filled[near], known) / number, np.nan)
+    for column, is_used in enumerate(used.T):
+        few = np.flatnonzero(np.isnan(means[:, column]))
+        if is_used.any() and len(few):
+            own = values[is_used, column]
+            for part, _, near in nearest_in_parts(places[is_used], wanted[few], number):
+                means[few[part], column] = own[near].mean(axis=1)
+    return means
 
 
 def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:

@@ -1377,7 +1377,9 @@ fitted(
     targets=(MODES, names(MODES)),
 )
 RECORDS = {"temperatures": (T, weather(T, fixed=False)), "frequencies": (F, frequencies(F, fixed=False))}
-use("preprocessing.check_records", **RECORDS)
+MODEL = (TRUSS, {cause: value for cause, value in models().items() if cause != "None"})
+for name in ("check_records", "gross_errors"):
+    use(f"preprocessing.{name}", **RECORDS, model=MODEL)
 use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
 fitted(
     OutlierDetector,
@@ -1407,7 +1409,7 @@ use(
     lambda **a: studies.DetectabilityStudy(
         CHAIN, MahalanobisDetector(), SCENARIOS[:1], n_repeats=1, **({"uncertainty": "noise"} | a)
     ).run(LATER.temperatures, F)["rate"],
-    usual="verbose",
+    usual="verbose tol",
     gaps=("fitted", choice("None")),
     outliers=("fitted", choice("None")),
     uncertainty=("noise", choice()),
@@ -1787,6 +1789,7 @@ NOT_CALLED |= {
     "datasets.BridgeFleet": "made by make_fleet",
     "datasets.FleetBridge": "made by make_fleet",
     "studies.PODCurve": "made by pod_curve",
+    "fem.FrequencySurface": "made by chains, of what they have checked",
     **dict.fromkeys(("datasets.load_kw51", "datasets.load_z24"), "their tests damage files in every place"),
     **{
         f"plotting.{name}": "draws results of others; tables are tried in from_predictions" for name in plotting.__all__
@@ -1799,6 +1802,7 @@ UNTRIED |= {
     "fem.AffineModel": {"contents"},
     "preprocessing.ExponentialMeans": {"sensors", "time_constants"},
     "preprocessing.check_records": {"unit"},
+    "preprocessing.gross_errors": {"unit"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
     "studies.DetectabilityStudy": {"models", "n_replicates"},
     "studies.detection_task": {"columns", "gaps", "outliers"},

@@ -66,8 +66,8 @@ TABLE = {
 ELSEWHERE = [
     *("full-truss", "full-kw51", "full-frame", "full-bridge", "bridge-basis", "kw51-reduced", "tracking"),
     *("truss-chain", "z24-chain", "identify", "study", "monitor-fit", "monitor-update", "updater", "two-jobs"),
-    *("ten-minutes", "lags-many", "gaps", "kw51-damaged", "study-of-eight", "monitor-later"),
-    *("study-truss", "study-footbridge", "study-footbridge-all"),
+    *("ten-minutes", "lags-many", "gaps", "gaps-year", "intervals", "drawn-models", "kw51-damaged"),
+    *("study-of-eight", "monitor-later", "study-truss", "study-footbridge", "study-footbridge-all"),
 ]
 IMPORTS = [f"import {room}" for room in ROOMS.split() if room != "surrogate"]
 ROWS = {"table": [*TABLE], "elsewhere": ELSEWHERE, "imports": ["import surrogate", *IMPORTS]}

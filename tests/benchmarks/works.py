@@ -289,10 +289,10 @@ def lag_features_of_many(clock, quick):
     lags_of(clock, 7, 10_000 if quick else 100_000)
 
 
-def gaps(clock, quick):
+def gaps(clock, quick, n_rows=30_000):
     """KNNGapImputer beside KNNImputer: seven correlated columns, 10 % missing."""
     random = np.random.default_rng(0)
-    values = random.standard_normal((3000 if quick else 30_000, 7)) @ random.standard_normal((7, 7))
+    values = random.standard_normal((3000 if quick else n_rows, 7)) @ random.standard_normal((7, 7))
     values[random.random(values.shape) < 0.1] = np.nan
     with clock.work():
         filled = KNNGapImputer(n_neighbors=10).fit_transform(values)
@@ -300,6 +300,30 @@ def gaps(clock, quick):
         reference = KNNImputer(n_neighbors=10).fit_transform(values)
     clock.keep(EXACT, filled=filled)
     clock.keep(NOT_COMPARED, error=np.abs(filled - reference).max())
+
+
+def intervals(clock, quick):
+    """Prediction intervals of an hourly year of the truss, 5 % of the frequencies missing."""
+    n_rows = 1460 if quick else 8760
+    campaign = make_truss_campaign(samples_per_year=n_rows, samples_per_day=n_rows // 365, random_state=0)
+    T, F = campaign.temperatures, campaign.frequencies
+    F = F.mask(np.random.default_rng(0).random(F.shape) < 0.05)
+    fem = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
+    fem.residuals()
+    with clock.work():
+        bounds = fem.predict_interval(T)
+    clock.keep(1e-6, bounds=np.stack([np.asarray(one) for one in bounds[:2]]))
+
+
+def drawn_models(clock, quick):
+    """Two models drawn from the calibration of KW51's reduced model."""
+    model = make_kw51().reduced(BOUNDS, random_state=0)
+    measured = model.frequencies(draw(model, 1, bounds=0.1))[0]
+    update = ModelUpdater(model, prior=0.15).fit(measured, frequency_std=0.005 * measured)
+    with clock.work():
+        models = update.sample_models(2, random_state=0)
+    nominal = np.ones((1, len(model.parameter_names)))
+    clock.keep(1e-3, frequencies=np.stack([one.frequencies(nominal) for one in models]))
 
 
 def truss_chain(clock, quick):
@@ -563,6 +587,9 @@ WORKS = {
     "lags-one": lag_features_of_one,
     "lags-many": lag_features_of_many,
     "gaps": gaps,
+    "gaps-year": partial(gaps, n_rows=8760),
+    "intervals": intervals,
+    "drawn-models": drawn_models,
     "full-truss": full_truss,
     "full-kw51": full_kw51,
     "full-frame": full_frame,

@@ -177,6 +177,7 @@ def test_a_page_that_cannot_be_written_hides_no_alarm(bridge, after, records, mo
     assert_goes_on(bridge, records, after)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("clock", ["2020-01-01", "2050-01-01"])
 def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, records, monkeypatch, clock):
     """The monitor itself asks the clock whether a jump in the stamps is plausible."""

@@ -1,7 +1,5 @@
 """Files of records in any common form are read as they were meant, to the last bit."""
 
-from datetime import timedelta
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -31,7 +29,7 @@ RECORDS.iloc[5, 0] = np.nan
     units=st.booleans(),
     is_split=st.booleans(),
 )
-@settings(max_examples=40, deadline=timedelta(seconds=5))
+@settings(max_examples=40, deadline=None)
 def test_every_form_is_found(
     tmp_path_factory, separator, decimal, days, clock, encoding, missing, head, units, is_split
 ):
@@ -95,7 +93,7 @@ ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "A
     start=st.datetimes(pd.Timestamp("2015-01-01"), pd.Timestamp("2026-12-01")),
     minutes=st.sampled_from([10, 30, 60]),
 )
-@settings(max_examples=15, deadline=timedelta(seconds=5))
+@settings(max_examples=15, deadline=None)
 def test_local_clocks_are_followed_over_their_changes(tmp_path_factory, zone, start, minutes):
     year = pd.date_range(
         pd.Timestamp(start).floor("h"), periods=370 * 24 * 60 // minutes // 8, freq=f"{minutes}min", tz="UTC"

@@ -83,6 +83,7 @@ class TestChecks:
         assert len(texts) == 1
         assert "'T1' is 20 in 40 rows" in texts[0]
 
+    @pytest.mark.nightly
     def test_a_chain_within_reports_what_was_found(self):
         fitted, _ = said(detector(chain()).fit, STUCK)
         table = fitted[0].estimator_.report_.findings.table

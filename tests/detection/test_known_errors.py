@@ -21,6 +21,7 @@ pytestmark = [
     for message in (
         "rows-from-fleet",
         "weather-of-one-fold",
+        "no-thermal-effect",
         "outside-training-weather",
         "frequency-outliers",
         "few-baseline-records",

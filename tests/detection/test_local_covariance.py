@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
-from skthermo.residuals.weather import NearestPlaces, nearest
+from skthermo.residuals.weather import NearestPlaces, mean_of_nearest, nearest
 from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 
 
@@ -106,3 +106,18 @@ def test_what_is_kept_of_searches_is_bounded(monkeypatch):
         for _ in range(2):
             np.testing.assert_array_equal(searched.of(wanted)[1], nearest(places, wanted, 5)[1])
     assert searched._kept.near.size == 40
+
+
+@pytest.mark.parametrize("number", [1, 7, 200])
+def test_means_of_the_nearest_places_are_those_of_all_distances_whatever_is_missing(number):
+    random = np.random.default_rng(0)
+    places, wanted, values = (random.normal(size=shape) for shape in ((150, 2), (40, 2), (150, 5)))
+    used = random.random(values.shape) < [1, 0.9, 0.5, 0.1, 0]
+    used[:, 2] &= places[:, 0] > 0  # missing in all the weather on one side
+    found = mean_of_nearest(places, np.where(used, values, np.nan), used, wanted, number)
+    assert np.isnan(found[:, 4]).all()
+    for row, place in enumerate(wanted):
+        order = np.argsort(((places - place) ** 2).sum(axis=1))
+        for column in range(4):
+            nearest_used = order[used[order, column]][:number]
+            np.testing.assert_allclose(found[row, column], values[nearest_used, column].mean(), rtol=1e-12)

@@ -44,8 +44,8 @@ def test_table_3_is_the_studies_mean_beside_the_papers(studies):
     for source in EXAMPLE.PAPER_RATES:
         rates = [study.results_.set_index(["source", "scenario"])["rate"].loc[source] for study in studies]
         np.testing.assert_allclose(table[source, "here"].loc[NAMES], 100 * sum(rates).loc[NAMES] / 2, atol=0.006)
-        assert (table[source, "ci_low"] <= table[source, "here"] + 0.01)[:-1].all()
-        assert (table[source, "here"] <= table[source, "ci_high"] + 0.01)[:-1].all()
+        assert (table[source, "lowest"] <= table[source, "here"] + 0.01)[:-1].all()
+        assert (table[source, "here"] <= table[source, "highest"] + 0.01)[:-1].all()
     published = np.subtract(*EXAMPLE.PAPER_RATES.values())
     assert table.loc["Average", ("difference", "paper")] == pytest.approx(np.abs(published).mean(), abs=0.006)
     assert table.loc["Average", ("difference", "here")] < 1.8
@@ -57,10 +57,10 @@ def test_minimum_detectable_damage_is_the_papers(studies):
     for level in ("POD 90%", "POD 95%"):
         found = table[level, "here"].unstack("source")
         assert (np.abs(found["simulated"] - found["reference"]) <= 5).all()  # half a step of the severities
-        assert (table[level, "ci_low"] <= table[level, "here"]).all()
-        assert (table[level, "here"] <= table[level, "ci_high"]).all()
+        assert (table[level, "lowest"] <= table[level, "here"]).all()
+        assert (table[level, "here"] <= table[level, "highest"]).all()
     assert table["POD 90%", "here"].unstack("source").loc[GROUPS, "reference"].tolist() == [20, 30, 20]
-    assert (table["", "paper"] <= table["POD 95%", "ci_high"]).all()
+    assert (table["", "paper"] <= table["POD 95%", "highest"]).all()
 
 
 def test_single_records_meet_the_targets_of_the_benchmark(tables):

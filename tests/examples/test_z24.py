@@ -75,7 +75,7 @@ def test_its_alarms_are_predicted(study_results):
     table = COMPARISON.side_by_side(study_results[1])
     assert list(table.index) == list(FEW)
     rates = table["damage found"]
-    assert (rates["measured"].between(rates["ci_low"] - 5, rates["ci_high"] + 5)).all()
+    assert (rates["measured"].between(rates["lowest"] - 5, rates["highest"] + 5)).all()
     assert COMPARISON.agreement(table).loc["damage found", "rank correlation"] > 0.7
 
 

@@ -45,6 +45,7 @@ def study(fem):
     return study
 
 
+@pytest.mark.nightly
 def test_a_detector_that_finds_far_less_in_truth_ranks_below(study):
     simulated, true = study.ranking(), study.ranking(source="reference")
     kept = true.index[true["within_limit"]]
@@ -54,6 +55,7 @@ def test_a_detector_that_finds_far_less_in_truth_ranks_below(study):
     assert all(order.index(one) < order.index(other) for one, other in clear)
 
 
+@pytest.mark.nightly
 def test_a_detector_that_keeps_no_limit_in_truth_is_not_chosen_for_what_it_finds(study):
     simulated, true = study.ranking(), study.ranking(source="reference")
     assert simulated["pod"].idxmax() == true["pod"].idxmax() == "in-sample"

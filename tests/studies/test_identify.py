@@ -251,6 +251,7 @@ def test_draws_make_a_scenario(fem):
     assert results["rate"].between(0.5, 1).all()
 
 
+@pytest.mark.nightly
 def test_a_mapper_that_has_learned_noise_finds_no_damage_in_healthy_records(fem):
     """Its own residuals are nothing like those of new records."""
     later = make_truss_campaign(random_state=107)

@@ -90,6 +90,7 @@ def test_outliers_do_not_move_the_model():
     np.testing.assert_array_equal(fem.training_records_[1], raw)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("seeded", [True, False])
 def test_equals_scikit_learns_transformed_target_regressor(seeded):
     quarter = T[::4], F[::4]
@@ -156,6 +157,7 @@ def test_gaps_flow_through_cross_validation():
     assert (scores["test_neg_mape"] > -3).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(FILLED)
 def test_imputer_completes_frequencies_in_fit_only():
     holed_T, holed_F = gappy()
@@ -169,15 +171,6 @@ def test_imputer_completes_frequencies_in_fit_only():
         rtol=1e-12,
     )
     assert with_imputer.predict(holed_T).isna().any(axis=None)
-
-
-def test_clone_shares_the_model_and_drops_what_was_fitted():
-    twin = clone(FITTED)
-    assert twin.model is TRUSS
-    assert twin.inverse.model is TRUSS
-    assert twin.inverse is not FITTED.inverse
-    assert not hasattr(twin, "mapper_")
-    np.testing.assert_array_equal(twin.fit(T, F).predict(T), FITTED.predict(T))
 
 
 def test_third_party_models_are_held_by_reference():
@@ -200,29 +193,12 @@ def test_third_party_models_are_held_by_reference():
         model.simulate(T, damage={"top": 0.1})
 
 
-def test_fit_is_idempotent_and_leaves_parameters_alone():
-    model = chain()
-    before = {name: repr(value) for name, value in model.get_params().items()}
-    first = model.fit(T[::4], F[::4]).predict(T)
-    np.testing.assert_array_equal(model.fit(T[::4], F[::4]).predict(T), first)
-    assert {name: repr(value) for name, value in model.get_params().items()} == before
-
-
 def test_nested_parameters_can_be_set():
     model = chain().set_params(
         mapper__lagfeatures__lags=4, inverse__regressor__ridge__alpha=0.1, inverse__noise=0.01, aligner__method="scale"
     )
     assert model.fit(T, F).mapper_[0].lags_ == [0, 1, 2, 3]
     assert model.inverse_.regressor_[-1].alpha == 0.1
-
-
-def test_feature_names_are_remembered_and_checked():
-    assert list(FITTED.feature_names_in_) == ["T1", "T2", "T3"]
-    assert FITTED.n_features_in_ == 3
-    with pytest.raises(ValueError, match="feature names"):
-        FITTED.predict(T.rename(columns={"T1": "air"}))
-    with pytest.raises(ValueError, match="Feature names seen at fit time, yet now missing:\n- T3"):
-        FITTED.predict(T[["T1", "T2"]])
 
 
 def test_impossible_parameters_are_nan_with_a_warning():
@@ -256,6 +232,7 @@ def test_nullable_frames_are_frames():
     np.testing.assert_array_equal(mape(nullable, holed_F), 0)
 
 
+@pytest.mark.nightly
 def test_pandas_output_everywhere_changes_no_value():
     transformer = make_pipeline(BiasAligner(TRUSS), inverse(refine=0))
     words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)

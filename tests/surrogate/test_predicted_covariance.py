@@ -111,6 +111,7 @@ def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_th
     assert (fem.residuals().spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()).all()  # beyond what anybody has seen
 
 
+@pytest.mark.nightly
 def test_intervals_after_thirty_days_hold_a_later_year():
     held = []
     for seed in range(12):

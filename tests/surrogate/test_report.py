@@ -211,6 +211,7 @@ class TestWarningsOfFit:
         assert not caught(fem.fit, z24.temperatures[healthy], z24.frequencies[healthy])
         assert fem.report_.n_trained > 2500
 
+    @pytest.mark.nightly
     def test_one_warning_for_all_folds(self):
         estimator, records = chain(mapper=TemperatureMapper(Ridge())), (T[::3], 1.5 * F[::3])
         record = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))

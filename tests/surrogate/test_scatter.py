@@ -44,6 +44,7 @@ def correlations(memory, n_records):
     return toeplitz(float(memory) ** np.arange(n_records))
 
 
+@pytest.mark.nightly
 def test_means_of_autoregressions_have_the_variance_of_the_closed_form():
     """Also after similar weather, often of neighbours in time, has taken its share of the slow noise."""
     random = np.random.RandomState(1)

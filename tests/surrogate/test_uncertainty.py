@@ -257,6 +257,7 @@ def test_folds_in_unseen_weather_are_named():
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*unsorted-stamps")
 @pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
 def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
     order = np.random.default_rng(0).permutation(len(T))

@@ -52,6 +52,15 @@ def test_draws_of_a_linear_model_have_the_posterior_mean_and_covariance():
     np.testing.assert_allclose(updater.theta_, mean, rtol=1e-6)
 
 
+def test_models_drawn_from_a_reduced_model_are_those_of_the_full_one():
+    full = TRUSS.with_parameters(["bottom", "top"])
+    reduced = full.reduced(0.5, tol=1e-6, random_state=0)
+    both = [calibrated(model, bounds=0.5).sample_models(3, random_state=0) for model in (full, reduced)]
+    expected, found = (np.vstack([model.frequencies(np.ones((1, 2))) for model in models]) for models in both)
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    assert np.ptp(expected, axis=0).min() > 1e-3
+
+
 @pytest.mark.nightly
 def test_moments_on_the_truss_agree_with_importance_sampling():
     updater = calibrated(noise=0.002)
@@ -146,6 +155,7 @@ def test_same_seed_same_models_whatever_the_number_of_jobs():
     assert not np.allclose(found[0], found[2], rtol=1e-4)
 
 
+@pytest.mark.nightly
 def test_shapes_make_models_alike_as_far_as_their_noise_allows():
     dofs, noise = np.arange(0, 22, 2), 0.01
     frequencies, shapes = (values[0] for values in TRUSS.modes([TRUTH]))

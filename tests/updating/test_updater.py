@@ -223,6 +223,7 @@ def test_covariance_is_the_noise_that_fits_pass_on_and_the_cramer_rao_bound():
     np.testing.assert_allclose(passed_on[identifiable], bound[identifiable], rtol=0.02)
 
 
+@pytest.mark.nightly
 def test_covariance_with_shapes_is_the_scatter_of_repeated_fits_and_the_cramer_rao_bound():
     """Standard deviations of 50 fits are known to 10 %; three of these are 30 %."""
     noise, shape_noise, n_fits, dofs = 0.002, 0.01, 50, [0, 3, 7, 9, 14, 17, 21]
