@@ -106,7 +106,7 @@ for ax, name in zip(axes, names, strict=True):
         ax.errorbar(kind.index, kind, bars, fmt="none", ecolor=GREY, elinewidth=1, zorder=0)
     ax.axhline(0, color="black", lw=0.7)
     ax.set_title(f"stiffness of {name.replace('_', ' ')}", fontsize="medium")
-fig.supylabel("change from what the weather explains (%)")
+fig.supylabel("change of stiffness from what the weather explains (%)")
 axes[-1].set_xlabel("day, by the hour counter of the records")
 bars = axes[0].errorbar([], [], [], fmt="none", ecolor=GREY, label="± 2 standard deviations of healthy days")
 fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
