@@ -102,9 +102,9 @@ print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB")
 # %%
 # How fast does it age?
 # ---------------------
-# :func:`~skthermo.monitoring.track_parameters` looks back over all records until the damage, and tells ageing from
-# weather and noise. Records of the days on which a sensor failed are left out first: this truss's thermometers are so
-# independent of each other that they predict little of one that is missing.
+# :func:`~skthermo.monitoring.track_parameters` looks back over all records until the damage, and separates ageing from
+# weather and noise. Changes of stiffness are since the first day. Records of the days on which a sensor failed are left
+# out first: this truss's thermometers are so independent of each other that they predict little of one that is missing.
 
 trusted = records[:"2027-11"]
 for _, fault in monitor.faults_.iterrows():
@@ -116,7 +116,7 @@ change = 100 * (history.table - 1)
 estimate, *band = (change.xs(side, axis=1, level=1) for side in ("estimate", "ci_low", "ci_high"))
 labels = {"labels": ("estimate", ""), "interval_label": "interval, 95 %"}
 PredictionDisplay.from_predictions(
-    estimate, None, *band, kind="lines", quantity="change from nominal", unit="%", **labels
+    estimate, None, *band, kind="lines", quantity="change of stiffness", unit="%", **labels
 )
 
 save_figures(options.figures)

@@ -131,7 +131,7 @@ print((100 * known.deviations).round(2).to_frame().T.to_string(index=False))
 # %%
 # M1: from frequencies to parameters
 # ----------------------------------
-# Parameters of test samples, and as M1 finds them with the paper's network.
+# Parameters of test samples, as multiples of nominal, and as M1 finds them with the paper's network.
 
 test = sample(bridge(), 0.3, 200, random_state=1)
 with quiet():
@@ -155,7 +155,9 @@ with quiet():
     history = paper.fem.estimate_parameters(filled.frequencies[:BASELINE])
     mapped = paper.test(paper.fem.predict_parameters(filled.temperatures[:BASELINE]))
 labels = ("from frequencies", "from temperatures")
-PredictionDisplay.from_predictions(paper.test(history), mapped, labels=labels, unit="", n_columns=1)
+PredictionDisplay.from_predictions(
+    paper.test(history), mapped, labels=labels, quantity="over nominal", unit="", n_columns=1
+)
 
 # %%
 # Table 7, their mean absolute percentage differences:

@@ -254,7 +254,10 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
     monitor = FakeMonitor(drift=found)
     standing = standing_of(monitor)
     whether, said = drift_sentences(standing)
-    assert whether == "The structure drifts (probability by chance 0.001)."
+    assert (
+        whether
+        == "The stiffness changes slowly; a change as large would be seen with a probability of 0.001 by chance."
+    )
     loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert said.startswith(loss)
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
@@ -270,7 +273,7 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
         return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[-1]
 
     assert sentence(per_year_error=0.01).endswith("at the earliest).")
-    assert sentence(significant=False).startswith("No drift of stiffness is seen")
+    assert sentence(significant=False).startswith("No slow change of stiffness is certain")
     assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
     assert "reached" not in sentence(per_year=0.01)
     assert "more than 100 years" in sentence(per_year=-1e-4)

@@ -139,7 +139,7 @@ def test_rows_in_weather_of_the_fleet_are_counted_and_those_beyond_it_are_warned
 def test_the_report_says_what_weather_is_the_fleets():
     report = fitted()[0].report_
     assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
-    assert re.search("predictions are based on a fleet: 'T[12]' from -40 to 60, here -", repr(report))
+    assert re.search("predictions are based on the fleet: 'T[12]' from -40 to 60, here -", repr(report))
     assert not list(chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings())
     T, F = bridge(0, 15)
     alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_
@@ -155,7 +155,8 @@ def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     assert len(fem.training_range_.names) == 4
 
 
-def test_damage_is_identified_and_studies_run_on_a_chain_that_stands_on_a_fleet():
+@pytest.mark.filterwarnings("ignore:.*not-compared")
+def test_damage_is_identified_and_studies_run_on_a_chain_that_learned_from_a_fleet():
     fem, T, F = fitted()
     damaged = fem.simulate(T[30:], damage={"pier": 0.15}, noise="fitted", random_state=0)
     found = identify_damage(fem, T[30:], damaged)

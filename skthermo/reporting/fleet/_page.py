@@ -145,13 +145,13 @@ class PageWriter:
         if chain is None:
             why = "The file of its model cannot be read" if without_chain else error or "No reason is given"
             return Bridge(name, FAILED, BROKEN, why=f"{why}.", n_warnings=n_warnings), None
-        why = f"{error or 'Its model was fitted only'}."
+        why = f"{error or 'It has a model but no monitor'}."
         return Bridge(name, UNWATCHED, WITHOUT_MONITOR, why=why, n_warnings=n_warnings), chain
 
 
 def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, written: str) -> list[Section]:
     """Sections on a bridge without a monitor: what its model has learned, or why it could not."""
-    unknown = "Whether the bridge is healthy is not known: silence never means healthy."
+    unknown = "Whether the bridge is healthy is not known, because no record of it is evaluated."
     headline, advice = HEADLINES.get(bridge.state, HEADLINES[UNWATCHED])
     state = banner(NOT_EVALUATED, written, headline, bridge.why, unknown)
     sections = [section("today", "Today", state, paragraphs(advice))]

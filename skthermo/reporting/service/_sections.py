@@ -212,9 +212,9 @@ def events(standing: Standing) -> Section:
     columns = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
     rows = [_cells(standing, number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
     caption = (
-        "Events, the newest first. Highest index: the highest damage index of the event, beside a threshold of now "
-        f"{significant(standing.monitor.threshold_, 3)}. Modes: those that changed most, the first the most. Records: "
-        "how many were in alarm."
+        "Events, the newest first. Highest index: the largest damage index of the event; the threshold is "
+        f"{significant(standing.monitor.threshold_, 3)} now. Modes: those that changed most, the first the most. "
+        "Records: how many were in alarm."
     )
     return section("events", "Events", paragraphs(text, older), table(caption, columns, rows, is_cards=True))
 
@@ -276,10 +276,10 @@ def drift_sentences(standing: Standing) -> list[str]:
     if found is None:
         return ["Slow drift is not followed: that needs a model of the structure."]
     certain = found[found["significant"].astype(bool)]
-    by_chance = f"(probability by chance {probability_text(found['p_value'].iloc[0])})"
+    by_chance = f"seen with a probability of {probability_text(found['p_value'].iloc[0])} by chance"
     if not len(certain):
-        return [f"No drift of stiffness is seen {by_chance}."]
-    sentences = [f"The structure drifts {by_chance}."]
+        return [f"No slow change of stiffness is certain; one as large would be {by_chance}."]
+    sentences = [f"The stiffness changes slowly; a change as large would be {by_chance}."]
     for name, row in certain.iterrows():
         change, rate = float(row["change"]), float(row["per_year"])
         verb, speed = "lost" if change < 0 else "gained", "loses" if rate < 0 else "gains"

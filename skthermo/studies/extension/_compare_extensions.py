@@ -229,9 +229,7 @@ def compare_extensions(
     name = study.detector_name(detector)
     present = study.arrangements_[name]
     changes, fem = changes_by_severity(study, name), study.fem
-    factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
-    if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):
-        raise ValueError(f"baseline_factors is {baseline_factors!r:.200}; expected numbers above 1, such as [2.0]")
+    factors = _checked_factors(baseline_factors)
     ranks = _further_modes(fem.model, modes)
     scatter = _scatter(study) if noise is None else noise
     candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
@@ -262,15 +260,27 @@ def compare_extensions(
                 ]
     if not rows:
         raise ValueError("there is no candidate; expected modes, baseline_factors or sensors")
-    unfound = list(dict.fromkeys(row["family"] for row in rows if np.isnan(row["gain"])))
-    if unfound:
+    _warn_of_undetected(list(dict.fromkeys(row["family"] for row in rows if np.isnan(row["gain"]))))
+    return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
+
+
+def _checked_factors(baseline_factors: Any) -> list[float]:
+    """Factors of the length of the baseline, all above 1."""
+    factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
+    if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):
+        raise ValueError(f"baseline_factors is {baseline_factors!r:.200}; expected numbers above 1, such as [2.0]")
+    return factors
+
+
+def _warn_of_undetected(families: Sequence[str]) -> None:
+    """Warn of families of damage that is not detected, so that no gain is known."""
+    if families:
         warn_user(
-            f"families {unfound} have candidates without a gain: damage is not detected at the severities around those "
-            "of the study. Repeat the study with larger severities",
+            f"families {families} have candidates without a gain: damage is not detected at the severities around "
+            "those of the study. Repeat the study with larger severities",
             ResultWarning,
             "undetected-families",
         )
-    return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
 
 def changes_by_severity(study: DetectabilityStudy, detector: str | None = None) -> ChangesBySeverity:
