@@ -6,7 +6,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 5256 --bridges 4
 
 Frequencies of the truss follow made-up weather, with noise that is correlated in time, gaps and outliers. Each part and
-size has a process of its own, whose peak memory, with that of its workers, is printed. In the parts "chain" and
+size has a process of its own, whose peak memory, without that of its workers, is printed. In the parts "chain" and
 "study", the inverse is a linear regression without refinement, which costs the same for each row and is not measured
 here; the part "defaults" has the defaults of all. "service" is a monitor that is fitted to the first tenth of the
 records, a year of ten, and then updated by each of the other days; "fleet" are bridges with a year of hourly records
@@ -267,8 +267,7 @@ def one(part, size):
         start = clock()
         way()
         print(json.dumps({"step": step, "seconds": clock() - start}))
-    own, workers = (resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    print(json.dumps({"own": own, "worker": workers}))
+    print(json.dumps({"gigabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}))
 
 
 def main():
@@ -286,13 +285,13 @@ def main():
     missed = 0
     for part in options.parts:
         what, sizes = ("bridge", options.bridges) if part == "fleet" else ("row", options.rows)
-        seconds, gigabytes, texts = {}, {}, []
+        seconds, peaks, texts = {}, {}, []
         for size in sizes:
             command = [sys.executable, __file__, "--one", f"--{what}s", str(size), "--parts", part]
             done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
             found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
             seconds[size] = {line["step"]: line["seconds"] for line in found if "step" in line}
-            gigabytes[size] = found[-1]
+            peaks[size] = found[-1]["gigabytes"]
             texts += [f"{size} {what}s: {line['text']}" for line in found if "text" in line]
             missed += sum(line.get("is_missed", False) for line in found)
         table = pd.DataFrame(seconds)
@@ -300,7 +299,6 @@ def main():
         ratios = (each / each.shift(axis=1)).where(table >= LEAST_SECONDS)
         shown = pd.concat({"seconds": table.round(2), f"us a {what}": (1e6 * each).round(1)}, axis=1)
         shown["ratio"] = ratios.iloc[:, -1].round(2)
-        peaks = {size: max(one.values()) for size, one in gigabytes.items()}
         memory_used = ", ".join(f"{peak:.2f} GB of {size} {what}s" for size, peak in peaks.items())
         print("\n".join([f"{part}: at most {memory_used}", *texts, "", shown.to_string(), ""]), flush=True)
         missed += int((ratios > MOST_RATIO).to_numpy().sum() + (max(peaks.values(), default=0.0) > MOST_GIGABYTES))
