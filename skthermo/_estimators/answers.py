@@ -6,11 +6,23 @@ from contextvars import ContextVar
 from pickle import PicklingError
 from typing import Any, TypeVar
 
-from joblib import hash as content_of
+import joblib
+import numpy as np
 
 Answer = TypeVar("Answer")
 
 MOST_KEPT = 12_500_000  # numbers, of 8 bytes, in the answers that are kept
+
+
+def content_of(inputs: Any) -> str:
+    """Hash of one input or a tuple; of tables, values and labels count, and not what pandas caches of an index."""
+    return joblib.hash([_content(one) for one in (inputs if isinstance(inputs, tuple) else (inputs,))])
+
+
+def _content(one: Any) -> Any:
+    if not hasattr(one, "columns"):
+        return one
+    return np.asarray(one), list(one.columns), getattr(one.index, "asi8", one.index), str(one.index.dtype)
 
 
 class KeptAnswers:

@@ -15,9 +15,9 @@ from weakref import ref
 
 import numpy as np
 from joblib import Parallel
-from joblib import hash as content_of
 from numpy.typing import NDArray
 
+from skthermo._estimators.answers import content_of
 from skthermo.exceptions import SkthermoWarning
 
 Records = TypeVar("Records")

@@ -6,10 +6,9 @@ from skthermo.metrics._detectability import (
     probability_of_false_alarm,
     time_to_detection,
 )
-from skthermo.metrics._errors import complete_r2, error_table, frequency_scorer, mape
+from skthermo.metrics.errors import error_table, frequency_scorer, mape
 
 __all__ = [
-    "complete_r2",
     "error_table",
     "frequency_scorer",
     "mape",

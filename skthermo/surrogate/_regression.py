@@ -49,7 +49,7 @@ from skthermo._validation import (
     seeded,
     validate_data,
 )
-from skthermo.metrics import complete_r2
+from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, gross_errors
 
 Result = TypeVar("Result")

@@ -1085,7 +1085,7 @@ for name in ("mape", "error_table", "complete_r2"):
         else {}
     )
     use(
-        f"metrics.{name}",
+        f"metrics.errors.{name}" if name == "complete_r2" else f"metrics.{name}",
         y_true=(F, table(F, rows=True, positive=positive)),
         y_pred=(PREDICTED, table(PREDICTED, rows=True, positive=False)),
         **more,
@@ -1389,7 +1389,7 @@ fitted(
     estimator=(IsolationForest(n_estimators=5, random_state=0), {}),
 )
 use(
-    "metrics.complete_r2",
+    "metrics.errors.complete_r2",
     y_true=(F, {}),
     y_pred=(PREDICTED, {}),
     sample_weight=(np.ones(len(F)), vector(np.ones(len(F)), but=("zero inside",))),
@@ -1534,8 +1534,8 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("fem.Structure", "neither matrix", lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}), "stiffness"),
     ("fem.CallableModel", "text", lambda: fem.CallableModel(lambda t: "no", ["k"], 1).frequencies([[1]]), "expected"),
     ("fem.shape_jacobian", "a program", lambda: fem.shape_jacobian(ONE_MODE, [1.0]), "'local_modes'"),
-    ("fem.share_reordered", "a program", lambda: fem.share_reordered(ONE_MODE, [[1.0]]), "'modes'"),
-    ("fem.share_reordered", "no rows", lambda: fem.share_reordered(TRUSS, np.ones((0, 4))), "theta"),
+    ("fem.share_reordered", "a program", lambda: fem.modal.share_reordered(ONE_MODE, [[1.0]]), "'modes'"),
+    ("fem.share_reordered", "no rows", lambda: fem.modal.share_reordered(TRUSS, np.ones((0, 4))), "theta"),
     ("fem.match_modes", "too many modes", lambda: fem.match_modes(TRUSS, np.ones((1, 50))), "50"),
     ("fem.match_modes", "no dofs", lambda: fem.match_modes(TRUSS, NOMINAL, shapes=np.ones((2, 6))), "dofs"),
     ("LagFeatures", "a table of lags", lambda: LagFeatures([[1, 2]]).fit(HOURLY), "lags"),

@@ -46,7 +46,8 @@ FROM_THE_DEPTHS = re.compile(
 """Messages of NumPy, SciPy, pandas and Python about what a wrong input led to."""
 
 SAYS_WHAT = re.compile(
-    "[Ee]xpected|must be|should match|is expecting|not fitted|is none of these|not readable as|; found|; .+; .+"
+    "[Ee]xpected|must be|should match|is expecting|not fitted|is none of these|not readable as|; found"
+    r"|: .+\. [A-Z].+\. [A-Z]"
 )
 """What says what was got and what was expected, or what was found, what follows and what to do; of scikit-learn's words
 those on parameters and on other columns."""

@@ -11,7 +11,6 @@ from sklearn.model_selection import cross_validate
 
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.metrics import (
-    complete_r2,
     error_table,
     frequency_scorer,
     mape,
@@ -19,6 +18,7 @@ from skthermo.metrics import (
     probability_of_detection,
     probability_of_false_alarm,
 )
+from skthermo.metrics.errors import complete_r2
 
 RNG = np.random.default_rng(0)
 MEASURED = RNG.uniform(3, 5, (60, 2))

@@ -14,7 +14,7 @@ from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.metrics import complete_r2
+from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 

@@ -26,7 +26,7 @@ from skthermo.fleet.prior._families import CoefficientFamily, Member
 from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
-from skthermo.metrics import complete_r2
+from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import gross_errors
 from skthermo.residuals.weather import TrainingRange, parts
 
@@ -197,7 +197,8 @@ class FleetMapper(RegressorMixin, Estimator):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_inputs)
-            Inputs; rows with NaN are NaN.
+            Inputs; rows with NaN are NaN. The chain or compensator that holds the mapper warns of rows outside
+            ``reach_``.
         return_std : bool, default=False
             Whether to return standard deviations, too.
 
@@ -220,7 +221,8 @@ class FleetMapper(RegressorMixin, Estimator):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_inputs)
-            Inputs; rows with NaN are NaN.
+            Inputs; rows with NaN are NaN. The chain or compensator that holds the mapper warns of rows outside
+            ``reach_``.
 
         Returns
         -------

@@ -62,7 +62,7 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
-from skthermo.metrics import complete_r2
+from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, gross_errors
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns

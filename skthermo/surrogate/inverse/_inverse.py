@@ -28,7 +28,7 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, evaluate
-from skthermo.metrics import complete_r2
+from skthermo.metrics.errors import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse._refinement import FAR_OUTSIDE, Refinement, unconverged

@@ -128,7 +128,7 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike, sample_weight: ArrayLike |
 
     Examples
     --------
-    >>> from skthermo.metrics import complete_r2
+    >>> from skthermo.metrics.errors import complete_r2
     >>> complete_r2([[4.0], [4.2], [4.4]], [[4.0], [4.2], [float("nan")]])
     1.0
     """
