@@ -200,12 +200,20 @@ def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
 
 
 def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
-    """Times of local clocks, in the order of the file: in the hour that comes twice, those after a step back are of
-    winter time."""
+    """Times of local clocks, in the order of the file. Of times that come twice in a night, those are of winter time
+    that follow a step back, or a step that only winter time makes as long as the usual one."""
     times = index.as_unit("ns").asi8
+    first, second = (
+        index.tz_localize(zone, ambiguous=np.full(len(index), is_summer), nonexistent="NaT")
+        for is_summer in (True, False)
+    )
+    shift = np.where(first.isna(), 0, second.as_unit("ns").asi8 - first.as_unit("ns").asi8)
+    step = np.diff(times)
+    usual = np.median(step) if len(step) else 0
     is_again = np.zeros(len(times), dtype=bool)
-    is_again[1:] = times[1:] <= np.maximum.accumulate(times)[:-1]
-    local = index.tz_localize(zone, ambiguous=~is_again, nonexistent="NaT")
+    is_again[1:] = (step + shift[1:] <= usual) | (times[1:] <= np.maximum.accumulate(times)[:-1])
+    is_again = pd.Series(is_again & (shift > 0)).groupby(index.normalize()).cummax().to_numpy()
+    local = second.where(is_again, first)
     if local.hasnans:
         place = int(np.argmax(local.isna()))
         raise ValueError(

@@ -1,9 +1,11 @@
 """Files of records in any common form are read as they were meant, to the last bit."""
 
+from datetime import datetime
+
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo.commands._looking import DAYS, look_at
@@ -91,8 +93,10 @@ ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "A
 @given(
     zone=st.sampled_from(ZONES),
     start=st.datetimes(pd.Timestamp("2015-01-01"), pd.Timestamp("2026-12-01")),
-    minutes=st.sampled_from([10, 30, 60]),
+    minutes=st.sampled_from([10, 20, 30, 60]),
 )
+@example(zone="Australia/Lord_Howe", start=datetime(2015, 3, 1), minutes=60)  # the clock goes back by half an hour
+@example(zone="Australia/Lord_Howe", start=datetime(2015, 3, 1), minutes=20)
 @settings(max_examples=15, deadline=None)
 def test_local_clocks_are_followed_over_their_changes(tmp_path_factory, zone, start, minutes):
     year = pd.date_range(
