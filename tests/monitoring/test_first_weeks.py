@@ -82,5 +82,6 @@ def test_winter_weeks_keep_the_false_alarm_rate_of_a_year_and_find_damage():
         silent = monitor_of(Logs).fit(records[:WEEKS])
         silent.update(records[WEEKS:])
         unaware.append(len(silent.events_))
-    assert np.mean(unaware) > 1.5 > np.mean(events) + 0.5
+    assert np.mean(events) < 1  # in a year, as asked
+    assert np.mean(events) < np.mean(unaware)
     assert np.mean(found) > 0.8
