@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pickle import PicklingError
 from typing import Any
 
-import joblib
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.answers import content_of
 from skthermo._estimators.warnings import reported_by_caller
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
@@ -165,7 +165,7 @@ class LearnedHeads:
         """The steps before the last one of a pipeline, fitted, and what they make of healthy records."""
         head = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], "passthrough")], memory=pipeline.memory)
         try:
-            key = joblib.hash((pipeline.steps[:-1], healthy))
+            key = content_of((pipeline.steps[:-1], healthy))
         except PicklingError:
             return head, head.fit_transform(healthy)
         if key not in self._learned:
