@@ -73,7 +73,7 @@ class Regression:
         return explain_rows(self.rest.predict(inputs), explained_rows(inputs))
 
     def errors(self, X: Any) -> PredictionError:
-        """Errors of the predictions that the estimator tells; none where it does not."""
+        """Errors of the predictions as the estimator states them; none where it does not."""
         if not self.states_errors:
             return PredictionError.none()
         with without_warnings():  # which predictions have given, here and below
@@ -121,7 +121,7 @@ class Regression:
 class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
     """Fits and predicts with the rows that a regressor accepts; the prediction of other rows is NaN.
 
-    The compensator around has checked the records with some findings, and warns of what it hands on. With
+    The compensator has checked the records with some findings, and warns of what it hands on. With
     ``states_errors``, the covariance of each row's prediction follows in the columns behind it.
     """
 

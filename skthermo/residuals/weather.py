@@ -23,14 +23,12 @@ from skthermo.residuals.gaussian import Gaussian
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
-SPARE, LEAST_SHARE = (
-    1.25,
-    1 / 3,
-)  # a search for columns with gaps finds so many times as many places, for so large a share
+SPARE = 1.25  # so many times as many places are searched at once for all columns with gaps
+LEAST_SHARE = 1 / 3  # of the places, for which a column with gaps is searched with the others
 MOST_KEPT = 4_000_000  # distances to nearest places that are kept, and as many positions
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
-MOST_LEARNED = 20_000  # number of records that tell as much of how sensors go together as more of them would
+MOST_LEARNED = 20_000  # records that show how sensors go together as well as more of them would
 LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
 JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
 FEWEST = 36  # records in a mean departure of a sensor
