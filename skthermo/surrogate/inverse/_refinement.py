@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import combinations_with_replacement
 from math import comb
 from typing import Any
@@ -294,9 +294,10 @@ class Local:
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[rows] = theirs
 
-    def beside(self, other: Local) -> Local:
-        """These rows, and then others."""
-        return Local(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)))
+    @classmethod
+    def together(cls, parts: Sequence[Local]) -> Local:
+        """The rows of all parts, one after the other."""
+        return cls(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
 
     def of(self, rows: NDArray) -> Local:
         """Some rows."""
@@ -342,10 +343,11 @@ class Refined:
         for mine, theirs in zip(self._states, other._states, strict=True):
             mine[rows] = theirs
 
-    def beside(self, other: Refined) -> Refined:
-        """These rows, and then others."""
-        states = zip(self._states, other._states, strict=True)
-        return Refined(self.local.beside(other.local), *(np.append(*pair) for pair in states))
+    @classmethod
+    def together(cls, parts: Sequence[Refined]) -> Refined:
+        """The rows of all parts, one after the other."""
+        states = zip(*(part._states for part in parts), strict=True)
+        return cls(Local.together([part.local for part in parts]), *map(np.concatenate, states))
 
     @property
     def _states(self) -> tuple[NDArray, ...]:
@@ -355,12 +357,13 @@ class Refined:
 def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
 
-    Rows that stall where a model that sorts its modes has kinks start again beyond; rows with a large misfit, where two
-    modes exchange their shapes, start again at the estimate from frequencies alone.
+    Rows that stall where a model that sorts its modes has kinks start again beyond, and so do those with a misfit, if
+    two modes are exchanged there; rows with a large misfit, where two modes exchange their shapes, start again at the
+    estimate from frequencies alone.
     """
     found = minimise(objective, start, n_steps)
 
-    def again(rows: NDArray[np.intp], beyond: Array) -> None:
+    def again(rows: NDArray[np.intp], beyond: Array | Local) -> None:
         there = minimise(objective.of(rows), beyond, n_steps)
         there.solves += found.solves[rows]
         better = there.local.value < found.local.value[rows]
@@ -371,7 +374,12 @@ def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> 
         doubtful = ~found.converged | (normalised_misfit(objective, found.local) > SOME_MISFIT)
         rows = np.flatnonzero(doubtful & (np.abs(gap(objective, found.local, lower)) < CLOSE))
         if rows.size:
-            again(rows, across(objective.of(rows), found.local.of(rows), lower))
+            here, some = found.local.of(rows), objective.of(rows)
+            beyond = some.at(across(some, here, lower))
+            goes_on = ~found.converged[rows] | exchanged(here, beyond, lower)
+            found.solves[rows[~goes_on]] += 1
+            if goes_on.any():
+                again(rows[goes_on], beyond.of(goes_on))
     if sorts:
         rows = np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > LARGE_MISFIT))
         if rows.size:
@@ -383,11 +391,11 @@ def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> 
     return found
 
 
-def minimise(objective: Objective, start: Array, n_steps: int) -> Refined:
-    """Levenberg-Marquardt steps from each start."""
-    found = objective.at(start.copy())
-    converged, damping = np.zeros(len(start), dtype=bool), np.zeros(len(start))
-    solves = np.ones(len(start), dtype=np.intp)
+def minimise(objective: Objective, start: Array | Local, n_steps: int) -> Refined:
+    """Levenberg-Marquardt steps from each start, ln theta or the objective there."""
+    found = start if isinstance(start, Local) else objective.at(start.copy())
+    converged, damping = np.zeros(len(found.x), dtype=bool), np.zeros(len(found.x))
+    solves = np.ones(len(found.x), dtype=np.intp)
     active = np.flatnonzero(np.isfinite(found.value))
     for remaining in range(n_steps, -1, -1):
         here, problem = found.of(active), objective.of(active)
@@ -436,10 +444,20 @@ def gap(objective: Objective, found: Local, lower: int) -> Array:
 
 def across(objective: Objective, found: Local, lower: int) -> Array:
     """One Gauss-Newton step that aims at the measured modes ``lower`` and ``lower + 1`` in exchanged order."""
-    order = np.arange(objective.log_measured.shape[1])
+    n_modes = objective.log_measured.shape[1]
+    order = np.arange(n_modes)
     order[[lower, lower + 1]] = order[[lower + 1, lower]]
-    here = objective.with_modes(order).at(found.x)
+    fitted = np.exp(objective.log_measured - found.residual[:, :n_modes]), found.sensitivity[:, :n_modes]
+    here = replace(objective.without_shapes().with_modes(order), linearise=lambda theta: fitted).at(found.x)
     return here.x + here.step(objective.prior, np.zeros(len(here.x)))
+
+
+def exchanged(before: Local, after: Local, lower: int) -> NDArray[np.bool_]:
+    """Whether the modes ``lower`` and ``lower + 1`` have each other's derivatives afterwards, as beyond a crossing."""
+    pair = slice(lower, lower + 2)
+    mine, others = before.sensitivity[:, pair], before.sensitivity[:, pair][:, ::-1]
+    same, other = (((after.sensitivity[:, pair] - one) ** 2).sum(axis=(1, 2)) for one in (mine, others))
+    return other < same
 
 
 SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
@@ -652,7 +670,7 @@ class Refinement:
         new = np.flatnonzero(place < 0)
         if new.size:
             place[new] = len(known_inputs) + np.arange(new.size)
-            found = found.beside(self._refine(objective.of(new), start[new]))
+            found = Refined.together([found, self._refine(objective.of(new), start[new])])
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
@@ -661,7 +679,7 @@ class Refinement:
         blocks = np.split(np.arange(len(start)), range(size, len(start), size))
         refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
         parts = with_progress(refined, len(start), None, count=lambda part: len(part.converged), unit="records")
-        return reduce(Refined.beside, parts)
+        return Refined.together([*parts])
 
     def _refine_block(self, objective: Objective, start: Array) -> Refined:
         """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
