@@ -150,9 +150,9 @@ def study(T, F):
     yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, whole, scenarios, **options).run(T, baseline=T.join(F))
 
 
-def defaults(T, F):
+def defaults(T, F, n_replicates=10):
     fem = DataInformedFEM(make_truss(), random_state=0)
-    options = {"random_state": 0}
+    options = {"n_replicates": n_replicates, "random_state": 0}
     yield "fit", lambda: fem.fit(T, F)
     yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, detector_of(F), [{"bottom": 0.1}], **options).run(T)
 
@@ -193,7 +193,8 @@ def service(T, F):
 def drawings(T, F):
     some = slice(None, None, max(len(T) // ROWS_FOR_DRAWINGS, 1))
     fem, detector = quick_chain().fit(T[some], F[some]), MahalanobisDetector().fit(F[some])
-    predicted, ends, index = fem.predict(T), fem.predict_interval(T), detector.damage_index(F)
+    predicted, index = fem.predict(T), detector.damage_index(F)
+    ends = (1 - 2 * fem.noise_) * predicted, (1 + 2 * fem.noise_) * predicted
     made = {
         "PredictionDisplay": partial(PredictionDisplay.from_predictions, F, predicted, *ends),
         "PredictionDisplay, scatter": partial(PredictionDisplay.from_predictions, F, predicted, kind="scatter"),
@@ -273,17 +274,17 @@ OF_RECORDS = (preprocessing, chain, detection, monitoring, study, defaults, serv
 PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
 
 
-def one(part, size):
+def one(part, size, **options):
     """Print seconds of each step of a part, and gigabytes, as lines of JSON."""
     if part is fleet:
         steps, clock = fleet(size), time.perf_counter
     else:
         T, F = records(size, 10 if part is service else 1)
-        steps, clock = part(T, with_faults(F)), time.process_time
+        steps, clock = part(T, with_faults(F), **options), time.process_time
     for step, way in steps:
         start = clock()
         way()
-        print(json.dumps({"step": step, "seconds": clock() - start}))
+        print(json.dumps({"step": step, "seconds": clock() - start}), flush=True)
     print(json.dumps({"gigabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}))
 
 
@@ -292,12 +293,14 @@ def main():
     parser.add_argument("--rows", type=int, nargs="+", default=[5_256, 52_560])
     parser.add_argument("--bridges", type=int, nargs="+", default=[10, 100])
     parser.add_argument("--parts", nargs="+", default=[*PARTS], choices=[*PARTS])
+    parser.add_argument("--replicates", type=int, default=10, help="of the study of the part defaults")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.one:
         part = PARTS[options.parts[0]]
-        one(part, (options.bridges if part is fleet else options.rows)[0])
+        more = {"n_replicates": options.replicates} if part is defaults else {}
+        one(part, (options.bridges if part is fleet else options.rows)[0], **more)
         return 0
     missed = 0
     for part in options.parts:
@@ -305,6 +308,7 @@ def main():
         seconds, peaks, texts = {}, {}, []
         for size in sizes:
             command = [sys.executable, __file__, "--one", f"--{what}s", str(size), "--parts", part]
+            command += ["--replicates", str(options.replicates)]
             done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
             found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
             seconds[size] = {line["step"]: line["seconds"] for line in found if "step" in line}
