@@ -171,9 +171,14 @@ class ActiveDetector(SavesFrames):
         return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
 
     @property
+    def estimate(self) -> FalseAlarmEstimate:
+        """That of damage events."""
+        return self.estimates[DAMAGE]
+
+    @property
     def threshold(self) -> float:
         """A damage event opens with an index above it."""
-        return self.estimates[DAMAGE].rule.threshold
+        return self.estimate.rule.threshold
 
     @property
     def watch_threshold(self) -> float | None:
@@ -207,7 +212,7 @@ class ActiveDetector(SavesFrames):
         if self.direction is None:
             return dict.fromkeys([DAMAGE, *watch], index)
         with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimates[DAMAGE].rule.release)
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimate.rule.release)
         stiffer = np.zeros(len(index), dtype=bool)
         if wanted.any():
             begin = self.memory.start(records.index.asi8, first)

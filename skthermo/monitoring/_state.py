@@ -15,7 +15,7 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog, event_table
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
 from skthermo.monitoring._transitions import Transition, event_changes
@@ -63,12 +63,17 @@ class MonitorState(SavesFrames):
         checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
         memory = active.corrections.cleaned(store.baseline.iloc[start:])[list(active.trained.columns)]
         days = _days_of(nothing, np.zeros(0, dtype=np.int64))
-        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimates[DAMAGE]),))
+        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimate),))
 
     @property
     def corrections(self) -> CorrectionState:
         """States of the corrections at the beginning of the newest day."""
         return self.checkpoints[-1].corrections
+
+    @property
+    def event_table(self) -> pd.DataFrame:
+        """Events as a frame, counted from 1, with what the owner has said of them."""
+        return event_table(self.log.events, self.acknowledgements, self.store.last.tz)
 
     @property
     def acknowledged(self) -> list[int]:
@@ -255,7 +260,7 @@ class MonitorState(SavesFrames):
             log, start = log.ended(end), active.corrections.start()
             points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
         day = points[-1].day
-        estimates = (*self.estimates, (self.store.last, active.estimates[DAMAGE]))
+        estimates = (*self.estimates, (self.store.last, active.estimate))
         kept = self.evaluations[self.evaluations.index < day]
         state = replace(self, checkpoints=points, log=log, evaluations=kept, estimates=estimates)
         today = self.store.kept.index[self.store.kept.index >= day]
