@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,10 +78,15 @@ def printable(text: Any) -> str:
     )
 
 
-def listed(names: Sequence[Any]) -> str:
+def listed(names: Sequence[Any], word: str = "and") -> str:
     """Names in a sentence."""
     *first, last = [str(name) for name in names] or [""]
-    return f"{', '.join(first)} and {last}" if first else last
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
+def capital(text: str) -> str:
+    """A text as the beginning of a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def duration_text(wait: Any) -> str:
@@ -98,6 +103,23 @@ def duration_text(wait: Any) -> str:
     )
     text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
     return f"{text} {unit}{'' if text == '1' else 's'}"
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if value is pd.NaT:
+        return None
+    if isinstance(value, pd.Timestamp | pd.Timedelta):
+        return value.isoformat() if isinstance(value, pd.Timestamp) else value.total_seconds()
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
 def period_text(index: pd.Index | None) -> str:

@@ -63,7 +63,6 @@ class Done:
         self.code = self.code if self.code == ALARM else FAILED
 
     def facts(self) -> dict[str, Any]:
-        """Plain values for JSON and metrics."""
         return {
             "name": self.name,
             "state": self.state,
@@ -85,17 +84,14 @@ class Bridge:
 
     @cached_property
     def settings(self) -> Settings | None:
-        """The settings, if there are any."""
         return read_settings(self.file) if self.file.suffix == ".toml" else None
 
     @property
     def name(self) -> str:
-        """Name of the bridge."""
         return self.file.stem if self.settings is None else self.settings.name
 
     @property
     def monitor_file(self) -> Path:
-        """File of the monitor."""
         return self.file if self.settings is None else self.settings.path(self.settings.files.monitor)
 
     @property
@@ -203,7 +199,6 @@ def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done,
 
 
 def fit(bridge: Bridge, done: Done) -> None:
-    """Fit a monitor to its baseline, and save it."""
     settings = _of_file(bridge)
     files = [settings.path(name) for name in settings.records.baseline]
     records, layouts = read_baseline(files, settings.csv, settings.records)
@@ -388,7 +383,6 @@ def status(bridge: Bridge, done: Done) -> None:
 
 
 def report(bridge: Bridge, done: Done) -> None:
-    """Write the page for the owner."""
     monitor = bridge.load()
     bridge.described(monitor, done)
     bridge.write_page(monitor, done)
@@ -397,7 +391,6 @@ def report(bridge: Bridge, done: Done) -> None:
 
 
 def acknowledge(bridge: Bridge, done: Done) -> None:
-    """Say what an event was, and save the monitor."""
     options = bridge.options
     with bridge.alone():
         monitor = bridge.load()

@@ -13,11 +13,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 import skthermo
 from skthermo._io import write_when_complete
+from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
 from skthermo.commands._choice import Candidate, candidates
 from skthermo.commands._looking import Look, is_in_kelvin, look_at
@@ -105,12 +105,9 @@ class Proposal:
 
     @property
     def step(self) -> pd.Timedelta:
-        """Usual time between records."""
-        steps = np.diff(self.baseline.index.as_unit("ns").asi8)
-        return pd.Timedelta(int(np.median(steps)) if len(steps) else 0, "ns")
+        return usual_step(self.baseline.index)
 
     def account(self) -> Iterator[str]:
-        """What was found in the files."""
         for look in self.looks:
             form, index = look.form, look.records.index
             is_csv = look.file.suffix.lower() not in PARQUET
@@ -300,7 +297,6 @@ def _comment(text: str, sign: str = "# ") -> str:
 
 
 def toml(value: Any) -> str:
-    """A value as TOML has it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, Mapping):

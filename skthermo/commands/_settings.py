@@ -96,7 +96,6 @@ class Records:
 
     @property
     def columns(self) -> list[str]:
-        """All columns that are used."""
         return [*self.temperatures, *self.reference, *self.responses]
 
 
@@ -108,7 +107,6 @@ class Setting(NamedTuple):
 
     @property
     def is_required(self) -> bool:
-        """Whether it has no default."""
         return self.default is inspect.Parameter.empty
 
 
@@ -120,7 +118,6 @@ def page_maker() -> Callable[..., Any]:
 
 
 def chain_maker() -> Callable[..., Any]:
-    """The chain of an FE model, which few monitors need."""
     from skthermo.surrogate import DataInformedFEM
 
     return DataInformedFEM
@@ -192,7 +189,6 @@ class Settings:
 
     @property
     def name(self) -> str:
-        """Name of the bridge."""
         return self.files.name or self.file.resolve().parent.name
 
     @property
@@ -274,7 +270,6 @@ class _Reader:
             raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
 
     def settings(self) -> Settings:
-        """All that the file says."""
         known = [*SECTIONS, *CLASSES]
         for name, given in self.content.items():
             is_list, wants_list = isinstance(given, list), name == "features"

@@ -14,7 +14,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY
+from skthermo._tables.frames import DAY, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
@@ -80,7 +80,6 @@ class Branch:
 
 
 def _steps(detector: Any) -> Iterator[Any]:
-    """The fitted steps of a detector, one after the other."""
     if isinstance(detector, BaseSearchCV):
         yield from _steps(detector.best_estimator_)
     elif isinstance(detector, Pipeline):
@@ -146,7 +145,7 @@ class ActiveDetector(SavesFrames):
             direction = Direction.of(detector, trained[columns], targets)
             is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
-        step = pd.Timedelta(np.median(np.diff(trained.index.as_unit("ns").asi8)), "ns")
+        step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         changes = LoweredIndices.of(partial(_index_of, detector, columns), trained, targets, usual[1], within)
         options = {"hold": DAY, "persistence": persistence, "release": release}
@@ -177,7 +176,6 @@ class ActiveDetector(SavesFrames):
 
     @property
     def threshold(self) -> float:
-        """A damage event opens with an index above it."""
         return self.estimate.rule.threshold
 
     @property
@@ -196,7 +194,6 @@ class ActiveDetector(SavesFrames):
         return pd.Series(last_step(self.detector).baseline_index_, self.trained.index)
 
     def ratio(self, records: pd.DataFrame) -> Array:
-        """Damage index over threshold."""
         return self._exact(records) / self.threshold
 
     def own_ratio(self, times: pd.DatetimeIndex) -> Array:
@@ -318,7 +315,6 @@ class ActiveDetector(SavesFrames):
         return names
 
     def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
-        """Why some records have no damage index."""
         if not len(rows):
             return []
         branches = list(Branch.all_of(self.detector))
@@ -383,7 +379,6 @@ class ActiveDetector(SavesFrames):
 
 
 def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
-    """Damage index of records by a fitted detector."""
     with without_warnings():
         return -np.asarray(detector.score_samples(records[columns]), dtype=float)
 

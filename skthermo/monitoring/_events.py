@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import as_index
 from skthermo.monitoring._false_alarms import EventRule, EventState
 
 DAMAGE, STIFFENING, MEASUREMENT, WATCH = "damage", "stiffening", "measurement or structure", "watch"
@@ -83,7 +84,6 @@ class EventLog:
         return sorted(found)
 
     def is_open(self, kind: str) -> bool:
-        """Whether an event of a kind is open."""
         return kind in self.states and self.states[kind].is_open
 
 
@@ -120,24 +120,17 @@ class Acknowledgement:
 
 
 def event_table(events: Sequence[Event], said: Sequence[Acknowledgement], zone: Any) -> pd.DataFrame:
-    """Events as a frame, with what the owner says of them."""
     by_event: list[Acknowledgement | None] = [
         next((a for a in reversed(said) if a.kind == e.kind and e.start <= a.peak_time and _before(a, e)), None)
         for e in events
     ]
-
-    def stamps(values: Sequence[int | None]) -> pd.DatetimeIndex:
-        missing = np.datetime64("NaT", "ns").astype(np.int64)
-        numbers = np.array([missing if value is None else value for value in values], dtype=np.int64)
-        return pd.DatetimeIndex(numbers.view("M8[ns]"), tz="UTC").tz_convert(zone)
-
     return pd.DataFrame(
         {
             "kind": pd.Series([e.kind for e in events], dtype=object),
-            "start": stamps([e.start for e in events]),
-            "end": stamps([e.end for e in events]),
+            "start": as_index([e.start for e in events], zone),
+            "end": as_index([e.end for e in events], zone),
             "peak": np.array([e.peak for e in events], dtype=float),
-            "peak_time": stamps([e.peak_time for e in events]),
+            "peak_time": as_index([e.peak_time for e in events], zone),
             "modes": pd.Series([e.modes for e in events], dtype=object),
             "n_alarms": np.array([e.n_alarms for e in events], dtype=np.int64),
             "acknowledged": np.array([a is not None for a in by_event], dtype=bool),

@@ -375,7 +375,6 @@ def _answers(
     numbers: dict[str, NDArray[np.int64]],
     is_held: NDArray[np.bool_],
 ) -> pd.DataFrame:
-    """A row for each record."""
     has_index, number = ~np.isnan(index), numbers[DAMAGE]
     is_alarm = has_index & (number > 0)
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)

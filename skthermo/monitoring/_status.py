@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from datetime import timedelta
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import DAY, as_moment, check_duration
-from skthermo._tables.text import counted, duration_text, probability_text
+from skthermo._tables.frames import DAY, as_moment, check_duration, usual_step
+from skthermo._tables.text import counted, duration_text, plain, probability_text
 from skthermo.monitoring._events import WATCH
 
 LATE = 2 * DAY  # beyond the usual step, after which a record is missed
@@ -159,7 +158,7 @@ class MonitorStatus:
         dict
             Texts, numbers, lists and dicts; None for what is not known.
         """
-        return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
+        return {one.name: plain(getattr(self, one.name)) for one in fields(self)}
 
 
 def facts_of(monitor: Any) -> MonitorStatus:
@@ -172,7 +171,7 @@ def facts_of(monitor: Any) -> MonitorStatus:
         baseline_end=baseline[-1],
         newest=monitor.last_ if len(monitor.days_) else None,
         evaluated=known.index[-1] if len(known) else None,
-        step=_usual_step(baseline.append(evaluations.index)),
+        step=usual_step(baseline.append(evaluations.index)) or DAY,
         index=float(known["index"].iloc[-1]) if len(known) else None,
         threshold=float(monitor.threshold_),
         clear_threshold=float(monitor.clear_threshold_),
@@ -218,26 +217,6 @@ def _open_events(events: pd.DataFrame) -> Iterator[dict[str, Any]]:
 def _lasting_faults(faults: pd.DataFrame) -> Iterator[dict[str, Any]]:
     for _, fault in faults[faults["until"].isna()].iterrows():
         yield {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
-
-
-def _usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
-    """Median time between records; a day for one record alone."""
-    return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else DAY
-
-
-def _plain(value: Any) -> Any:
-    """A value as JSON has it: times as text, durations in seconds, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(one) for name, one in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(one) for one in value]
-    if isinstance(value, pd.Timestamp):
-        return None if pd.isna(value) else value.isoformat()
-    if isinstance(value, pd.Timedelta):
-        return value.total_seconds()
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value
 
 
 def summary_lines(monitor: Any) -> Iterator[str]:

@@ -53,7 +53,6 @@ def drawing(module: str) -> ModuleType:
 
 
 def pyplot() -> ModuleType:
-    """Matplotlib's pyplot."""
     return drawing("matplotlib.pyplot")
 
 
@@ -88,7 +87,6 @@ def label_of(name: Hashable) -> str:
 
 
 def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
     return plain(f"{quantity} ({unit})" if unit else quantity)
 
 

@@ -58,7 +58,6 @@ class Projection:
 
     @property
     def is_space(self) -> bool:
-        """Whether three directions are drawn."""
         return len(self.directions) == 3
 
     @property

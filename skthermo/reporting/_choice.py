@@ -51,7 +51,6 @@ class Choice:
         return text if self.name == self.best.name else f"{text} {asked}"
 
     def section(self) -> Section:
-        """The recommended detector, and all others beside it."""
         results = self.study.results_
         damaged = results[(results["measure"] == "POD") & (results["source"] == SIMULATED)]
         n_states = counted(damaged["scenario"].nunique(), "damaged state")

@@ -37,7 +37,6 @@ class Finding:
 
     @property
     def is_found(self) -> bool:
-        """Whether some tested severity is detected reliably."""
         return bool(np.isfinite(self.smallest))
 
     def sentence(self) -> str:

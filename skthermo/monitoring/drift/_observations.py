@@ -144,11 +144,9 @@ class GroupEffects:
 
     @property
     def names(self) -> list[str]:
-        """Names of the groups."""
         return list(self.members)
 
     def without_even(self) -> GroupEffects:
-        """The groups alone."""
         kept = [place for place in range(len(self.members)) if place not in self.even]
         members = {name: joined for name, joined in self.members.items() if name != ALL_GROUPS}
         return replace(self, slopes=self.slopes[:, kept], members=members, incidence=self.incidence[:, kept])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, as_random_state, is_real
+from skthermo._tables.arrays import Array, as_random_state, check_probability
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
@@ -117,8 +117,7 @@ def track_parameters(
     (True, 'bottom')
     """
     check_records(fem, T, F)
-    if not is_real(significance) or not 0 < significance < 1:
-        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
+    check_probability(significance, "significance")
     random = as_random_state(random_state)
     length_of(freq)
     order = np.argsort(F.index, kind="stable")
@@ -173,7 +172,6 @@ class Followed:
     n_days: int
 
     def best(self) -> dict[int, GroupTrajectory]:
-        """The groups of the best set."""
         groups, walk = self.found.sets[0], float(self.found.walk[0])
         return {group: self.beside([group], [one for one in groups if one != group], walk) for group in groups}
 
@@ -230,7 +228,6 @@ def history_of(
     significance: float,
     random: np.random.RandomState,
 ) -> ParameterHistory:
-    """What was found, by the names of groups and modes."""
     found, names = followed.found, effects.names
     best, has_drift = found.sets[0], found.p_value <= significance
     alternatives = {group: found.instead(group) for group in best} if has_drift else {}

@@ -13,8 +13,8 @@ from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time
-from skthermo._tables.text import counted
+from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
+from skthermo._tables.text import capital, counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._memory import Memory
@@ -121,7 +121,7 @@ class Retraining:
             lines.append(
                 f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
             )
-        lines += [f"{note[:1].upper()}{note[1:]}." for note in self.notes]
+        lines += [f"{capital(note)}." for note in self.notes]
         return "\n".join(lines)
 
 
@@ -331,7 +331,7 @@ def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, An
 
 def margin_of(memory: Memory, records: pd.DataFrame) -> pd.Timedelta:
     """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
-    return max(MARGIN, memory.duration(pd.Series(records.index).diff().median()))
+    return max(MARGIN, memory.duration(usual_step(records.index)))
 
 
 @dataclass(frozen=True)
@@ -350,8 +350,7 @@ class NewLevel:
     def of(cls, old: WeatherFree, new: pd.DataFrame) -> NewLevel:
         """From new records, by what the old regression leaves of them."""
         left = old.of_new(new)
-        step = pd.Series(new.index).diff().median()
-        span = new.index[-1] - new.index[0] + (step if pd.notna(step) else pd.Timedelta(0))
+        span = new.index[-1] - new.index[0] + usual_step(new.index)
         counts = left.notna().sum()
         deviations = old.residuals.std()
         times = pd.Series([correlation_time(column) for column in old.residuals.to_numpy().T], left.columns)

@@ -76,7 +76,7 @@ class Bridge:
         place, size, duration, note = WELL, change, "", ""
         if standing.state == ALARM:
             place, size = (SIGNIFICANT if is_significant else OPEN), highest
-            duration = f" for {duration_text(max(standing.now - opened['start'].min(), standing.step))}"
+            duration = f" for {duration_text(max(standing.now - opened['start'].min(), standing.status.step))}"
             note = "" if is_significant else NOT_SIGNIFICANT
         elif unexplained:
             place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
@@ -126,7 +126,7 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
     if standing.state == ALARM:
         modes = listed(sorted({mode for text in opened["modes"] if text for mode in str(text).split(", ")}))
         texts.append(f"Modes that drive it: {modes}." if modes else "")
-        if standing.is_silent:
+        if standing.status.is_late:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
     elif standing.state == WATCH:
         texts.append("The damage index is raised, below the level of an alarm.")

@@ -183,7 +183,6 @@ def _opened(mapping: Mapping[Hashable, Any], name: Hashable) -> tuple[Any, str]:
 
 
 def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Section:
-    """The table, the worst first."""
     rows = [
         [
             element("a", bridge.name, href=links[bridge.name]),

@@ -93,7 +93,7 @@ def _drawn(
 
     def make() -> MonitorDisplay:
         display = MonitorDisplay.from_estimator(standing.monitor, **options)
-        fold_legend(display.figure_, "outside lower center", n_columns=2)
+        fold_legend(display.figure_, "outside lower center")
         return display
 
     return draw(make, alt, title, height=height, values=values)

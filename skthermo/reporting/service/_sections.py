@@ -9,6 +9,7 @@ import pandas as pd
 
 from skthermo._tables.text import (
     SPACE,
+    capital,
     counted,
     counted_number,
     duration_text,
@@ -144,8 +145,8 @@ def _newest(standing: Standing) -> list[str]:
 
 def _smallest_change(standing: Standing) -> str:
     """Which changes the monitor would still see, and which not."""
-    seen = f"{standing.monitor.smallest_changes_}"
-    return f"{seen[:1].upper()}{seen[1:]}, in weather like that of the baseline. Smaller changes count as healthy."
+    seen = capital(f"{standing.monitor.smallest_changes_}")
+    return f"{seen}, in weather like that of the baseline. Smaller changes count as healthy."
 
 
 def _open_events(standing: Standing) -> list[str]:
@@ -185,7 +186,7 @@ def _what_to_do(standing: Standing) -> list[str]:
             "Find out whether the sensors or the structure have changed where a response was set aside. If it is the "
             "sensors, acknowledge the event as harmless: the other responses are evaluated from then on."
         )
-    if standing.is_silent or standing.is_ahead or standing.error or not standing.has_records:
+    if standing.status.is_late or standing.status.is_ahead or standing.error or not standing.has_records:
         steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")
     elif standing.state == NOT_EVALUATED:
         steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")
@@ -197,7 +198,6 @@ def _what_to_do(standing: Standing) -> list[str]:
 
 
 def events(standing: Standing) -> Section:
-    """All events, the newest first."""
     known = standing.events
     if not len(known):
         text = "There has been no event." if standing.has_records else "No record has come yet, and so no event."
@@ -350,7 +350,6 @@ def _signed(value: float, error: float) -> str:
 
 
 def sensor_sentences(standing: Standing) -> list[str]:
-    """What does not work at present."""
     if not standing.monitor.sensors:
         return ["Sensors are not watched."]
     if not len(standing.failed):
@@ -365,7 +364,6 @@ def sensor_sentences(standing: Standing) -> list[str]:
 
 
 def sensors(standing: Standing) -> Section:
-    """Faults that last, and those that are over."""
     known = standing.monitor.faults_
     parts = [bullets(sensor_sentences(standing))]
     if standing.monitor.sensors:
@@ -395,7 +393,6 @@ def sensors(standing: Standing) -> Section:
 
 
 def not_evaluated(standing: Standing) -> Section:
-    """How many records were not evaluated, and why."""
     counts, evaluated, days = standing.monitor.counts_, standing.evaluations, standing.monitor.days_
     title = "What was not evaluated"
     if not standing.has_records:

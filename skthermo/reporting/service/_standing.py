@@ -45,12 +45,10 @@ class Standing:
 
     @cached_property
     def events(self) -> pd.DataFrame:
-        """All events."""
         return self.monitor.events_
 
     @cached_property
     def evaluations(self) -> pd.DataFrame:
-        """Evaluations of the records that are kept."""
         return self.monitor.evaluations_
 
     @cached_property
@@ -59,29 +57,12 @@ class Standing:
         return self.monitor.status(self.now)
 
     @property
-    def step(self) -> pd.Timedelta:
-        """Usual time between records."""
-        return self.status.step
-
-    @property
     def has_records(self) -> bool:
-        """Whether any record has come since the baseline."""
         return self.status.newest is not None
 
     @property
     def last(self) -> pd.Timestamp:
-        """Stamp of the newest record."""
         return self.monitor.last_
-
-    @property
-    def is_silent(self) -> bool:
-        """Whether a new record has been missed for days."""
-        return self.status.is_late
-
-    @property
-    def is_ahead(self) -> bool:
-        """Whether the newest record is of a time to come."""
-        return self.status.is_ahead
 
     @property
     def state(self) -> str:
@@ -100,7 +81,6 @@ class Standing:
         return [str(name) for name in drift.index[drift["significant"].astype(bool) & (drift["change"] <= -self.limit)]]
 
     def headline(self) -> str:
-        """The state in one line."""
         if self.state == ALARM:
             opened = self.opened("damage")
             since = opened["start"].min() if len(opened) else self.last
@@ -120,7 +100,7 @@ class Standing:
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
             )
-            if self.is_silent:
+            if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
             return f"{text} {self.error}." if self.error else text
         if self.state == ATTENTION:
@@ -147,10 +127,10 @@ class Standing:
         if not self.has_records:
             text = f"No record has come since the baseline, which ends on {last}"
             return Doubt(self.last, "Not evaluated: no record since the baseline", text)
-        if self.is_ahead:
+        if self.status.is_ahead:
             text = f"The newest record is of {last}, a time after {moment(self.now)}, when this page was written"
             return Doubt(self.last, "Not evaluated: the dates of the records are wrong", text)
-        if self.is_silent:
+        if self.status.is_late:
             text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
             return Doubt(self.last, f"Not evaluated: no record since {last}", text)
         reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
@@ -160,7 +140,7 @@ class Standing:
     @property
     def step_text(self) -> str:
         """Usual time between records, as in "every day"."""
-        return duration_text(self.step).removeprefix("1 ")
+        return duration_text(self.status.step).removeprefix("1 ")
 
     @property
     def not_evaluated_since(self) -> pd.Timestamp:
@@ -179,13 +159,11 @@ class Standing:
 
     @cached_property
     def failed(self) -> pd.DataFrame:
-        """Faults of sensors that last."""
         faults = self.monitor.faults_
         return faults[faults["until"].isna()]
 
     @property
     def years(self) -> float:
-        """Years in service, up to the newest record."""
         return (self.last - self.monitor.days_.index[0]) / YEAR if self.has_records else 0.0
 
     def days_until(self, end: pd.Timestamp) -> pd.DataFrame:

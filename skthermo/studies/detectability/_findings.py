@@ -11,9 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, check_flag
+from skthermo._tables.arrays import Array, check_flag, check_probability
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
-from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences

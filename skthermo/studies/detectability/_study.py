@@ -17,13 +17,12 @@ from sklearn.exceptions import NotFittedError
 from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
-from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
+from skthermo._tables.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
 from skthermo._validation import Stages, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.studies.detectability._candidates import Candidate, LearnedHeads
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,

@@ -21,6 +21,7 @@ from skthermo._tables.arrays import (
     as_floats,
     as_random_state,
     check_names,
+    check_probability,
     check_size,
     positive_integer,
 )
@@ -29,7 +30,7 @@ from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import gross_errors
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
-from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
+from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios

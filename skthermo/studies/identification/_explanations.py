@@ -134,9 +134,7 @@ class Scale:
         found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_errors)
         return [
             Weight(tuple(causes.tolist()), *parts)
-            for causes, *parts in zip(
-                sets, found.log_evidence, found.means, found.covariances, amounts, change, variances, strict=True
-            )
+            for causes, *parts in zip(sets, *found, amounts, change, variances, strict=True)
         ]
 
     def exact(self, weights: Sequence[Weight]) -> list[Correction]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import is_real
+from skthermo._tables.arrays import check_probability
 from skthermo._tables.text import SPACE, counted, listed, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
@@ -33,7 +33,6 @@ class Places:
 
     @property
     def members(self) -> list[Hashable]:
-        """All members."""
         return [member for line in self.lines for member in line]
 
     def text(self, chosen: Collection[Hashable], *, alternatives: bool = False) -> str:
@@ -42,8 +41,7 @@ class Places:
         if chosen >= set(self.members):
             return f"all {counted(len(self.members), 'element')}"
         ranges = [self._range(line, first, last) for line in self.lines for first, last in _runs(line, chosen)]
-        joined = " or " if alternatives else " and "
-        return joined.join([", ".join(ranges[:-1]), ranges[-1]] if len(ranges) > 1 else ranges)
+        return listed(ranges, "or" if alternatives else "and")
 
     def _range(self, line: Sequence[Hashable], first: int, last: int) -> str:
         which = f"element {first + 1}" if first == last else f"elements {first + 1} to {last + 1}"
@@ -162,9 +160,7 @@ class LocatedDamage:
         """
         if group is not None and group not in self.places:
             raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
-        if not is_real(probability) or not 0 < probability < 1:
-            raise ValueError(f"probability is {probability!r}; expected a number between 0 and 1, such as 0.9")
-        return fewest(self._sets(group), probability)[0]
+        return fewest(self._sets(group), check_probability(probability, "probability"))[0]
 
     def answer(self) -> list[str]:
         """Where the structure is damaged, and how surely.
@@ -187,7 +183,6 @@ class LocatedDamage:
         return "\n".join(self.answer()).replace(SPACE, " ")
 
     def _sets(self, group: str | None) -> list[tuple[frozenset[Hashable], float]]:
-        """Sets of damaged members and their probabilities."""
         if group is not None:
             return [(e.members[group], e.probability) for e in self.explained if group in e.members]
         return visible_sets(self.explained, self.found.unobservable)

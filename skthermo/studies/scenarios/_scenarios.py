@@ -74,7 +74,6 @@ class BaseScenario(ABC):
 
 
 def check_chain(fem: FittedChain) -> None:
-    """Raise an error for what is not a fitted chain."""
     if isinstance(fem, type) or not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
@@ -88,13 +87,11 @@ def check_groups(groups: Sequence[str], known: Any) -> None:
 
 
 def check_name(name: Any) -> None:
-    """Raise an error if a scenario's name is not a text."""
     if not isinstance(name, str) or not name:
         raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
 
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
-    """Severity by group as floats."""
     damage = mapping_of(damage, f"damage of scenario {name!r}", "{group: severity}")
     for group, severity in damage.items():
         if not isinstance(group, str):
