@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -127,3 +128,46 @@ def period_text(index: pd.Index | None) -> str:
     if not isinstance(index, pd.DatetimeIndex) or not len(index):
         return ""
     return f"from {index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}"
+
+
+class Sentences(ABC):
+    """What a result says: an answer, what is not known, and remarks."""
+
+    @abstractmethod
+    def _answer(self) -> Iterator[str]: ...
+
+    def _limits(self) -> Iterator[str]:
+        yield from ()
+
+    def _remarks(self) -> Iterator[str]:
+        yield from ()
+
+    def answer(self) -> list[str]:
+        """What was found, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences. The first says what is most probable.
+        """
+        return list(self._answer())
+
+    def limits(self) -> list[str]:
+        """What is not known.
+
+        Returns
+        -------
+        list of str
+            Sentences; none if nothing is left open.
+        """
+        return list(self._limits())
+
+    def summary(self) -> str:
+        """What was found, and what is not known.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        return "\n".join([*self._answer(), *self._limits(), *self._remarks()]).replace(SPACE, " ")

@@ -84,10 +84,9 @@ def fit_fleet(
     The result is the same, bit for bit, whatever the number of jobs, the back end of joblib (its own processes, Dask,
     Ray) and the other bridges are. Parallel parts within a bridge run one after another.
 
-    If a process is killed, for lack of memory, say, what is finished stays, and the rest is begun again in new
-    processes. A bridge that may have killed its process twice is run alone, and given up when it does so again. With
-    one job and no such back end, all runs in this process, which nothing protects. The back end "multiprocessing" of
-    joblib hangs when a process is killed.
+    If a process is killed, for lack of memory, say, the rest is begun again in new processes; a bridge that kills its
+    process repeatedly is given up (:ref:`fleet-cluster`). With one job and no such back end, all runs in this process,
+    which nothing protects. The back end "multiprocessing" of joblib hangs when a process is killed.
 
     Changes are found by content: records, the estimator with its model, versions, and the code of ``monitor``. Code
     that other modules hold is not looked into: use another folder when it has changed. Files are read with ``pickle``,

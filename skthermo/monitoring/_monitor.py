@@ -162,21 +162,10 @@ class Monitor(SavesFrames, Estimator):
     The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
     how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
 
-    More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
-    25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not
-    evaluated, or in alarm if the others are. With three such records of the last five, an event of kind "measurement or
-    structure" opens. While it is open, or while a response repeats one value, no record is healthy and no damage event
-    closes, until a day after the response has come back, or `acknowledge` says that its sensor is at fault. Smaller
-    changes, and those of most responses at once, are left to the detector; `fit` refuses one that drops large changes.
-
     A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
     a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in
-    kelvin. Whatever is left out has its reason in the row and counts in ``counts_``.
-
-    A logger's clock may be wrong. After a jump of more than ``max_jump``, records are taken in if they are of the
-    present by the clock of this computer, or if ten or more of them confirm each other and none is in the future.
-    Otherwise they are set aside, and never make true records late. Where earlier records are in the future already, as
-    in a simulation, only a year or more is a jump.
+    kelvin. Whatever is left out has its reason in the row and counts in ``counts_``. :doc:`/guide/in_service` says what
+    becomes of responses that are implausible, of sensors that fail, and of records from a clock that is wrong.
 
     Examples
     --------
@@ -616,15 +605,7 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        Records never train of events that were not acknowledged as harmless, from a week before their start (or the
-        detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
-        Values of faulty sensors do not train, nor do records that came too late.
-
-        The new detector is refused if the new records differ from the baseline, beyond the weather, from some day on or
-        steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
-        record's standard deviation: a detector that learned them would not see that change any more. It is refused if
-        more of the new records are above its threshold, each evaluated by the others, than above the old one; if it
-        finds only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
+        Which records never train, and when the new detector is refused: :doc:`/guide/in_service`.
         """
         check_is_fitted(self)
         if records is not None:
@@ -662,10 +643,8 @@ class Monitor(SavesFrames, Estimator):
         been said of them. Records of an event that began since, and was acknowledged as damage, do not train.
 
         The records of the baseline stand in for the weather that has not come since: each mode is moved to its new
-        level, which is the mean of what the old regression on the weather leaves of the new records. As few days tell
-        a level only roughly, each week of old records is moved besides by what another stretch of the old baseline, as
-        long as the new one, misses its level by: the threshold allows for that. Old weeks drop out when new records
-        cover their time of the year. Call again as days come; `refit` goes on in the same way.
+        level, the mean of what the old regression on the weather leaves of the new records. The threshold allows for
+        how roughly few days tell it. Call again as days come; `refit` goes on in the same way.
         """
         check_is_fitted(self)
         retraining = begun_again(self, since, self._activated, until=until)

@@ -56,17 +56,9 @@ def owner_report(
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
-    Of a study, it says which damage the monitoring would detect, the smallest one first, what was monitored, how good
-    the model is, which damage was identified, and with which settings and warnings all this was computed. Of several
-    detectors, it says which one is recommended and why, and the rest is on that one.
-
-    Of a monitor, it says whether the structure is healthy today, in alarm or not evaluated, since when and why; which
-    events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and how many
-    false alarms are to be expected. A monitor without a record for two days more than usual is not called healthy.
-
-    Of a fleet, it says how many bridges are in which state, and how many of the alarms chance explains. A table has a
-    row for each bridge, the worst first, which opens that bridge's own page in a folder beside the file:
-    ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced.
+    Of a study, it says which damage the monitoring would detect; of a monitor, how the structure is today; of a fleet,
+    which bridges are in alarm, with a page for each in a folder beside the file (``fleet_pages`` for ``fleet.html``),
+    whose earlier pages are replaced. :doc:`/guide/report` describes the pages.
 
     Parameters
     ----------

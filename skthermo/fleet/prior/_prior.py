@@ -88,8 +88,7 @@ class FleetPrior(Estimator):
     residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family.
     Noise that remembers for so long counts as such, and makes bands wide.
 
-    ``tests/benchmarks/fleet_prior.py`` measures errors and bands beside the fleet's mean, a ridge towards it, bridges
-    on their own and bridges with a year of records.
+    How much it helps, and where it does not: :doc:`/guide/many_bridges`.
 
     Examples
     --------

@@ -129,7 +129,8 @@ def retrained(
     monitor: Any, records: pd.DataFrame | None, activated: Activated, *, until: Any = None, force: bool = False
 ) -> Retraining:
     """A detector that has learned from the baseline and what came since, compared with the one in charge."""
-    harvest = _harvest(monitor, records, until)
+    kept, margin = _until(_kept(monitor, records), until), margin_of(monitor.lookback_, monitor.trained_)
+    harvest = Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
@@ -211,13 +212,6 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
     notes.append(f"the smallest detected change is {ratio:.2f} times that with the baseline before")
     learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector}
     return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
-
-
-def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
-    """Records since the baseline that may train."""
-    kept = _until(_kept(monitor, records), until)
-    margin = margin_of(monitor.lookback_, monitor.trained_)
-    return Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
 
 
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:

@@ -423,9 +423,6 @@ def detection_task(
 
     Notes
     -----
-    Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
-    among them. ``task.refit(search)`` fits it to the baseline.
-
     The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
     from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
     threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
@@ -438,11 +435,8 @@ def detection_task(
     so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
     records, and lags of rows without stamps, do so only in ``scoring``.
 
-    A compensator of the kind that the chain is looks better in its simulations than it is: choose the kind of
-    regression by measured records.
-
-    The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
-    with noise that took no part.
+    Give the search ``refit=False``, and fit its best detector to the baseline by ``task.refit``. How to read the score
+    of the best of many settings: :ref:`tune-by-simulated-damage`.
 
     Examples
     --------

@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
-from skthermo._tables.text import SPACE, chance_text, listed, percent, probability_text
+from skthermo._tables.text import SPACE, Sentences, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
 from skthermo.studies.identification._observe import ComparedRecords
@@ -137,7 +137,7 @@ def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
     shared = [one for one in amounts if first.agrees(one)]
     for one in [first, *(one for one in amounts if one not in shared)]:
         saying = PHRASES[one.saying][is_further or (one is not first and one.saying == first.saying)]
-        names = listed([other.subject for other in (shared if one is first else [one], "or")])
+        names = listed([other.subject for other in (shared if one is first else [one])], "or")
         text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
         texts.append(text + (f" ({one.band})" if in_full else ""))
     return " or ".join(texts) + (", which these modes cannot distinguish," if len(amounts) > 1 else "")
@@ -377,7 +377,7 @@ def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class IdentifiedDamage:
+class IdentifiedDamage(Sentences):
     """Explanations of a shift of frequencies with their probabilities, and what follows for each possible cause.
 
     An explanation is a set of up to three causes, or none; causes are damage of a group, and what else was asked for.
@@ -536,36 +536,14 @@ class IdentifiedDamage:
         """
         return UncertainDamage(name, self.draws)
 
-    def answer(self) -> list[str]:
-        """What is most probable, how probable, and what else could be.
+    def _answer(self) -> Iterator[str]:
+        return answer(self)
 
-        Returns
-        -------
-        list of str
-            Sentences. The first names the most probable explanation; those that these modes cannot distinguish are one.
-        """
-        return list(answer(self))
+    def _limits(self) -> Iterator[str]:
+        return limits(self)
 
-    def limits(self) -> list[str]:
-        """What is not known: causes that look alike or cannot be seen, and what no explanation explains.
-
-        Returns
-        -------
-        list of str
-            Sentences; none if the most probable explanation explains all shifts, and all causes can be seen and
-            distinguished.
-        """
-        return list(limits(self))
-
-    def summary(self) -> str:
-        """What is most probable and what else could be, what is not known, and which records were left out.
-
-        Returns
-        -------
-        str
-            One sentence a line.
-        """
-        return "\n".join([*self.answer(), *self.limits(), *self.records.sentences()]).replace(SPACE, " ")
+    def _remarks(self) -> Iterator[str]:
+        return self.records.sentences()
 
     def warnings(self) -> Iterator[SkthermoWarning]:
         """What is doubtful.

@@ -98,13 +98,11 @@ def locate_damage(
     Notes
     -----
     The members of a group follow each other along lines, by their common nodes, or by their places where they have
-    none. A line is divided into pieces of some neighbouring members, and each stretch of neighbouring pieces may be
-    damaged, by one severity; so may the whole group, with a prior probability of a quarter. Shorter stretches are more
-    probable than longer ones, and their severities may be larger. Stretches of all groups that damage of whole groups
-    makes probable, alone and with one or two other groups, are weighed by the evidence of `identify_damage`; if damage
-    of whole groups does not explain the shifts, stretches of all groups are. Pieces that are probable are divided
-    further, until they consist of single members, or until the probability is spread over most of the group, because
-    the records do not carry more. Effects are those at the mean parameters of the records.
+    none. Each stretch of neighbouring pieces of a line may be damaged, by one severity; so may the whole group, with a
+    prior probability of a quarter. Shorter stretches are more probable than longer ones, and their severities may be
+    larger. Stretches of all probable groups, alone and with one or two other groups, are weighed by the evidence of
+    `identify_damage`, with effects at the mean parameters of the records. Probable pieces are divided further, as long
+    as the records carry it: :doc:`/guide/identify`.
 
     Examples
     --------
