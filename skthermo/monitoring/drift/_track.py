@@ -229,30 +229,27 @@ def history_of(
     random: np.random.RandomState,
 ) -> ParameterHistory:
     found, names = followed.found, effects.names
-    best, has_drift = found.sets[0], found.p_value <= significance
-    alternatives = {group: found.instead(group) for group in best} if has_drift else {}
-    trajectories = followed.best() if has_drift else {}
-    for group in range(len(names)):
-        if group not in trajectories:
-            replaced = {member for member, others in alternatives.items() if group in others}
-            others = [member for member in best if member not in replaced] if has_drift else []
-            trajectories[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
+    has_drift, trends = found.p_value <= significance, followed.trends
+    best, walk = (found.sets[0], float(found.walk[0])) if has_drift else ((), 0.0)
+    alternatives = {group: found.instead(group) for group in best}
+    trajectories = [
+        followed.beside([group], [one for one in best if group not in alternatives[one]], walk)
+        for group in range(len(names))
+    ]
     sets = indistinguishable_sets(found, alternatives, effects.even)
-    named = {names[group]: trajectories[group] for group in range(len(names))}
-    for one in sets:
-        others = [member for member in best if member not in one] if has_drift else []
-        label = " and ".join(names[group] for group in one)
-        named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
-    named = {name: trajectory.with_error_of_effects(EFFECT_ERROR) for name, trajectory in named.items()}
-    information = np.diag(followed.trends.information())
+    named = dict(zip(names, trajectories, strict=True))
+    for alike in sets:
+        label = " and ".join(names[group] for group in alike)
+        named[label] = followed.beside(alike, [one for one in best if one not in alike], walk)
     with np.errstate(divide="ignore"):
-        alone = 1 / np.sqrt(information) / followed.trends.years
-    shifts = sum((np.outer(trajectories[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
-    trends = followed.trends
-    misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
+        alone = 1 / np.sqrt(np.diag(trends.information())) / trends.years
+    shifts = np.zeros((len(days), len(trends.slopes)))
+    for group in best:
+        shifts += np.outer(trajectories[group].mean, trends.slopes[:, group])
+    misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(found.sets[0])
     return ParameterHistory(
         days=days,
-        trajectories=named,
+        trajectories={name: one.with_error_of_effects(EFFECT_ERROR) for name, one in named.items()},
         years=trends.years,
         p_value=found.p_value,
         significance=significance,
@@ -268,11 +265,9 @@ def history_of(
         confounded={names[one]: [names[other] for other in others] for one, others in found.confounded.items()},
         unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
         detectable_rates=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
-        modes=mode_table(
-            fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes)), is_measured
-        ),
+        modes=mode_table(fem.mode_names_, followed, shifts[-1], is_measured),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
         widening=found.widening,
-        shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, days, fem.mode_names_),
+        shifts=pd.DataFrame(shifts, days, fem.mode_names_),
         seed=int(random.randint(2**31 - 1)),
     )

@@ -181,19 +181,19 @@ def identify_damage(
     check_jobs(n_jobs)
     causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass, even=True)
     seen = observe(fem, T, F, noise)
-    effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
-    every = compared(effects, seen.shift, shapes, dofs, shape_noise)
-    nominal = ShiftComparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
-    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+
+    def beside(chain: Any, theta: Array) -> ShiftComparison:
+        effects = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
+        return compared(effects, seen.shift, shapes, dofs, shape_noise)
+
+    def scale_of(every: ShiftComparison) -> Scale:
+        return Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+
+    every = beside(fem, seen.theta)
+    nominal = ShiftComparison([replace(every.parts[0], effects=every.parts[0].effects.nominal()), *every.parts[1:]])
+    scale = scale_of(every)
     whitened = every.observed().rotation @ scale.curves.first
-    alone = errors_alone(whitened)
-    asked = [place for place, cause in enumerate(causes) if not cause.is_even]
-    if alone[asked].min() > VISIBLE:
-        errors = ", ".join(f"{causes[place].name} {alone[place]:.2g}" for place in asked)
-        raise ValueError(
-            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
-            f"{errors}. More records or other modes would lower them"
-        )
+    check_visible(whitened, causes)
     random = as_random_state(random_state)
     if models is None:
         posterior = Posterior.of(scale, *explanations(scale), random)
@@ -202,10 +202,7 @@ def identify_damage(
         def with_model(model: Any, seed: int) -> Posterior:
             with without_warnings():  # the chain itself has given them
                 chain = fem.refitted(model=model)
-                theta = as_floats(chain.predict_parameters(seen.temperatures))
-                of_chain = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
-                other = compared(of_chain, seen.shift, shapes, dofs, shape_noise)
-                scale = Scale.of(other.observed(prior.model_error), other.effects, causes, prior)
+                scale = scale_of(beside(chain, as_floats(chain.predict_parameters(seen.temperatures))))
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 
         models = checked_models(fem, models)
@@ -215,6 +212,18 @@ def identify_damage(
     found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
+
+
+def check_visible(slopes: Array, causes: Sequence[Cause]) -> None:
+    """Raise an error if no cause that was asked for can be seen."""
+    alone = errors_alone(slopes)
+    asked = [place for place, cause in enumerate(causes) if not cause.is_even]
+    if alone[asked].min() > VISIBLE:
+        errors = ", ".join(f"{causes[place].name} {alone[place]:.2g}" for place in asked)
+        raise ValueError(
+            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
+            f"{errors}. More records or other modes would lower them"
+        )
 
 
 def compared(
