@@ -110,29 +110,19 @@ class Setting(NamedTuple):
         return self.default is inspect.Parameter.empty
 
 
-def page_maker() -> Callable[..., Any]:
-    """What writes pages; drawings are not needed by other commands."""
-    from skthermo.reporting import owner_report
-
-    return owner_report
-
-
-def chain_maker() -> Callable[..., Any]:
-    from skthermo.surrogate import DataInformedFEM
-
-    return DataInformedFEM
-
-
 SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
     "files": (lambda: Files, ()),
     "records": (lambda: Records, ()),
     "csv": (lambda: CsvFormat, ()),
     "compensator": (lambda: TemperatureCompensator, ("estimator", "targets")),
     "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
-    "fem": (chain_maker, ("inverse", "mapper", "imputer")),
-    "page": (page_maker, ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now")),
+    "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
+    "page": (
+        lambda: import_module("skthermo.reporting").owner_report,
+        ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now"),
+    ),
 }
-"""What each section calls, and which parameters come from elsewhere."""
+"""What each section calls, imported when it is needed, and which parameters come from elsewhere."""
 
 CLASSES: dict[str, tuple[str, ...]] = {
     "features": ("skthermo.preprocessing", "sklearn"),
@@ -226,7 +216,7 @@ class Settings:
         options = dict(self.options["fem"])
         if not options:
             return None
-        return chain_maker()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+        return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
 
 
 def _model(path: Path, settings: Path) -> Any:

@@ -118,10 +118,10 @@ def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
             handler.close()
 
 
-def _complain(error: Exception) -> None:
+def _complain(error: Exception, what: str = "") -> None:
     if not isinstance(error, EXPLAINED):
         traceback.print_exception(error)
-    logger.error("%s", error)
+    logger.error("%s%s", what, error)
 
 
 def _parser() -> Parser:
@@ -302,9 +302,7 @@ def _as_fleet(
 
 def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> int:
     """Say that something beside the monitors failed; the exit code, which stays that of an alarm."""
-    if not isinstance(error, EXPLAINED):
-        traceback.print_exception(error)
-    logger.error("%s%s", what, error)
+    _complain(error, what)
     facts["errors"].append(f"{what}{error}")
     return code if code == ALARM else FAILED
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -115,33 +114,13 @@ def fit_fleet(
     storage = Storage(None if folder is None else check_path(folder, "folder"))
     with storage.alone():
         storage.read()
+        known = {name: storage.outcomes[name] for name in estimators if name in storage.outcomes}
         tasks = {
-            name: BridgeFit(
-                name, estimators[name], records[name], monitor, seed_of(base, name), storage.outcomes.get(name)
-            )
+            name: BridgeFit(name, estimators[name], records[name], monitor, seed_of(base, name), known.get(name))
             for name in estimators
         }
-        storage.outcomes = {name: storage.outcomes[name] for name in estimators if name in storage.outcomes}
-        n_done, begun_again = 0, []
-        try:
-            work = run_tasks(tasks, n_jobs)
-            for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
-                if not result.is_as_before:
-                    before = tasks[name].known
-                    if (
-                        before is not None
-                        and before.standing["n_evaluated"]
-                        and before.content != result.outcome.content
-                    ):
-                        storage.set_aside(name)
-                        begun_again.append(name)
-                    storage.put(result.outcome, result.fitted)
-                elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
-                    _restore(storage, name)
-                n_done += 1
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(_where_to_go_on(n_done, len(tasks), storage.folder))
-            raise
+        storage.outcomes = known
+        begun_again = _work(tasks, storage, n_jobs, progress)
     storage.outcomes = {name: storage.outcomes[name] for name in estimators}
     fleet = Fleet._of(storage)
     warn_of_bridges(fleet)
@@ -154,6 +133,33 @@ def fit_fleet(
             "monitors-restarted",
         )
     return fleet
+
+
+def _work(
+    tasks: Mapping[Hashable, BridgeFit], storage: Storage, n_jobs: int | None, progress: bool | None
+) -> list[Hashable]:
+    """Fit bridges, and keep each as soon as it is fitted; those whose monitor was replaced."""
+    n_done, begun_again = 0, []
+    try:
+        work = run_tasks(tasks, n_jobs)
+        for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
+            if not result.is_as_before:
+                before = tasks[name].known
+                is_watched = before is not None and before.standing["n_evaluated"]
+                if is_watched and before.content != result.outcome.content:
+                    storage.set_aside(name)
+                    begun_again.append(name)
+                storage.put(result.outcome, result.fitted)
+            elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
+                _restore(storage, name)
+            n_done += 1
+    except KeyboardInterrupt as interrupt:
+        left = f"are finished and kept in {storage.folder}; the same call goes on there"
+        if storage.folder is None:
+            left = "were finished, and are lost; expected folder=... to keep them"
+        interrupt.add_note(f"{n_done} of {len(tasks)} bridges {left}")
+        raise
+    return begun_again
 
 
 def _restore(storage: Storage, name: Hashable) -> None:
@@ -188,10 +194,3 @@ def _check_names(estimators: Any, records: Any) -> None:
         )
     if not estimators:
         raise ValueError("estimators are empty; expected at least one bridge")
-
-
-def _where_to_go_on(n_done: int, total: int, folder: Path | None) -> str:
-    """What an interrupt leaves."""
-    if folder is None:
-        return f"{n_done} of {total} bridges were finished, and are lost; expected folder=... to keep them"
-    return f"{n_done} of {total} bridges are finished and kept in {folder}; the same call goes on there"

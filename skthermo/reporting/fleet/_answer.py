@@ -91,17 +91,14 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
     """A sentence that names bridges, the worst first, with how long they are in alarm and their small print."""
     if not bridges:
         return Html()
+    notes = {one.name: [element("small", f" ({one.note})")] for one in bridges if one.note}
     shown = [
-        element("span", element("a", one.name, href=links[one.name]), one.duration, _small(one.note))
+        element("span", element("a", one.name, href=links[one.name]), one.duration, *notes.get(one.name, ()))
         for one in bridges[:MOST_NAMED]
     ]
     rest = f" and {len(bridges) - MOST_NAMED:,} more, in the table" if len(bridges) > MOST_NAMED else ""
     listed = [part for one in shown for part in (", ", one)][1:]
     return element("span", element("strong", f"{text}: "), *listed, f"{rest}.")
-
-
-def _small(note: str) -> Html:
-    return element("small", f" ({note})") if note else Html()
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:

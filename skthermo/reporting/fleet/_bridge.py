@@ -140,12 +140,9 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
         texts.append(f"{number} would be significant, but ended before it was explained.")
     if len(standing.failed):
-        texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
+        more = f" and {len(standing.failed) - 3} more" if len(standing.failed) > 3 else ""
+        texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{more}.")
     return " ".join(text for text in texts if text)
-
-
-def _more(failed: pd.DataFrame) -> str:
-    return f" and {len(failed) - 3} more" if len(failed) > 3 else ""
 
 
 def _drift(standing: Standing) -> tuple[float, str]:

@@ -98,7 +98,8 @@ def introduction(monitor: Monitor) -> list[str]:
 def today(standing: Standing) -> Section:
     """State, and what an owner should know, in a few sentences."""
     sentences = [*_newest(standing), *_open_events(standing), *sensor_sentences(standing), *drift_sentences(standing)]
-    sentences.append(_smallest_change(standing))
+    smallest = capital(f"{standing.monitor.smallest_changes_}")
+    sentences.append(f"{smallest}, in weather like that of the baseline. Smaller changes count as healthy.")
     words = (
         "A record is one measurement of temperatures and responses, such as natural frequencies. Its damage index says "
         "how far the responses are from those of the healthy structure in the same weather. An event begins when the "
@@ -141,12 +142,6 @@ def _newest(standing: Standing) -> list[str]:
         text += f" Its damage index is {significant(newest['index'], 3)}; an event begins above "
         text += f"{significant(newest['threshold'], 3)}."
     return [text, standing.recent()]
-
-
-def _smallest_change(standing: Standing) -> str:
-    """Which changes the monitor would still see, and which not."""
-    seen = capital(f"{standing.monitor.smallest_changes_}")
-    return f"{seen}, in weather like that of the baseline. Smaller changes count as healthy."
 
 
 def _open_events(standing: Standing) -> list[str]:
