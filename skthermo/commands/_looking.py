@@ -158,7 +158,6 @@ def _divided(text: str) -> tuple[str, str, list[tuple[int, list[str]]]]:
 
 
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Share of cells that are numbers, of those with a value."""
     given = [cell for cell in cells if cell.lower() not in MISSING]
     return sum(_is_number(cell, decimal) for cell in given) / len(given) if given else 0.0
 

@@ -204,7 +204,6 @@ def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 
 def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Do the work of a command on each bridge; the exit code of all."""
     given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
     files = [file for file in given if file.suffix in MONITORS]
     records = [file for file in given if file.suffix not in MONITORS]
@@ -254,7 +253,6 @@ def _for_one(options: argparse.Namespace, number: int) -> argparse.Namespace:
 
 
 def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:
-    """Print what a command says of a bridge, and its errors."""
     where = f"{done.name}: " if number > 1 else ""
     if not options.json and done.lines:
         print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
@@ -308,7 +306,6 @@ def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> in
 
 
 def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Look at files of records, and say what was found."""
     from skthermo.commands._proposal import Proposal  # for jobs that look at files
 
     found = Proposal.of(options)
@@ -319,7 +316,6 @@ def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
 
 
 def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Look at files of records, and write settings that fit them."""
     from skthermo.commands._proposal import Proposal
 
     found = Proposal.of(options)

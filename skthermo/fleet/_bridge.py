@@ -266,13 +266,11 @@ def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
 
 
 def _facts(T: Table, F: Table) -> dict[str, float]:
-    """Number of records, and share of values that are missing."""
     missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
     return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
 
 
 def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
-    """Mean absolute error of the training frequencies in percent."""
     report = getattr(chain, "report_", None)
     errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
@@ -310,7 +308,6 @@ def _answers(name: Hashable, evaluations: pd.DataFrame) -> pd.DataFrame:
 
 
 def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
-    """One row for a bridge of which no new record was evaluated."""
     row = {
         "bridge": name,
         "time": pd.NaT,

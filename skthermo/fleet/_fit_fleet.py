@@ -182,7 +182,6 @@ def _base(random_state: Any) -> int:
 
 
 def _check_names(estimators: Any, records: Any) -> None:
-    """Raise an error unless both are mappings of the same names."""
     for what, given in (("estimators", estimators), ("records", records)):
         if not isinstance(given, Mapping):
             raise ValueError(f"{what} are {type(given).__name__!r}; expected a mapping of names of bridges")

@@ -164,5 +164,4 @@ class Corrections:
             yield from fault_changes(*lists, names, self.sensors.units, newest)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
-        """The drift of each group; None where none is followed."""
         return None if self.drift is None else self.drift.report(state.drift)

@@ -147,7 +147,6 @@ def _from_joblib(content: bytes) -> Any:
 
 
 def _by_skops(monitor: Any, file: Path) -> bytes:
-    """A file of skops; an error if it could not be read again."""
     skops = import_optional("skops.io", extra="drop-ins")
     try:
         content: bytes = skops.dumps(monitor)

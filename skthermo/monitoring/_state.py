@@ -67,7 +67,6 @@ class MonitorState(SavesFrames):
 
     @property
     def corrections(self) -> CorrectionState:
-        """States of the corrections at the beginning of the newest day."""
         return self.checkpoints[-1].corrections
 
     @property
@@ -83,7 +82,6 @@ class MonitorState(SavesFrames):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of records, and of values that were left out."""
         n_outside = self.n_too_late + len(self.store.ahead)
         n_records, n_evaluated, n_left_out = (
             int(self.days[name].sum()) for name in ("n_records", "n_evaluated", "n_left_out")
@@ -278,7 +276,6 @@ class MonitorState(SavesFrames):
         return (numbers > 0) & ~np.any(said, axis=0) if said else numbers > 0
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
-        """The answers to new records, and those to others that have changed."""
         is_new = answers.index.isin(fresh)
         changed = np.zeros(len(answers), dtype=bool)
         if not is_new.all():
@@ -369,7 +366,6 @@ def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Chec
 
 
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
-    """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
     modes, is_held = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=bool)
     return _answers(stamps, nothing, threshold, modes, list(reasons), {DAMAGE: number}, is_held)

@@ -42,7 +42,6 @@ class Choice:
         return one
 
     def sentence(self) -> str:
-        """Which detector is recommended, and which one the report is on."""
         best, limit = quoted(self.best.name), percent(self.limit)
         text = f"Recommended is {best}, with a limit of {limit} false alarms."
         if not self.best["within_limit"]:

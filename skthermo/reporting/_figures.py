@@ -202,7 +202,6 @@ def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
 
 
 def draw_identified_damage(identified: IdentifiedDamage) -> Html:
-    """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
 

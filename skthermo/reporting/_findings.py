@@ -40,7 +40,6 @@ class Finding:
         return bool(np.isfinite(self.smallest))
 
     def sentence(self) -> str:
-        """The smallest severity that is detected reliably, in words."""
         kind = "a loss of stiffness" if self.severities[0] > 0 else "a gain of stiffness"
         least, largest = percent(abs(self.severities[0])), percent(abs(self.severities[-1]))
         if not self.is_found:

@@ -131,7 +131,6 @@ def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def _doubts(report: FitReport) -> list[str]:
-    """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
     found = [*([] if report.findings is None else report.findings.warnings()), *report.warnings()]
     doubts += [f"{capital(warning.args[0])}." for warning in found]

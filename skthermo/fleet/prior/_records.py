@@ -120,7 +120,6 @@ def days_of(table: ArrayLike) -> Array | None:
 
 
 def usable_rows(inputs: Array, values: Array, weights: Array | None) -> Array:
-    """Rows with all inputs, at least one value and a weight."""
     usable = ~(np.isnan(inputs).any(axis=1) | np.isnan(values).all(axis=1))
     return usable if weights is None else usable & (weights > 0)
 

@@ -136,7 +136,6 @@ def track_parameters(
 
 
 def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
-    """Daily means without modes that were measured on too few days."""
     needed = FEWEST * (daily.basis.shape[2] + N_SHAPES)
     n_days = daily.known.sum(axis=0)
     if (n_days < needed).all():

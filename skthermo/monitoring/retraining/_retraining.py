@@ -243,7 +243,6 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
 
 
 def _candidate(monitor: Any, baseline: pd.DataFrame, activated: Activated) -> ActiveDetector:
-    """A clone of the detector, fitted, with its monitor's threshold."""
     with without_warnings():
         return activated(clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)]), baseline)
 
@@ -258,7 +257,6 @@ def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.
 
 
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
-    """Kept records of each event that was not acknowledged as harmless."""
     records, events, found = monitor.corrected_, monitor.events_, {}
     margin = margin_of(monitor.lookback_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
@@ -313,7 +311,6 @@ class Harvest:
 
 
 def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
-    """Start, end and reason of each time that may not train."""
     for number, event in zip(events.index, events.itertuples(), strict=True):
         if event.harmless or event.kind == WATCH:
             continue

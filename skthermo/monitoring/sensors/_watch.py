@@ -254,7 +254,6 @@ class SensorWatch:
         moments: Counts,
         acknowledged: Sequence[int],
     ) -> NDArray[np.bool_]:
-        """Responses set aside that the structure may have moved."""
         n_sensors, faults = len(self.sensors), state.faults
         of_mode = {
             column - n_sensors: fault
@@ -376,7 +375,6 @@ class SensorWatch:
         return replace(state, exchanged=evidence, exchanged_since=since, faults=faults)
 
     def _with_runs(self, state: WatchState, midnight: int) -> WatchState:
-        """Columns that are dead, stuck or implausible, or no longer."""
         faults, runs = state.faults, state.runs
         is_run = runs.counts >= self.run_limits.limits
         out = faults.left_out()
@@ -421,7 +419,6 @@ class SensorWatch:
         return self.thermometers.noises[sensor].change(departures)
 
     def _is_fault(self, sensor: int, change: Change | None) -> bool:
-        """Whether noise does not explain a change, and it matters."""
         if change is None or change.n_days < LEAST_DAYS:
             return False
         return change.z > self.thermometers.noises[sensor].limit and abs(change.size) > A_DEGREE

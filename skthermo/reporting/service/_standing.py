@@ -15,7 +15,6 @@ from skthermo.monitoring import Monitor, MonitorStatus
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
-ALARM, WATCH, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "watch", "attention", "healthy", "not evaluated"
 
 
 class Doubt(NamedTuple):
@@ -68,9 +67,9 @@ class Standing:
     def state(self) -> str:
         """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
         said = self.status.state
-        if said in (HEALTHY, WATCH) and self.error:
-            return NOT_EVALUATED
-        return ATTENTION if said == HEALTHY and self.worn else said
+        if said in ("healthy", "watch") and self.error:
+            return "not evaluated"
+        return "attention" if said == "healthy" and self.worn else said
 
     @property
     def worn(self) -> list[str]:
@@ -81,21 +80,21 @@ class Standing:
         return [str(name) for name in drift.index[drift["significant"].astype(bool) & (drift["change"] <= -self.limit)]]
 
     def headline(self) -> str:
-        if self.state == ALARM:
+        if self.state == "alarm":
             opened = self.opened("damage")
             since = opened["start"].min() if len(opened) else self.last
             return f"Alarm since {moment(since)}"
-        if self.state == WATCH:
-            return f"Watch since {moment(self.opened(WATCH)['start'].min())}: no alarm, but a raised damage index"
-        if self.state == HEALTHY:
+        if self.state == "watch":
+            return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
+        if self.state == "healthy":
             return "Healthy: no alarm"
-        if self.state == ATTENTION:
+        if self.state == "attention":
             return "No alarm, but much stiffness has been lost slowly"
         return self.doubt.headline
 
     def explanation(self) -> str:
         """What the headline means, and why."""
-        if self.state == ALARM:
+        if self.state == "alarm":
             text = (
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
@@ -103,18 +102,18 @@ class Standing:
             if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
             return f"{text} {self.error}." if self.error else text
-        if self.state == ATTENTION:
+        if self.state == "attention":
             return (
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
                 "the stiffness since the baseline. The monitor takes slow drift out before it evaluates, so that this "
                 "raises no alarm. An engineer should evaluate whether the structure can bear it."
             )
-        if self.state == WATCH:
+        if self.state == "watch":
             return (
                 "The damage index is above the level from which on the structure is to be watched, and below that of "
                 f"an alarm. A healthy structure has {counted_number(self.monitor.watch_per_year, 'such event')} a year."
             )
-        if self.state == HEALTHY:
+        if self.state == "healthy":
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
         return f"{self.doubt.explanation}. Whether the structure is healthy now is not known."
 
@@ -146,7 +145,7 @@ class Standing:
     def not_evaluated_since(self) -> pd.Timestamp:
         """First record after the last one that was evaluated."""
         days, evaluated = self.monitor.days_, self.evaluations
-        known = evaluated.index[evaluated["state"] != NOT_EVALUATED]
+        known = evaluated.index[evaluated["state"] != "not evaluated"]
         if len(known):
             return evaluated.index[evaluated.index > known[-1]][0]
         some = days.index[days["n_evaluated"] > 0]

@@ -207,7 +207,6 @@ def alike_sets(indistinguishable: Sequence[Sequence[str]], similarity: pd.DataFr
 
 
 def answer(found: IdentifiedDamage) -> Iterator[str]:
-    """What is most probable, how probable, what else could be."""
     explanations = statements(found)
     first, *others = explanations
     shown = " observable in these modes" if found.unobservable else ""
@@ -332,7 +331,6 @@ def _is_at_bound(found: IdentifiedDamage, cause: str) -> bool:
 
 
 def _departure(found: IdentifiedDamage) -> str:
-    """The mode that damage explains least, in standard errors."""
     shifts = found.shifts
     worst = int(np.nanargmax(np.abs(found.unexplained)))
     measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))

@@ -215,7 +215,6 @@ def identify_damage(
 
 
 def check_visible(slopes: Array, causes: Sequence[Cause]) -> None:
-    """Raise an error if no cause that was asked for can be seen."""
     alone = errors_alone(slopes)
     asked = [place for place, cause in enumerate(causes) if not cause.is_even]
     if alone[asked].min() > VISIBLE:

@@ -80,7 +80,6 @@ def check_chain(fem: FittedChain) -> None:
 
 
 def check_groups(groups: Sequence[str], known: Any) -> None:
-    """Raise an error for damage groups that the model does not have."""
     unknown = [group for group in groups if group not in known]
     if unknown:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
@@ -106,7 +105,6 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
 
 
 def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
-    """Raise an error for severities that no structure can have."""
     values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
     wrong = values[~(np.isfinite(values) & (values < 1) & (values >= LOWEST_SEVERITY))]
     if wrong.size:
