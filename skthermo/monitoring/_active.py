@@ -14,7 +14,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY, usual_step
+from skthermo._tables.frames import DAY, check_duration, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
@@ -116,24 +116,13 @@ class ActiveDetector(SavesFrames):
 
     @classmethod
     def of(
-        cls,
-        detector: Any,
-        trained: pd.DataFrame,
-        columns: list[Any],
-        targets: list[Any],
-        corrections: Corrections,
-        memory: Memory,
-        *,
-        by_direction: bool,
-        per_year: float,
-        watch_per_year: float | None = None,
-        persistence: int = 1,
+        cls, monitor: Any, detector: Any, trained: pd.DataFrame, columns: list[Any], corrections: Corrections
     ) -> ActiveDetector:
-        """Learned from what the detector was fitted on; ``by_direction`` distinguishes stiffening.
-
-        ``per_year`` damage events are expected of a healthy structure, and ``watch_per_year`` in which its index is
-        raised, if they are asked for.
-        """
+        """Learned from what the detector was fitted on, with the parameters and the responses of its monitor."""
+        targets, persistence = monitor.targets_, monitor.persistence
+        memory = Memory.of(detector)
+        if monitor.lookback is not None:
+            memory = Memory.of_time(check_duration(monitor.lookback, "lookback"))
         temperatures = [name for name in trained.columns if name not in targets]
         frequencies = as_floats(trained[targets])
         deviation = np.nanstd(frequencies, axis=0)
@@ -141,7 +130,7 @@ class ActiveDetector(SavesFrames):
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
         direction, by_kind, release = None, {DAMAGE: index}, release_level(index, DAY, persistence)
-        if by_direction:
+        if monitor.direction == "softening":
             direction = Direction.of(detector, trained[columns], targets)
             is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
@@ -151,13 +140,17 @@ class ActiveDetector(SavesFrames):
         options = {"hold": DAY, "persistence": persistence, "release": release}
         estimates = {
             kind: estimate_false_alarms(
-                one, per_year, **options, smallest_at=changes.smallest if kind == DAMAGE else None
+                one,
+                monitor.false_alarms_per_year,
+                **options,
+                smallest_at=changes.smallest if kind == DAMAGE else None,
             )
             for kind, one in by_kind.items()
         }
-        if watch_per_year is not None:
+        if monitor.watch_per_year is not None:
             with without_warnings():  # those of the higher threshold have been given
-                watch = estimate_false_alarms(by_kind[DAMAGE], watch_per_year, **options, name="watch_per_year")
+                per_year = monitor.watch_per_year
+                watch = estimate_false_alarms(by_kind[DAMAGE], per_year, **options, name="watch_per_year")
             lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)
             estimates[WATCH] = replace(watch, rule=replace(watch.rule, threshold=lower))
         parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)

@@ -682,18 +682,9 @@ class Monitor(SavesFrames, Estimator):
         corrections: Corrections | None = None,
     ) -> ActiveDetector:
         """All by which a detector evaluates that was fitted on some records; by default as the one in charge."""
-        return ActiveDetector.of(
-            detector,
-            trained,
-            self.active_.columns if columns is None else columns,
-            self.targets_,
-            self.active_.corrections if corrections is None else corrections,
-            Memory.of(detector) if self.lookback is None else Memory.of_time(check_duration(self.lookback, "lookback")),
-            by_direction=self.direction == "softening",
-            per_year=self.false_alarms_per_year,
-            watch_per_year=self.watch_per_year,
-            persistence=self.persistence,
-        )
+        columns = self.active_.columns if columns is None else columns
+        corrections = self.active_.corrections if corrections is None else corrections
+        return ActiveDetector.of(self, detector, trained, columns, corrections)
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
