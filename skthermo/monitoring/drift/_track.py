@@ -86,23 +86,8 @@ def track_parameters(
 
     Notes
     -----
-    Daily means of ln(measured / predicted frequency) are the sum of four parts. The drift is the product of the
-    Jacobian d ln f / d ln stiffness, averaged over the weather, and the change of ln stiffness of the groups: a steady
-    rate and a random walk, both 0 on the first day. What the chain has mislearned depends on the weather: a constant,
-    principal coordinates of the temperatures, their squares, hinges in cold and heat, and the day before, with unknown
-    coefficients for each mode, so that one year's weather is not taken for ageing and a chain that was trained on
-    drifting records does not hide the drift. A disturbance of each mode fades from day to day, and the rest is new with
-    each record. The variances are those of greatest restricted likelihood; modes are correlated.
-
     Bands allow for an error of 1 % of the FE model's effects; if it is less accurate than that, they are too narrow.
-
-    Each mode's trend is estimated first. Sets of one or two groups, and an even change of all groups, then explain
-    these trends, weighed by their evidence: most structures age in few places or everywhere alike, and different
-    changes in all groups at once are hardly ever determined. If no set explains the trends within their errors, all
-    errors are widened by Birge's ratio. The ``p_value`` of the drift compares the evidence of the best group with
-    that in draws of trends without drift. The stiffness of the best set by day is a steady rate and slow waves,
-    with the effects of changes as large as theirs. Each other group is given as one that changes beside it, and a
-    group that explains the trends about as well as one of the set in the place of that: the two are named as a set.
+    :ref:`how-drift-is-estimated` has the parts of the daily means, and how sets of groups explain the trends.
 
     Examples
     --------

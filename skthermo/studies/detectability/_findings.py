@@ -358,14 +358,8 @@ class StudyFindings:
 
         Notes
         -----
-        The default order is by detectors as they will be used: detectors that overfit the records from which simulated
-        noise is drawn need too low a threshold in the simulation, so that the order at equal false alarms agrees less
-        with the truth on the truss.
-
-        Differences are paired, as all detectors evaluate the same records in every repeat. Their bounds are t intervals
-        of jackknife pseudo-values over the repeats, with the error of the moved threshold and Bonferroni's correction
-        for all comparisons with the first row. They include noise alone. An example, and the limits of a ranking:
-        :doc:`/guide/rank_detectors`.
+        Differences are paired, as all detectors evaluate the same records. Their bounds include noise alone
+        (:ref:`how-detectors-are-ranked`). An example, and limits of a ranking: :doc:`/guide/rank_detectors`.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")

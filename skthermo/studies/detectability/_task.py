@@ -423,20 +423,9 @@ def detection_task(
 
     Notes
     -----
-    The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
-    from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
-    threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
-    until no more do. A damaged record that is not evaluated is not found. Where false alarms by the own threshold
-    exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound. All
-    scenarios have the same weather, and a repeat the same noise in all of them (common random numbers).
-
-    Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
-    into another. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
-    so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
-    records, and lags of rows without stamps, do so only in ``scoring``.
-
-    Give the search ``refit=False``, and fit its best detector to the baseline by ``task.refit``. How to read the score
-    of the best of many settings: :ref:`tune-by-simulated-damage`.
+    The score is the probability of detection at a limit of false alarms. Give the search ``refit=False``, and fit its
+    best detector to the baseline by ``task.refit``. :ref:`how-a-task-is-scored` says how states are kept apart, and
+    :ref:`tune-by-simulated-damage` how to read the score of the best of many settings.
 
     Examples
     --------

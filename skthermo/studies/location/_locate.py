@@ -97,12 +97,8 @@ def locate_damage(
 
     Notes
     -----
-    The members of a group follow each other along lines, by their common nodes, or by their places where they have
-    none. Each stretch of neighbouring pieces of a line may be damaged, by one severity; so may the whole group, with a
-    prior probability of a quarter. Shorter stretches are more probable than longer ones, and their severities may be
-    larger. Stretches of all probable groups, alone and with one or two other groups, are weighed by the evidence of
-    `identify_damage`, with effects at the mean parameters of the records. Probable pieces are divided further, as long
-    as the records carry it: :doc:`/guide/identify`.
+    Each stretch of neighbouring members may be damaged, by one severity, and the whole group:
+    :ref:`how-explanations-are-weighed`.
 
     Examples
     --------
