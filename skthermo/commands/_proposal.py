@@ -46,6 +46,17 @@ FEATURES = {
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
 WIDTH = 110  # of comments
+OTHERS = """
+# An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives one,
+# or a folder of matrices that another program exported. Other settings are those of DataInformedFEM.
+# [fem]
+# model = "model.py:make_model"
+# random_state = 0
+
+# The page for the owner.
+# [page]
+# title = "Bridge over the river"
+# drift_limit = 0.1"""
 
 
 @dataclass(frozen=True)
@@ -196,7 +207,7 @@ class Proposal:
         ]
         parts += [_comment("Found in the records:"), *(_comment(f"- {one}") for one in found)]
         parts += [_section(*call) for call in calls]
-        parts += [_fem(), _page()]
+        parts.append(OTHERS)
         return "\n".join(parts) + "\n"
 
 
@@ -263,31 +274,6 @@ def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) 
         lines.append(_comment(setting.text, "## "))
         shown = "..." if value is None else toml(value)
         lines.append(f"{key} = {shown}" if is_chosen else f"# {key} = {shown}")
-    return "\n".join(lines)
-
-
-def _fem() -> str:
-    lines = [
-        "",
-        _comment(
-            "An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives "
-            "one, or a folder of matrices that another program exported. Other settings are those of DataInformedFEM."
-        ),
-        "# [fem]",
-        '# model = "model.py:make_model"',
-        "# random_state = 0",
-    ]
-    return "\n".join(lines)
-
-
-def _page() -> str:
-    lines = [
-        "",
-        _comment("The page for the owner."),
-        "# [page]",
-        '# title = "Bridge over the river"',
-        "# drift_limit = 0.1",
-    ]
     return "\n".join(lines)
 
 

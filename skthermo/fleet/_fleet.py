@@ -36,6 +36,11 @@ from skthermo.monitoring import Monitor, MonitorStatus
 MOST_NAMED = 5  # bridges or kinds in a sentence
 SILENT = 7  # days without a record, after which a bridge counts as silent
 
+SAID = {
+    "alarm": "In alarm",
+    "watch": "Raised damage index without an alarm (watch)",
+    "not evaluated": "Not evaluated, state not known",
+}
 ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
 
 
@@ -63,12 +68,9 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
             f"Newest records of {len(watched)} monitors: {(state == 'alarm').sum()} in alarm, "
             f"{(state == 'healthy').sum()} healthy, {(state == 'not evaluated').sum()} not evaluated."
         )
-        if (state == "alarm").any():
-            yield f"In alarm: {named(watched.index[state == 'alarm'])}."
-        if (state == "watch").any():
-            yield f"Raised damage index without an alarm (watch): {named(watched.index[state == 'watch'])}."
-        if (state == "not evaluated").any():
-            yield f"Not evaluated, state not known: {named(watched.index[state == 'not evaluated'])}."
+        for one, text in SAID.items():
+            if (state == one).any():
+                yield f"{text}: {named(watched.index[state == one])}."
         silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
         if len(silent):
             yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."

@@ -29,15 +29,16 @@ class BaseScenario(ABC):
     """
 
     name: str
+    damage: Mapping[str, float] | None
     family: str | None
     severity: float | None
     onset: Any = None
     n_draws: int = 1
 
     @property
-    @abstractmethod
     def groups(self) -> tuple[str, ...]:
         """Damage groups that are changed."""
+        return tuple(group for group, severity in (self.damage or {}).items() if severity)
 
     @property
     def is_healthy(self) -> bool:
@@ -195,11 +196,6 @@ class Scenario(BaseScenario):
         object.__setattr__(self, "parameters", factors)
         object.__setattr__(self, "family", family if self.family is None else self.family)
         object.__setattr__(self, "severity", severity if self.severity is None else float(self.severity))
-
-    @property
-    def groups(self) -> tuple[str, ...]:
-        """Damage groups that it changes."""
-        return tuple(group for group, severity in (self.damage or {}).items() if severity)
 
     @property
     def is_healthy(self) -> bool:
@@ -362,11 +358,6 @@ class ProgressiveDamage(BaseScenario):
         object.__setattr__(self, "damage", damage)
         object.__setattr__(self, "family", family if self.end is None else None)
         object.__setattr__(self, "severity", severity)
-
-    @property
-    def groups(self) -> tuple[str, ...]:
-        """Damage groups that it changes."""
-        return tuple(group for group, severity in self.damage.items() if severity)
 
     def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         times, onset = row_times(T), time_of(T, self.onset, "onset")
