@@ -153,45 +153,12 @@ def load_affine(
 
     Notes
     -----
-    These files are read:
+    :doc:`/guide/fe_programs` lists the files that are read, program by program, the names by which matrices of one job
+    belong together, and the rules that decide the role of each matrix. Roles that were found and are doubtful, such as
+    a total that is more than the sum of the terms, or a term proportional to the mass, give a warning.
 
-    =====================  =============================================================================================
-    program                files
-    =====================  =============================================================================================
-    Abaqus                 ``.mtx`` of ``*MATRIX GENERATE``, with ``FORMAT=MATRIX INPUT``, whose nodes and directions
-                           label the rows, or ``FORMAT=COORDINATE``. What is held (1e36 on the diagonal) is left out.
-    ANSYS                  Harwell-Boeing, as ``HBMAT`` writes it in ASCII, real, symmetric (RSA) or not (RUA), and its
-                           mapping file, which labels the rows; Rutherford-Boeing
-    Nastran, OptiStruct    DMIG in a punch file (small, large and free field; form 6 or 1), whose grid points and
-                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big, or binary and dense
-    CalculiX, SAP2000      lines of row, column and value (``.sti``, ``.mas``; ``.TXK``, ``.TXM``), and CalculiX's
-                           ``.dof``, which labels the rows
-    MATLAB, Python         MATLAB v5 (``save -v7``), ``.npz`` of named arrays or of `scipy.sparse.save_npz`, Matrix
-                           Market
-    =====================  =============================================================================================
-
-    Rows with labels are joined by them, so that a group's matrix needs its own nodes only; ``model.dofs`` holds them.
-    A file in a folder that begins as none of these is ignored, unless its name ends like theirs.
-
-    Of a job ``E_deck`` that wrote stiffness and mass, the stiffness is called E_deck, and the mass is used as that of
-    the model if it is the same in all jobs: ``E_deck_STIF1.mtx`` and ``E_deck_MASS1.mtx`` (Abaqus), ``E_deck.sti`` and
-    ``.mas``, ``.TXK`` and ``.TXM``, ``.stif`` and ``.mass``, or K... and M... in ``E_deck.pch`` or ``E_deck.op4``. With
-    ``factor=2``, a folder of such jobs is one job called ``nominal``, and one for each group with its modulus doubled.
-
-    The role of each matrix is decided by these rules alone. Roles that were found and are doubtful, such as a total
-    that is more than the sum of the terms, or a term proportional to the mass, give a warning.
-
-    - Text, structs, numbers, vectors and matrices that are not square are ignored. A square matrix of another
-      size than the mass, not finite, skew-symmetric (gyroscopic), or of the mass's size and complex, is an error
-      unless ``stiffness`` names the terms; an imaginary part of zeros is dropped. If ``stiffness`` names the terms,
-      only the mass, the terms and the total are read from a folder.
-    - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
-    - Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
-      more for each MB, and ten times the memory of the files, or 256 MB.
-    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If the total is
-      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal, that is an
-      error. If ``stiffness`` names only some of the terms in a file with a total, these terms vary and the others are
-      constant. To add K0 to the terms as a constant part, give ``stiffness={"K0": (), "K1": "E_deck", ...}``.
+    Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
+    more for each MB, and ten times the memory of the files, or 256 MB.
 
     Examples
     --------
