@@ -163,9 +163,8 @@ class FrequencySurface:
     -----
     The box is that of the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %.
     The difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the
-    box; where that estimate is more than half of the least one at a check point of too large an error, or more than at
-    all check points; and where two modes are within 1 %, or a polynomial of their difference leaves open which is
-    higher.
+    box, where that estimate is more than half of the least one at a check point of too large an error, and where two
+    modes are within 1 %, or a polynomial of their difference leaves open which is higher.
 
     Examples
     --------
