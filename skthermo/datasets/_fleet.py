@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -294,7 +294,7 @@ def check_share(value: float, what: str) -> float:
     return float(value)
 
 
-class BridgeFleet(Mapping[str, FleetBridge]):
+class BridgeFleet(dict[str, FleetBridge]):
     """The bridges of `make_fleet` by name.
 
     Parameters
@@ -319,16 +319,7 @@ class BridgeFleet(Mapping[str, FleetBridge]):
     """
 
     def __init__(self, bridges: Sequence[FleetBridge]):
-        self._bridges = {bridge.name: bridge for bridge in bridges}
-
-    def __getitem__(self, name: str) -> FleetBridge:
-        return self._bridges[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._bridges)
-
-    def __len__(self) -> int:
-        return len(self._bridges)
+        super().__init__({bridge.name: bridge for bridge in bridges})
 
     def __repr__(self) -> str:
         kinds = pd.Series([bridge.kind for bridge in self.values()]).value_counts(sort=False)

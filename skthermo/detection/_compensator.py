@@ -25,7 +25,6 @@ from skthermo._estimators.warnings import (
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
     check_positions_are_names,
-    check_temperatures,
     column_names,
     frame_like,
     has_stamps,
@@ -48,6 +47,7 @@ from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records, gross_errors
+from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -390,12 +390,19 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
         names = _check_feature_names_in(self, None)
-        named = pd.DataFrame(values, columns=names, copy=False)
-        warn_of_markers(named[names[self.targets_]])
-        try:
-            check_temperatures(named.drop(columns=names[self.targets_]))
-        except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error), RecordsWarning, "implausible-temperatures")
+        warn_of_markers(pd.DataFrame(values, columns=names, copy=False)[names[self.targets_]])
+        known = Plausible.beside(self.training_range_.lowest, self.training_range_.highest)
+        far = known.implausible(as_floats(temperatures))
+        if far.any():  # only a warning, as another column may be something else than a temperature
+            column = int(far.sum(axis=0).argmax())
+            value = as_floats(temperatures)[far[:, column].argmax(), column]
+            warn_user(
+                f"temperatures are implausible: {self.training_range_.names[column]!r} is {value:g} in "
+                f"{far[:, column].sum()} of {len(far)} rows, {far.sum()} values in all. Their predictions are wrong. "
+                "Give degrees Celsius, and NaN where a value is missing",
+                RecordsWarning,
+                "implausible-temperatures",
+            )
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:

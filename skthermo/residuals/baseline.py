@@ -137,10 +137,6 @@ class BaselineResiduals:
         """How records scatter around what similar weather explains, and how long they remember it."""
         return Scatter.of(self)
 
-    def independent_scatter(self, deviations: Array) -> Scatter:
-        """The same for independent records and modes of stated relative standard deviations, (n_modes,)."""
-        return Scatter.independent(deviations, len(self.values))
-
     @property
     def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""

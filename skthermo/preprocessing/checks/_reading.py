@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import HUGE, Array, as_floats
-from skthermo._tables.frames import PREFIXES, as_stamps
+from skthermo._tables.frames import as_stamps
 from skthermo.preprocessing.checks._kinds import Finding
 
 NUMBERED = pd.Timestamp("1970-03-01")  # before which numbers that are read as nanoseconds fall
@@ -103,7 +103,7 @@ class Reading:
         if values.ndim not in (1, 2):
             return
         values = values[:, np.newaxis] if values.ndim == 1 else values
-        prefix = PREFIXES["temperature" if self.what == "temperatures" else "frequency"]
+        prefix = "T" if self.what == "temperatures" else "f"
         self.values, self.index = values, pd.RangeIndex(len(values))
         self.columns = names or [f"{prefix}{place + 1}" for place in range(values.shape[1])]
 
