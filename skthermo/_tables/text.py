@@ -42,7 +42,6 @@ def significant(value: float, digits: int = 2) -> str:
 
 
 def probability_text(value: float) -> str:
-    """A probability as a number."""
     if not np.isfinite(value):
         return UNKNOWN
     return "less than 0.001" if value < 0.001 else f"{value:.2g}"
@@ -56,7 +55,6 @@ def chance_text(probability: float) -> str:
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
-    """A number with its noun."""
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
 
 
@@ -79,7 +77,6 @@ def printable(text: Any) -> str:
 
 
 def listed(names: Sequence[Any]) -> str:
-    """Names in a sentence."""
     *first, last = [str(name) for name in names] or [""]
     return f"{', '.join(first)} and {last}" if first else last
 

@@ -169,7 +169,6 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
 
 
 def _numbers_of(value: object, what: str, *, complex_too: bool = False) -> NDArray:
-    """An array of numbers."""
     if not isinstance(value, np.ndarray):
         raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
     if np.iscomplexobj(value) and not complex_too:

@@ -273,7 +273,6 @@ def stiffness_factors(
 
 
 def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[str]) -> Mapping[str, float]:
-    """The values, checked."""
     values = {} if values is None else values
     if not isinstance(values, Mapping) or not set(values) <= set(groups):
         raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
@@ -284,7 +283,6 @@ def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[
 
 
 def _onset(index: pd.DatetimeIndex, damage_from: Stamp) -> pd.Timestamp:
-    """When the damage begins."""
     if damage_from is None:
         return index[0]
     try:

@@ -372,7 +372,6 @@ class SensorMeans(RecordTransformer):
         return list(self.columns_)
 
     def _read_roles(self) -> list[str | None]:
-        """Role of each column."""
         names = list(getattr(self, "feature_names_in_", range(self.n_features_in_)))
         if self.roles is None:
             return [EVERYWHERE] * len(names)

@@ -75,7 +75,6 @@ class BaselineResiduals:
 
     @property
     def n_modes(self) -> int:
-        """Number of modes."""
         return self.values.shape[1]
 
     def spread(self, weather: Array) -> Array:

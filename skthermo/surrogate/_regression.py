@@ -193,7 +193,6 @@ class Standardiser:
         return cls(scaler.mean_, scaler.scale_, log)
 
     def transform(self, values: Array) -> Array:
-        """Standardised values."""
         return ((np.log(values) if self.log else values) - self.mean) / self.scale
 
     def inverse_transform(self, standardised: Array) -> Array:

@@ -59,7 +59,6 @@ class PrincipalBox:
         )
 
     def places(self, theta: Array) -> Array:
-        """Coordinates of rows of theta."""
         return (np.log(theta) - self.centre) @ self.directions.T / self.half_widths
 
     def holds(self, theta: Array, places: Array) -> NDArray[np.bool_]:

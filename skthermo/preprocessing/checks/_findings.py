@@ -166,11 +166,9 @@ class _Records:
         return INERTIA if self.hours is None else max(int(24 / self.hours), 1)
 
     def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> Finding:
-        """A finding in some rows."""
         return finding(self.index, what, column, rows, detail)
 
     def period(self, rows: NDArray[np.intp]) -> str:
-        """First and last of some rows."""
         return period_of(self.index, rows)
 
 

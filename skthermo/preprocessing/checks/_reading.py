@@ -77,7 +77,6 @@ class Reading:
 
     @property
     def whole(self) -> NDArray[np.intp]:
-        """All rows."""
         return np.arange(len(self.values))
 
     def finding(
@@ -88,7 +87,6 @@ class Reading:
         return finding(self.index, what, column, rows, detail + where)
 
     def found(self, *args: Any, **options: Any) -> None:
-        """Add a finding."""
         self.findings.append(self.finding(*args, **options))
 
     def _read_array(self, table: Any) -> None:
@@ -156,7 +154,6 @@ def _frame_values(table: pd.DataFrame, reading: Reading) -> Array:
 
 
 def _reason(error: Exception) -> str:
-    """The first part of an error."""
     return f"{str(error).partition(';')[0]:.150}"
 
 

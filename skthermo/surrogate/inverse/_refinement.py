@@ -67,17 +67,14 @@ class ShapeInputs:
 
     @property
     def n_sensors(self) -> int:
-        """Number of sensors."""
         return len(self.dofs)
 
     @property
     def n_modes(self) -> int:
-        """Number of modes."""
         return self.reference.shape[1]
 
     @property
     def n_columns(self) -> int:
-        """Number of columns of inputs."""
         return self.n_modes * (1 + self.n_sensors)
 
     @property
@@ -191,7 +188,6 @@ class Objective:
 
     @property
     def n_sensors(self) -> int:
-        """Number of sensors of shapes."""
         return self.units.shape[2]
 
     @property
@@ -215,7 +211,6 @@ class Objective:
         return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
 
     def of(self, rows: NDArray) -> Objective:
-        """The objective of some rows."""
         return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], units=self.units[rows])
 
     def without_shapes(self) -> Objective:
@@ -234,11 +229,9 @@ class Rows:
     """Arrays of the same rows, and further objects of the same rows."""
 
     def of(self, rows: NDArray) -> Self:
-        """Some rows."""
         return type(self)(*(part.of(rows) if isinstance(part, Rows) else part[rows] for part in vars(self).values()))
 
     def put(self, rows: NDArray, other: Self) -> None:
-        """Replace some rows."""
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             if isinstance(mine, Rows):
                 mine.put(rows, theirs)
@@ -246,7 +239,6 @@ class Rows:
                 mine[rows] = theirs
 
     def beside(self, other: Self) -> Self:
-        """These rows, and then others."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return type(self)(*(a.beside(b) if isinstance(a, Rows) else np.concatenate([a, b]) for a, b in pairs))
 
