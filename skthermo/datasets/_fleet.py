@@ -370,22 +370,11 @@ def make_fleet(
 
     Notes
     -----
-    Kinds, with five modes, mostly between 1 and 30 Hz:
-
-    - truss: the 28-bar truss scaled to spans of 26 to 58 m, with a floor and pavement on its bottom chord; parameters
-      ``deck``, ``top``, ``diagonals`` and ``bearings``;
-    - girder: continuous over two or three spans of at most 20 to 45 m, of concrete or composite, in bending and
-      torsion, its piers on soil; parameters ``deck``, ``torsion``, ``bearings`` and ``soil``;
-    - arch: a tied arch of 50 to 120 m in its plane, with a steel or composite deck; parameters ``deck``, ``arch``,
-      ``hangers`` and ``bearings``.
-
-    The user's model has a coarser mesh (but for the truss), stiffnesses that are 2 to 5 % off, masses that are 1 % off,
-    and parameters that cut across the thermal zones of the truth.
-
-    Climates lie between 43 and 60 degrees of latitude, maritime to continental. Parts follow the air with thermal
-    inertia (steel 2 h, concrete 15 h, soil four days) and are warmed by the sun. The logarithm of the stiffness of a
-    part changes in proportion to its temperature, and rises below a knee near 0 C, up to a limit, where water freezes
-    or elastomers stiffen. The coefficients scatter by 10 to 30 % about those of the material, the knee by 0.5 C.
+    Kinds, with five modes, mostly between 1 and 30 Hz, and their parameters: trusses (``deck``, ``top``, ``diagonals``,
+    ``bearings``), girders over two or three spans (``deck``, ``torsion``, ``bearings``, ``soil``) and tied arches
+    (``deck``, ``arch``, ``hangers``, ``bearings``). The user's model has a coarser mesh (but for the truss),
+    stiffnesses that are 2 to 5 % off, masses that are 1 % off, and parameters that cut across the thermal zones of the
+    truth. :ref:`bridges-of-a-fleet` describes spans, climates and thermal laws.
 
     Examples
     --------
