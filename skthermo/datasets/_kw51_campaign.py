@@ -345,8 +345,8 @@ def make_kw51_campaign(
 ) -> KW51Campaign:
     """Synthetic monitoring of the railway bridge KW51: hourly temperatures and modes, through its retrofit.
 
-    The measurements may not be part of this package. This campaign has their length and gaps and, as far as these are
-    known, their correlations with temperature and shifts by the retrofit, and its truth is known.
+    The measurements [ML21]_ may not be part of this package. This campaign has their length and gaps and, as far as
+    these are known, their correlations with temperature and shifts by the retrofit, and its truth is known.
 
     Parameters
     ----------
@@ -423,13 +423,6 @@ def make_kw51_campaign(
     correlations with temperature differ from theirs by at most 0.09 (``python tests/benchmarks/kw51_campaign.py``). A
     model with the five thermal parameters of `make_kw51` as functions of tBD31A can come close to this bridge, but
     cannot be exact.
-
-    References
-    ----------
-    Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001 [ML21]_.
-
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------

@@ -48,7 +48,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     """Read the monitoring of the Z24 highway bridge, with its progressive damage.
 
     Z24 in Switzerland was a post-tensioned concrete box girder of 14 + 30 + 14 m, monitored for a
-    year, damaged step by step in its last month, and demolished in 1998 (KU Leuven). The data are not
+    year, damaged step by step in its last month, and demolished in 1998 (KU Leuven) [PD01]_. The data are not
     part of this package: their use is non-commercial.
 
     Parameters
@@ -84,11 +84,6 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     The time stamp is ``record``, in hours, added to 1997-11-11 00:00, the day on which monitoring began; the
     hour of the first record is not documented, so that times of day are nominal. Without ``idx``, rows of a MATLAB file
     are taken as consecutive hours.
-
-    References
-    ----------
-    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
 
     Examples
     --------
@@ -235,17 +230,9 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     Notes
     -----
     Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0.
-    :ref:`structure-of-z24` lists dimensions and constants, four of which ``tools/fit_z24_constants.py`` found from the
-    healthy records above 5 C. Torsion (f4) has vertical modes close below and above it, so that modes change their
-    order in most of the box of +-30 %; columns therefore follow shapes.
-
-    References
-    ----------
-    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
-
-    Teughels & De Roeck, Structural damage identification of the highway bridge Z24 by FE model updating, Journal of
-    Sound and Vibration 278 (2004) 589-610 [TD04]_.
+    :ref:`structure-of-z24` lists dimensions [PD01]_ and constants [TD04]_, four of which ``tools/fit_z24_constants.py``
+    found from the healthy records above 5 C. Torsion (f4) has vertical modes close below and above it, so that modes
+    change their order in most of the box of +-30 %; columns therefore follow shapes.
 
     Examples
     --------

@@ -50,7 +50,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     max_shift : float, default=0.15
         Largest relative difference of a pole's frequency from that of its mode.
     min_mac : float, default=0.8
-        Lowest modal assurance criterion (MAC) of a pole's shape and that of its mode.
+        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and that of its mode.
     follow : float, str, timedelta or None, default=None
         Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
         of records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step.
@@ -86,10 +86,6 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
     mode that is missing keeps its mean. :doc:`/guide/modes` says how to set the tolerances. The tracker comes before a
     pipeline, not into it: its ``frequencies`` are what the other estimators take.
-
-    References
-    ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------

@@ -397,7 +397,7 @@ def offsets_between(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class BiasAligner(RecordTransformer):
-    """Move measured frequencies so that their means are the model's frequencies, equation (22).
+    """Move measured frequencies so that their means are the model's frequencies, equation (22) [KCM26]_.
 
     Parameters
     ----------
@@ -418,10 +418,6 @@ class BiasAligner(RecordTransformer):
         Number of modes.
     feature_names_in_ : ndarray of str
         Names of the modes, where `fit` saw a frame with such names.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

@@ -65,7 +65,8 @@ class ModelUpdater(Estimator):
               + \\sum_p \\Bigl(\\frac{\\theta_p - 1}{\\sigma_p}\\Bigr)^2 ,
 
     with measured frequencies, their weights w = measured frequency / standard deviation (or 1), weights v of shapes,
-    and standard deviations of a prior. The first sum with unit weights is eq. (A.3).
+    and standard deviations of a prior. The first sum with unit weights is eq. (A.3) of
+    [KCM26]_; see [FM95]_, and for large models [MF98]_.
 
     Parameters
     ----------
@@ -134,15 +135,6 @@ class ModelUpdater(Estimator):
     with noise of s times their root mean square at n degrees of freedom have the weight v = sqrt(2 (n - 1)) / s^2.
     Without ``frequency_std`` it serves for comparison only. It takes no account of bounds or of errors of the model
     itself. :doc:`/guide/updating` explains weights, close modes and the steps that are taken.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
-
-    Friswell & Mottershead, Finite element model updating in structural dynamics, Kluwer, 1995 [FM95]_.
-
-    Möller & Friberg, Updating large finite element models in structural dynamics, AIAA Journal 36 (1998)
-    1861-1868 [MF98]_.
 
     Examples
     --------
