@@ -11,6 +11,7 @@ from scipy import stats
 from skthermo._effects import healthy_frequencies
 from skthermo._tables.arrays import Array, check_noise, means_of_known, median, robust_deviation
 from skthermo._tables.frames import has_stamps, row_times
+from skthermo.residuals.scatter import PSEUDO_RECORDS, Scatter
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
@@ -79,7 +80,7 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     parts = new + scatter.of_sums(trained, np.arange(len(trained)))
     freedom = scatter.freedom(parts)
     if isinstance(noise, str):  # Hotelling: the covariance is not known, either
-        n_evaluated, of_correlations = measured.sum(), freedom + scatter.n_pseudo
+        n_evaluated, of_correlations = measured.sum(), freedom + PSEUDO_RECORDS
         factor = of_correlations / max(of_correlations - n_evaluated + 1, 1.0)
         freedom = max(freedom - n_evaluated + 1, 1.0)
     covariance = np.where(np.outer(measured, measured), factor * parts.sum(axis=0), np.eye(len(mean)))
@@ -97,7 +98,7 @@ def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
     deviations = check_noise(noise, len(fem.mode_names_), fem.mode_names_)
     if (deviations == 0).any():
         raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-    return fem.residuals().independent_scatter(deviations)
+    return Scatter.independent(deviations, len(fem.residuals().values))
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:
