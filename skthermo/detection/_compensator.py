@@ -409,7 +409,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
         predict = partial(self._predicted, temperatures)
-        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        weather, predicted, errors, unknown = answer_once(self, (temperatures,), 2 * np.size(X), predict)
         return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
 
     def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
@@ -434,11 +434,13 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Temperatures and frequencies of new records, with a warning of values that are none."""
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
-        names = _check_feature_names_in(self, None)
-        named = pd.DataFrame(values, columns=names, copy=False)
-        warn_of_markers(named[names[self.targets_]])
+        others, targets = temperatures, frequencies
+        if not isinstance(X, pd.DataFrame):
+            named = pd.DataFrame(values, columns=_check_feature_names_in(self, None), copy=False)
+            others, targets = split_columns(named, values, self.targets_)
+        warn_of_markers(targets)
         try:
-            check_temperatures(named.drop(columns=names[self.targets_]))
+            check_temperatures(others)
         except ValueError as error:  # only a warning, as another column may be something else than a temperature
             warn_user(str(error), RecordsWarning, "implausible-temperatures")
         return temperatures, frequencies
