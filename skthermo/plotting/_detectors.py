@@ -239,7 +239,7 @@ class DetectorsDisplay(Display):
         DetectorsDisplay
             Itself.
         """
-        n_columns = min(3 if "pod_deficit" in self.panels else 2, len(self.panels))
+        n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
         size = 3.6 + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
         self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
