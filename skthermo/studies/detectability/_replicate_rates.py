@@ -218,8 +218,9 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
                     here = replace(simulation, T=T)
                     drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                 if part == "baseline":
-                    levels = replicates.noise_levels(number)
-                    drawn = [(noise * levels, gappy) for noise, gappy in drawn]
+                    levels, faults = replicates.noise_levels(number), replicates.fault_stream(number)
+                    here = replace(here, measurement=here.measurement.resampled(here.fem, faults))
+                    drawn = [(noise * levels, gappy) for noise, gappy in (here.drawn(int(seed)) for seed, _ in seeds)]
                 steps.append(_rates(here, chain, seeds, drawn, number * N_DRAWS))
         except Exception as error:
             return f"{type(error).__name__}: {error}"

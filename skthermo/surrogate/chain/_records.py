@@ -283,6 +283,11 @@ class ServiceRecords:
             taken[row] = record
         return taken
 
+    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
+        """Gaps and outliers that the training records could have had as well, in their own weather."""
+        taken = self.draw(self.places, random_state)
+        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
+
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
         """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
         run by run, with the bandwidth of Silverman's rule on logarithms."""
