@@ -17,9 +17,9 @@ the mean of the records by `ModelUpdater`, or only its offset is removed ("align
 
 States of which the predicted share is between 5 and 95 % are counted apart: of the others, nearly every band holds.
 States of such a measured share are counted, too, but they are a biased choice. Of the states predicted to be nearly
-always or never detected, it takes only those in which the prediction was wrong. The exit code is 1 if the ensemble's
-intervals cover less than 85 or more than 95 % of partly detected states, by more than twice the sampling error of the
-share.
+always or never detected, it takes only those in which the prediction was wrong. The exit code is 1 if intervals by
+default, or those of the ensemble, cover less than 85 or more than 95 % of partly detected states, by more than twice
+the sampling error of the share.
 """
 
 import argparse
@@ -226,7 +226,9 @@ def realisation(kind, seed, options):
         own_models = [] if options.calibrated else [(False, model, None)]
         if not options.aligned:
             updater = ModelUpdater(model, bounds=0.6, prior=0.15).fit(F, frequency_std=DEVIATION * F.mean())
-            own_models.append((True, updater.model_, updater.sample_models(options.replicates, random_state=seed)))
+            number = 0 if options.without_ensemble else options.replicates
+            ensemble = updater.sample_models(number, random_state=seed) if number else None
+            own_models.append((True, updater.model_, ensemble))
         for calibrated, own, models in own_models:
             if name == "right" and not (calibrated or options.aligned):
                 continue
@@ -283,6 +285,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="half of the states, and one detector")
     parser.add_argument("--aligned", action="store_true", help="models as they are, without an ensemble")
     parser.add_argument("--calibrated", action="store_true", help="calibrated models alone")
+    parser.add_argument("--without-ensemble", action="store_true", help="and no bands of all uncertainty")
     parser.add_argument("--save", help="a file for the table of all bands")
     options = parser.parse_args()
     numbers = range(options.first_seed, options.first_seed + options.realisations)
@@ -299,7 +302,7 @@ def main():
         shares = table(found)
         print(shares.round(1).to_string())
         print(f"  {time.perf_counter() - began:.0f} s in all")
-        for key, row in shares[shares.index.get_level_values(2) == "all"].iterrows():
+        for key, row in shares[shares.index.get_level_values(2).isin(["default", "all"])].iterrows():
             of_independent = 100 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / row["partly detected"])
             margin = 2 * np.nanmax([row["+-"], of_independent])
             met = WANTED[0] - margin <= row["held"] <= WANTED[1] + margin
