@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, check_names
 from skthermo._tables.text import percent, printable, share_text
 from skthermo.plotting._display import (
     BLACK,
@@ -23,7 +23,7 @@ from skthermo.plotting._display import (
     plain,
     shortened,
 )
-from skthermo.plotting._tables import check_study, names_from
+from skthermo.plotting._tables import check_study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -330,7 +330,7 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
     table = both_rates(results[~failed])
     measures = table.groupby("scenario", sort=False)["measure"].first()
     known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index
-    names = names_from(scenarios, known, "scenarios")
+    names = check_names(known if scenarios is None else scenarios, "scenarios", known)
     rows = table[table["scenario"].isin(names)]
     rows = rows[rows["measure"] == "POD"] if (rows["measure"] == "POD").any() else rows
     found = rows.groupby("detector", sort=False)["value"].mean().sort_values(ascending=False, kind="stable")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Real
@@ -53,7 +52,6 @@ def drawing(module: str) -> ModuleType:
 
 
 def pyplot() -> ModuleType:
-    """Matplotlib's pyplot."""
     return drawing("matplotlib.pyplot")
 
 
@@ -88,7 +86,6 @@ def label_of(name: Hashable) -> str:
 
 
 def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
     return plain(f"{quantity} ({unit})" if unit else quantity)
 
 
@@ -319,11 +316,6 @@ class Display:
         """One axes for each name: those that are given, or those of a new figure with panels of this size."""
         self.axes_ = panels(ax, names, size, **options)
         return self.axes_
-
-    def _head(self, result: object, width: int) -> None:
-        """The first sentence of a result that has an answer, above all panels."""
-        if hasattr(result, "answer"):
-            self.figure_.suptitle(plain(textwrap.fill(result.answer()[0], width)), fontsize="medium")
 
     @property
     def ax_(self) -> Axes:

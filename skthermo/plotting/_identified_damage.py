@@ -124,8 +124,9 @@ class IdentifiedDamageDisplay(Display):
         self.bars_ = self._draw_explanations(explanations)
         self.severities_ = self._draw_severities(severities)
         self._draw_shifts(shifts)
-        if ax is None:
-            self._head(self.identified, LINE)
+        if ax is None and hasattr(self.identified, "answer"):
+            head = textwrap.fill(self.identified.answer()[0], LINE)
+            self.figure_.suptitle(plain(head), fontsize="medium")
         return self
 
     def _draw_explanations(self, ax: Axes) -> BarContainer:

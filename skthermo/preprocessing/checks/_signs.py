@@ -308,7 +308,6 @@ def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
 
 
 def _beside(inputs: Array, columns: Array) -> Array:
-    """What inputs leave of columns."""
     basis = _orthonormal(inputs)
     return columns - basis @ (basis.T @ columns)
 

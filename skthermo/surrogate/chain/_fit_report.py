@@ -434,7 +434,6 @@ class FitReport(SavesFrames):
 
 
 def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
-    """The report of a chain that is fitted otherwise."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
