@@ -264,7 +264,8 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
         return "Intervals include noise only, not other weather, other training records or an error of the model."
     names = [column for column in parts.columns if column in NAMES]
     lines = [
-        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}."
+        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}. "
+        "They hold in weather that the chain has learned: colder or warmer days can raise more false alarms."
     ]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()
