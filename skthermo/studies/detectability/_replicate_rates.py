@@ -264,7 +264,7 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
     names = [column for column in parts.columns if column in NAMES]
     lines = [
         f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}. "
-        "They hold in weather that the chain has learned: colder or warmer days can raise more false alarms."
+        "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()
