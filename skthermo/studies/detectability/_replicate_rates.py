@@ -219,9 +219,12 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
                     here = replace(simulation, T=T)
                     drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                 if part == "baseline":
-                    levels, faults = replicates.noise_levels(number), replicates.fault_stream(number)
-                    here = replace(here, measurement=here.measurement.resampled(here.fem, faults))
-                    drawn = [(noise * levels, gappy) for noise, gappy in (here.drawn(int(seed)) for seed, _ in seeds)]
+                    measurement = here.measurement.resampled(here.fem, replicates.fault_stream(number))
+                    if measurement is not here.measurement:
+                        here = replace(here, measurement=measurement)
+                        drawn = [here.drawn(int(seed)) for seed, _ in seeds]
+                    levels = replicates.noise_levels(number)
+                    drawn = [(noise * levels, gappy) for noise, gappy in drawn]
                 steps.append(_rates(here, chain, seeds, drawn, number * N_DRAWS))
         except Exception as error:
             return f"{type(error).__name__}: {error}"

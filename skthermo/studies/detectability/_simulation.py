@@ -246,7 +246,7 @@ class Measurement:
         if self.outliers is None or is_real(self.outliers):
             return self
         service = fem.recorder_.service if isinstance(self.outliers, str) else self.outliers
-        return replace(self, outliers=service.resampled(random_state))
+        return replace(self, outliers=service.resampled(random_state)) if service.has_faults else self
 
     def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
