@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from importlib import import_module
 from numbers import Integral
+from operator import attrgetter
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
@@ -248,6 +249,13 @@ def last_step(estimator: Any) -> Any:
     if isinstance(estimator, BaseSearchCV):
         return last_step(getattr(estimator, "best_estimator_", estimator.estimator))
     return estimator
+
+
+def held(path: str, *, is_copied: bool = False) -> Any:
+    """A property that a part of an object holds, such as "active_.threshold"; the object's class says what it is."""
+    get = attrgetter(path)
+    doc = f"``{path}``, as the class describes it."
+    return property((lambda owner: get(owner).copy()) if is_copied else get, doc=doc)
 
 
 class Stages:

@@ -111,7 +111,6 @@ def as_columns(values: ArrayLike) -> Array:
 
 
 def as_dense(matrix: Matrix) -> Array:
-    """A matrix as an array."""
     return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
@@ -464,13 +463,16 @@ def check_jobs(n_jobs: Any) -> None:
         raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
 
 
-def check_names(names: Any, what: str) -> list[str]:
-    """Different names as a list; one text in place of several is an error."""
+def check_names(names: Any, what: str, known: Iterable[Any] | None = None) -> list[str]:
+    """Different names as a list, some of those that are known; one text in place of several is an error."""
     given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
     if len(set(given)) < len(given):
         raise ValueError(f"{what} are {given!r:.200}; expected each name once")
+    unknown = [] if known is None else [name for name in given if name not in known]
+    if unknown:
+        raise ValueError(f"{what} names {unknown!r:.200}; expected some of {list(known)}")
     return given
 
 
@@ -479,6 +481,11 @@ def check_size(value: Any, what: str, lowest: float, highest: float, expected: s
     if not is_real(value) or not lowest < float(value) < highest:
         raise ValueError(f"{what} is {value!r:.100}; expected {expected}")
     return float(value)
+
+
+def check_probability(value: Any, what: str) -> float:
+    """A probability strictly between 0 and 1."""
+    return check_size(value, what, 0, 1, "a probability between 0 and 1, such as 0.9")
 
 
 def integer_row(values: Any, what: str, expected: str = "integers in one row") -> NDArray[np.integer]:
@@ -497,7 +504,6 @@ def integer_row(values: Any, what: str, expected: str = "integers in one row") -
 
 
 def check_path(path: Any, what: str = "path") -> Path:
-    """A path, given as text or as a path."""
     if not isinstance(path, str | PathLike) or not str(path):
         raise ValueError(f"{what} is {path!r:.200}; expected a path, as text or a pathlib.Path")
     return Path(path)

@@ -58,7 +58,6 @@ class Failure:
 
     @classmethod
     def of(cls, stage: str, error: BaseException) -> Failure:
-        """What is known of an error that was caught."""
         return cls(stage, type(error).__name__, str(error), _place(error))
 
     def __str__(self) -> str:
@@ -101,7 +100,6 @@ class BridgeOutcome:
 
     @property
     def is_watched(self) -> bool:
-        """Whether there is a monitor."""
         return self.events is not None
 
 
@@ -239,7 +237,6 @@ def call(given: Any) -> Any:
 
 
 def pair(records: Any, name: Hashable) -> tuple[Table, Table]:
-    """Temperatures and frequencies."""
     if not isinstance(records, tuple | list) or len(records) != 2:
         raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
     shapes = [np.shape(table) for table in records]
@@ -262,7 +259,6 @@ def joined(T: Table, F: Table) -> pd.DataFrame:
 
 
 def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
-    """A monitor that is fitted to the records."""
     if not hasattr(monitor, "update") or not hasattr(monitor, "fit"):
         raise ValueError(f"monitor gave {type(monitor).__name__!r}; expected an unfitted Monitor")
     seed_parts(monitor, np.random.RandomState(seed))
@@ -270,26 +266,22 @@ def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
 
 
 def _facts(T: Table, F: Table) -> dict[str, float]:
-    """Number of records, and share of values that are missing."""
     missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
     return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
 
 
 def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
-    """Mean absolute error of the training frequencies in percent."""
     report = getattr(chain, "report_", None)
     errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
 
 
 def known_of(monitor: Monitor) -> dict[str, Any]:
-    """What an outcome holds of a monitor."""
     status = monitor.status(monitor.last_)
     return {"standing": standing_of(monitor), "events": monitor.events_, "status": status}
 
 
 def standing_of(monitor: Monitor) -> dict[str, Any]:
-    """What a monitor says of its bridge."""
     days, events, drift = monitor.days_, monitor.events_, monitor.drift_
     damage = events[events["kind"] == "damage"]
     n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
@@ -310,14 +302,12 @@ def standing_of(monitor: Monitor) -> dict[str, Any]:
 
 
 def _answers(name: Hashable, evaluations: pd.DataFrame) -> pd.DataFrame:
-    """Evaluations with the name of their bridge."""
     table = evaluations.rename_axis("time").reset_index()
     table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
     return table
 
 
 def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
-    """One row for a bridge of which no new record was evaluated."""
     row = {
         "bridge": name,
         "time": pd.NaT,
@@ -340,7 +330,6 @@ def pickled(fitted: Any) -> bytes:
 
 
 def unpickled(content: bytes) -> Any:
-    """Fitted objects from bytes."""
     return pickle.loads(zlib.decompress(content))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Real
@@ -53,7 +52,6 @@ def drawing(module: str) -> ModuleType:
 
 
 def pyplot() -> ModuleType:
-    """Matplotlib's pyplot."""
     return drawing("matplotlib.pyplot")
 
 
@@ -88,7 +86,6 @@ def label_of(name: Hashable) -> str:
 
 
 def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
     return plain(f"{quantity} ({unit})" if unit else quantity)
 
 
@@ -293,7 +290,7 @@ def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> No
             nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
             texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
     if texts:
-        _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not evaluated")
+        _write(ax, "; ".join(texts), x=0.01, y=0.95, ha="left", va="top", gid="not evaluated")
 
 
 def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
@@ -319,11 +316,6 @@ class Display:
         """One axes for each name: those that are given, or those of a new figure with panels of this size."""
         self.axes_ = panels(ax, names, size, **options)
         return self.axes_
-
-    def _head(self, result: object, width: int) -> None:
-        """The first sentence of a result that has an answer, above all panels."""
-        if hasattr(result, "answer"):
-            self.figure_.suptitle(plain(textwrap.fill(result.answer()[0], width)), fontsize="medium")
 
     @property
     def ax_(self) -> Axes:

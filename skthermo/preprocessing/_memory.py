@@ -100,14 +100,11 @@ class ExponentialMeans(PastFeatures):
 
     Notes
     -----
-    The mean of a record at time t is that of the known values at s with weights exp(-(t - s) / time constant), for
-    t - s up to four time constants, the record's own value included. Near the first record it is the mean of what is
-    known. Missing values have no weight, and a mean is NaN only where no value is known.
-
-    Records of `fit` and of `transform` count together, as in `LagFeatures`: for a stamp in both, the values of
-    `transform`. Rows may come in any order, which the result keeps. Without a DatetimeIndex rows count as consecutive,
-    and those of `fit` are not used in `transform`. There is a warning if more than half of the rows have no record that
-    is older than the longest time constant, and do not begin as the records of `fit` do.
+    The mean of a record at time t is that of the known values at s with weights exp(-(t - s) / time constant), for t -
+    s up to four time constants, the record's own value included. Near the first record it is the mean of what is known.
+    Missing values have no weight, and a mean is NaN only where no value is known. Records of `fit` and of `transform`
+    count together, as in `LagFeatures`. There is a warning if more than half of the rows have no record that is older
+    than the longest time constant, and do not begin as the records of `fit` do.
 
     Examples
     --------
@@ -368,16 +365,8 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
 
     Notes
     -----
-    Errors are those of piecewise-linear ridge regression on up to three principal components of the temperatures, with
-    a mean of one sensor beside them, out of fold in five contiguous parts of the records; values far from what the
-    weather explains are left out. A mean is chosen if it lowers the mean absolute error by 5 % on average over the
-    modes, by 15 % if its time constant is five days or more, and by 25 % if it is more than a day and the records last
-    less than nine months; if it raises the error in no part; and if it lowers the error beside a trend and a step by
-    half as much. Time constants are at most a quarter of the records. A second mean of the same sensor is chosen by the
-    same rules beside the first.
-
-    Records of the first two time constants do not count, because their means lack the weather before. Nothing is looked
-    for in records without a DatetimeIndex.
+    A mean is chosen if it lowers the mean absolute out-of-fold error of a piecewise-linear regression on the weather
+    enough, by the rules of :doc:`/guide/records_theory`. Nothing is looked for in records without a DatetimeIndex.
 
     Examples
     --------

@@ -75,7 +75,6 @@ class BaselineResiduals:
 
     @property
     def n_modes(self) -> int:
-        """Number of modes."""
         return self.values.shape[1]
 
     def spread(self, weather: Array) -> Array:
@@ -136,10 +135,6 @@ class BaselineResiduals:
     def scatter(self) -> Scatter:
         """How records scatter around what similar weather explains, and how long they remember it."""
         return Scatter.of(self)
-
-    def independent_scatter(self, deviations: Array) -> Scatter:
-        """The same for independent records and modes of stated relative standard deviations, (n_modes,)."""
-        return Scatter.independent(deviations, len(self.values))
 
     @property
     def is_overfitted(self) -> bool:

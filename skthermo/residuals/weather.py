@@ -349,7 +349,6 @@ class WeatherFunctions:
 
     @property
     def size(self) -> int:
-        """Number of functions."""
         return 2 * len(self.directions) + 3
 
     def values(self, weather: Array, *, is_clipped: bool = False) -> Array:

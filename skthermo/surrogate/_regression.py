@@ -161,8 +161,8 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     -----
     ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. The dropout of Table 1 (0.05 after the
     input) and Table 6 (0.2 after the first two layers) is replaced by the L2 penalty ``alpha``, 0.1 and 1 here, and,
-    for the inverse surrogate, by ``noise`` on the simulated frequencies. Training ends before 1000 epochs when the loss
-    has stopped falling; no rows are held out to decide this. The estimators themselves standardise inputs and outputs.
+    for the inverse surrogate, by ``noise`` on the simulated frequencies. No rows are held out to decide when the loss
+    has stopped falling. The estimators themselves standardise inputs and outputs.
 
     Examples
     --------
@@ -193,7 +193,6 @@ class Standardiser:
         return cls(scaler.mean_, scaler.scale_, log)
 
     def transform(self, values: Array) -> Array:
-        """Standardised values."""
         return ((np.log(values) if self.log else values) - self.mean) / self.scale
 
     def inverse_transform(self, standardised: Array) -> Array:
@@ -383,13 +382,8 @@ class TemperatureMapper(MultiplierRegressor):
 
     Notes
     -----
-    Rows with a missing temperature or parameter are left out in `fit`, and only there.
-
-    On the last fifth of the healthy records of the bridge Z24, warmer than all others, the errors are 0.60 % with
-    piecewise-linear regression, about 0.7 % with small networks (different for each seed), 0.67 % with random forests,
-    0.73 % with boosted trees, 1.4 % with Gaussian processes and 7 % with quadratic polynomials
-    (``examples/plot_regressors.py``). Trees stay at their last value beyond the data. Where few records show a sharp
-    knee, networks follow it better.
+    Rows with a missing temperature or parameter are left out in `fit`, and only there. :doc:`/accuracy_regressors`
+    compares regressors on the last fifth of the healthy records of the bridge Z24, warmer than all others.
 
     Examples
     --------

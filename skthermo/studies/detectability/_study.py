@@ -17,13 +17,12 @@ from sklearn.exceptions import NotFittedError
 from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
-from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
-from skthermo._validation import Stages, last_step, seeded
+from skthermo._tables.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
+from skthermo._validation import Stages, held, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.studies.detectability._candidates import Candidate, LearnedHeads
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
@@ -42,19 +41,12 @@ Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 P, Answer = ParamSpec("P"), TypeVar("Answer")
 
 
-def _found_attribute(name: str) -> Any:
-    """A property of a study: what its last run found, under this name."""
-    return property(
-        lambda study: getattr(study._found(), name), doc=f"``findings_.{name}``, as the class describes it."
-    )
-
-
 def _of_findings(method: Callable[Concatenate[StudyFindings, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
     """A method of a study that its last run's findings answer, with their docstring and signature."""
 
     @wraps(method)
     def answer(study: Any, *args: P.args, **options: P.kwargs) -> Answer:
-        return method(study._found(), *args, **options)
+        return method(study._found, *args, **options)
 
     return answer
 
@@ -243,20 +235,20 @@ class DetectabilityStudy(BaseEstimator):
         self.random_state = random_state
         self.verbose = verbose
 
-    results_ = _found_attribute("table")
-    detectors_ = _found_attribute("detectors")
-    thresholds_ = _found_attribute("thresholds")
-    indices_ = _found_attribute("indices")
-    decisions_ = _found_attribute("decisions")
-    transitions_ = _found_attribute("transitions")
-    calibration_ = _found_attribute("calibration")
-    arrangements_ = _found_attribute("arrangements")
-    uncertainty_ = _found_attribute("uncertainty")
-    replicates_ = _found_attribute("replicates")
-    scenarios_ = _found_attribute("scenarios")
-    errors_ = _found_attribute("errors")
-    confidence_ = _found_attribute("confidence")
-    warnings_ = _found_attribute("warnings")
+    results_ = held("_found.table")
+    detectors_ = held("_found.detectors")
+    thresholds_ = held("_found.thresholds")
+    indices_ = held("_found.indices")
+    decisions_ = held("_found.decisions")
+    transitions_ = held("_found.transitions")
+    calibration_ = held("_found.calibration")
+    arrangements_ = held("_found.arrangements")
+    uncertainty_ = held("_found.uncertainty")
+    replicates_ = held("_found.replicates")
+    scenarios_ = held("_found.scenarios")
+    errors_ = held("_found.errors")
+    confidence_ = held("_found.confidence")
+    warnings_ = held("_found.warnings")
 
     pod_curve = _of_findings(StudyFindings.pod_curve)
     minimum_detectable_damage = _of_findings(StudyFindings.minimum_detectable_damage)
@@ -391,6 +383,7 @@ class DetectabilityStudy(BaseEstimator):
             return MOST_REPEATS
         return positive_integer(self.n_repeats, "n_repeats")
 
+    @property
     def _found(self) -> StudyFindings:
         if not hasattr(self, "findings_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")

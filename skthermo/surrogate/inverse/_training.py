@@ -44,7 +44,6 @@ class InverseColumns:
         return cls(inverse.model, ShapeInputs.of(inverse.model, inverse.dofs, inverse.shape_noise), inverse.n_jobs)
 
     def names(self) -> list[str]:
-        """Names of the columns."""
         modes = [f"f{i + 1}" for i in range(self.model.n_modes)]
         dofs = () if self.shapes is None else self.shapes.dofs
         return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
