@@ -166,21 +166,19 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
     With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
     """
-    return _as_numbers(partial(_validated, estimator), X, "X", options)
+    check = _validate_floats if is_frame_of_floats(X) else sklearn.utils.validation.validate_data
+    return _as_numbers(partial(check, estimator), X, "X", options)
+
+
+def _validate_floats(estimator: BaseEstimator, X: pd.DataFrame, *, reset: bool = True, **options: Any) -> Any:
+    """scikit-learn's `validate_data` of a frame of floats, whose values it checks sooner as an array."""
+    sklearn.utils.validation.validate_data(estimator, X, reset=reset, skip_check_array=True)
+    return sklearn.utils.check_array(X.to_numpy(), input_name="X", estimator=estimator, **options)
 
 
 def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
     """scikit-learn's `check_array` of numbers, of which some may be missing: masked ones become NaN."""
     return _as_numbers(sklearn.utils.check_array, values, input_name, options)
-
-
-def _validated(estimator: BaseEstimator, X: Any, *, reset: bool = True, **options: Any) -> Any:
-    """As scikit-learn's `validate_data`, which takes several times as long to see that a frame holds floats."""
-    validate = partial(sklearn.utils.validation.validate_data, estimator, X, reset=reset)
-    if not is_frame_of_floats(X):
-        return validate(**options)
-    validate(skip_check_array=True)
-    return sklearn.utils.check_array(X.to_numpy(), **options)
 
 
 def _as_numbers(check: Callable[..., Any], values: Any, what: str, options: dict[str, Any]) -> Any:
