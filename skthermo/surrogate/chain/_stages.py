@@ -545,7 +545,8 @@ class StructureInWeather:
 
 def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
-    return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
+    frequencies = simulator.frequencies(possible(theta)[0], n_jobs, warn=False, n_rows=len(theta))
+    return as_floats(aligner.inverse_transform(frequencies))
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
