@@ -17,8 +17,6 @@ from skthermo._validation import _num_samples
 from skthermo.exceptions import RecordsWarning
 
 Table: TypeAlias = Array | pd.DataFrame
-PREFIXES = {"temperature": "T", "frequency": "f"}
-ABSOLUTE_ZERO = -273.15  # degrees Celsius
 IMPLAUSIBLE = 20  # robust standard deviations from the median
 MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
 YEAR, DAY = pd.Timedelta(days=365.25), pd.Timedelta(days=1)
@@ -53,7 +51,7 @@ def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
     """Positions of each sensor's columns: its own, and its lags and means where `LagFeatures` and
     `ExponentialMeans` made columns of them."""
     columns: dict[Hashable, list[int]] = {}
-    for position, name in enumerate(column_names(T, PREFIXES["temperature"])):
+    for position, name in enumerate(column_names(T, "T")):
         sensor = re.sub(r"_(lag\d+|mean\d+[A-Za-z]*)$", "", name) if isinstance(name, str) else name
         columns.setdefault(sensor, []).append(position)
     return columns
@@ -107,41 +105,6 @@ def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None
             "other column to predict them from"
         )
     return np.array(positions, dtype=np.intp)
-
-
-def check_columns(X: ArrayLike, what: str) -> None:
-    """Raise an error for columns without a value."""
-    for name, column in zip(column_names(X, PREFIXES[what]), as_floats(X).T, strict=True):
-        if np.isnan(column).all():
-            raise ValueError(f"{what} column {name!r} is NaN in all {len(column)} rows; expected values")
-
-
-def check_temperatures(T: ArrayLike) -> None:
-    """Raise an error for temperatures in kelvin, and for numbers that stand for a missing value: below absolute zero,
-    or above 100 or below -80 and more than 100 from the rest of their column."""
-    for name, column in zip(column_names(T, PREFIXES["temperature"]), as_floats(T).T, strict=True):
-        if np.fmin.reduce(column) >= -80 and np.fmax.reduce(column) <= 100:
-            continue  # nothing to sort for
-        values, counts = np.unique(column[np.isfinite(column)], return_counts=True)
-        if not values.size:
-            continue
-        gap = np.diff(values) > 100
-        above = np.logical_or.accumulate(gap & (values[1:] > 100))
-        below = np.logical_or.accumulate((gap & (values[:-1] < -80))[::-1])[::-1]
-        marker = (values < ABSOLUTE_ZERO) | np.append(False, above) | np.append(below, False)
-        if (values > 150).all():
-            raise ValueError(
-                f"temperature column {name!r} lies between {values[0]:g} and {values[-1]:g}, all above 150: kelvin? "
-                "expected degrees Celsius"
-            )
-        if marker.any():
-            marks = values[marker]
-            others = "" if len(marks) == 1 else f" to {marks[-1]:g}"
-            kelvin = " (kelvin?)" if marks[0] >= -80 - ABSOLUTE_ZERO and marks[-1] <= 100 - ABSOLUTE_ZERO else ""
-            raise ValueError(
-                f"temperature column {name!r} is {marks[0]:g}{others} in {counts[marker].sum()} of {len(column)} rows"
-                f"{kelvin}; expected degrees Celsius, and NaN where a value is missing"
-            )
 
 
 def warn_of_markers(X: ArrayLike) -> None:
@@ -277,6 +240,20 @@ def check_duration(value: Any, name: str) -> pd.Timedelta:
     if not duration >= pd.Timedelta(0):
         raise ValueError(f"{name} is {value!r}; expected a duration of zero or more, such as '7D'")
     return duration
+
+
+def usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
+    """Median time between records in order of time; zero for one record alone."""
+    steps = np.diff(stamps.as_unit("ns").asi8)
+    return pd.Timedelta(np.median(steps) if len(steps) else 0, "ns")
+
+
+def as_index(times: ArrayLike, zone: Any) -> pd.DatetimeIndex:
+    """Times in nanoseconds as stamps in a time zone, if there is one; missing for None."""
+    missing = np.datetime64("NaT", "ns").astype(np.int64)
+    numbers = np.array([missing if time is None else time for time in times], dtype=np.int64)
+    stamps = pd.DatetimeIndex(numbers.view("M8[ns]"))
+    return stamps.tz_localize("UTC").tz_convert(zone) if zone else stamps
 
 
 def has_stamps(T: Any) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -273,7 +273,6 @@ def relative_error(name: str, of_stiffness: float) -> float:
 
 
 def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:
-    """Times of the records."""
     days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
     if HOURS_A_DAY % samples_per_day:
         raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
@@ -288,13 +287,12 @@ def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.D
 
 
 def check_share(value: float, what: str) -> float:
-    """A share of records."""
     if not is_real(value) or not 0 <= value <= MOST:
         raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")
     return float(value)
 
 
-class BridgeFleet(Mapping[str, FleetBridge]):
+class BridgeFleet(dict[str, FleetBridge]):
     """The bridges of `make_fleet` by name.
 
     Parameters
@@ -319,16 +317,7 @@ class BridgeFleet(Mapping[str, FleetBridge]):
     """
 
     def __init__(self, bridges: Sequence[FleetBridge]):
-        self._bridges = {bridge.name: bridge for bridge in bridges}
-
-    def __getitem__(self, name: str) -> FleetBridge:
-        return self._bridges[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._bridges)
-
-    def __len__(self) -> int:
-        return len(self._bridges)
+        super().__init__({bridge.name: bridge for bridge in bridges})
 
     def __repr__(self) -> str:
         kinds = pd.Series([bridge.kind for bridge in self.values()]).value_counts(sort=False)
@@ -381,22 +370,11 @@ def make_fleet(
 
     Notes
     -----
-    Kinds, with five modes, mostly between 1 and 30 Hz:
-
-    - truss: the 28-bar truss scaled to spans of 26 to 58 m, with a floor and pavement on its bottom chord; parameters
-      ``deck``, ``top``, ``diagonals`` and ``bearings``;
-    - girder: continuous over two or three spans of at most 20 to 45 m, of concrete or composite, in bending and
-      torsion, its piers on soil; parameters ``deck``, ``torsion``, ``bearings`` and ``soil``;
-    - arch: a tied arch of 50 to 120 m in its plane, with a steel or composite deck; parameters ``deck``, ``arch``,
-      ``hangers`` and ``bearings``.
-
-    The user's model has a coarser mesh (but for the truss), stiffnesses that are 2 to 5 % off, masses that are 1 % off,
-    and parameters that cut across the thermal zones of the truth.
-
-    Climates lie between 43 and 60 degrees of latitude, maritime to continental. Parts follow the air with thermal
-    inertia (steel 2 h, concrete 15 h, soil four days) and are warmed by the sun. The logarithm of the stiffness of a
-    part changes in proportion to its temperature, and rises below a knee near 0 C, up to a limit, where water freezes
-    or elastomers stiffen. The coefficients scatter by 10 to 30 % about those of the material, the knee by 0.5 C.
+    Kinds, with five modes, mostly between 1 and 30 Hz, and their parameters: trusses (``deck``, ``top``, ``diagonals``,
+    ``bearings``), girders over two or three spans (``deck``, ``torsion``, ``bearings``, ``soil``) and tied arches
+    (``deck``, ``arch``, ``hangers``, ``bearings``). The user's model has a coarser mesh (but for the truss),
+    stiffnesses that are 2 to 5 % off, masses that are 1 % off, and parameters that cut across the thermal zones of the
+    truth. :ref:`bridges-of-a-fleet` describes spans, climates and thermal laws.
 
     Examples
     --------

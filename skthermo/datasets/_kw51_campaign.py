@@ -345,8 +345,8 @@ def make_kw51_campaign(
 ) -> KW51Campaign:
     """Synthetic monitoring of the railway bridge KW51: hourly temperatures and modes, through its retrofit.
 
-    The measurements may not be part of this package. This campaign has their length and gaps and, as far as these are
-    known, their correlations with temperature and shifts by the retrofit, and its truth is known.
+    The measurements [ML21]_ may not be part of this package. This campaign has their length and gaps and, as far as
+    these are known, their correlations with temperature and shifts by the retrofit, and its truth is known.
 
     Parameters
     ----------
@@ -418,49 +418,11 @@ def make_kw51_campaign(
 
     Notes
     -----
-    The bridge is the updated model of `make_kw51` with bearings added: springs against sliding at the two movable
-    ones (10 MN/m) and against rocking at all four (30 MN m/rad). Weather moves ten multipliers:
-
-    =========  ====================================  ============================================================
-    parameter  what it multiplies                    how it depends on the weather
-    =========  ====================================  ============================================================
-    E_gir      girders, transverse beams,            -0.036 %/K with tBD31A
-               stiffeners
-    E_pla      plate                                 -0.036 %/K with tBD31A averaged over the last day
-    E_arc      arches                                -0.036 %/K with a temperature in the sun, whose daily cycle
-                                                     is 1.4 times as wide and two hours earlier
-    E_br       braces                                as the arches
-    E_con      connections                           -0.08 %/K with the temperature in the sun
-    E_pip      pipes                                 as the arches
-    E_b        ballast                               -0.15 %/K with the average; up to +50 % in frost
-    I_33g      vertical bending of the girders       -0.15 %/K with the average; up to +100 % in frost
-    K_bea      bearings                              -1.2 %/K with tBD31A
-    M_b        mass of the ballast                   moisture: standard deviation 0.18 %, memory of some days
-    =========  ====================================  ============================================================
-
-    Averages over the last day have exponentially decreasing weights. Frost is such an average of the degrees below
-    1.5 C; its effect saturates, with a scale of 2 K. All multipliers are 1 at 10 C without frost and with moisture at
-    its mean. A model with the five thermal parameters of `make_kw51` as functions of tBD31A can come close to this
-    bridge, but cannot be exact. The temperature is the sum of a seasonal cycle, random anomalies of limited size that
-    fade within days, and a daily cycle that is wider in summer and under a clear sky; its scatter before the retrofit
-    and the coldest hour of the first January (about -3 C) are held near their measured values.
-
-    Weather, noise, thermal laws, coverage and the retrofit were tuned to what is published of the measurements.
-    ``python tests/benchmarks/kw51_campaign.py`` prints both side by side: over ten seeds, correlations with temperature
-    differ by at most 0.09, coverage by 0.04 and shifts by the retrofit by 0.12 %. What was not measured is assumed: the
-    noise of mode 1 (0.3 %) and its coverage, damping ratios, when the work of the retrofit was done, and that modes 1,
-    2 and 4, in which wind moves the arches sideways, are often missing together.
-
-    The retrofit stiffens the connections of the braces by 90.6 % at the arches and by 43 % at the deck, and adds 353
-    kg to each joint of a brace and a connection at the arches and 837 kg to each at the deck. These four numbers were
-    fitted to five shifts; other changes of the structure may explain them as well.
-
-    References
-    ----------
-    Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001 [ML21]_.
-
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
+    The bridge is the updated model of `make_kw51` with bearings added. :ref:`campaign-of-kw51` says how weather moves
+    its ten multipliers, what the retrofit changes, and what is known or assumed of the measurements; over ten seeds,
+    correlations with temperature differ from theirs by at most 0.09 (``python tests/benchmarks/kw51_campaign.py``). A
+    model with the five thermal parameters of `make_kw51` as functions of tBD31A can come close to this bridge, but
+    cannot be exact.
 
     Examples
     --------

@@ -36,8 +36,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     """Read the monitoring of the railway bridge KW51 before, during and after its retrofit.
 
     KW51 in Leuven is a steel bowstring bridge of 115 m. KU Leuven tracked its modes every hour from October 2018 to
-    January 2020; in between, the connections of its diagonals were strengthened. The data are not part of this
-    package; they are published at doi:10.5281/zenodo.3745914 for non-commercial use (CC BY-NC-SA 4.0).
+    January 2020 [ML21]_; in between, the connections of its diagonals were strengthened. The data are not part of this
+    package; they are published [ML20]_ at doi:10.5281/zenodo.3745914 for non-commercial use (CC BY-NC-SA 4.0).
 
     Parameters
     ----------
@@ -89,14 +89,6 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     See Also
     --------
     make_kw51 : An FE model of this bridge.
-
-    References
-    ----------
-    Maes & Lombaert, Monitoring railway bridge KW51 before, during, and after retrofitting, Journal of Bridge
-    Engineering 26 (3) (2021) 04721001 [ML21]_.
-
-    Maes & Lombaert, Monitoring data for railway bridge KW51 in Leuven, Belgium, before, during, and after retrofitting,
-    Zenodo, 2020 [ML20]_.
 
     Examples
     --------
@@ -169,7 +161,6 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
 
 
 def _numbers_of(value: object, what: str, *, complex_too: bool = False) -> NDArray:
-    """An array of numbers."""
     if not isinstance(value, np.ndarray):
         raise ValueError(f"{what} is text, a cell array, a struct or sparse; expected a full array of numbers")
     if np.iscomplexobj(value) and not complex_too:

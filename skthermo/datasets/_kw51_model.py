@@ -132,7 +132,6 @@ def kw51_structure() -> Structure:
 
 
 def place(node: Node) -> np.ndarray:
-    """Coordinates of a node."""
     if node[0] == "joint":
         _, foot, head, line, end = node
         start, other = place(("deck", foot, line)), place(on_arch(head, line))
@@ -150,7 +149,6 @@ def on_arch(station: float, line: int) -> Node:
 
 
 def along_deck(line: int) -> list[Node]:
-    """Nodes of one line of the deck."""
     return [("deck", station, line) for station in STATIONS]
 
 
@@ -211,8 +209,8 @@ def make_kw51(
 ) -> AffineModel:
     """FE model of the railway bridge KW51 in Leuven before its retrofit, as drawn or updated.
 
-    A steel tied arch of 115 m with an orthotropic deck, as Kamali et al. (2026), Appendix A,
-    describe it: a space frame with 1760 degrees of freedom.
+    A steel tied arch of 115 m with an orthotropic deck, as [KCM26]_, Appendix A, describes it: a space frame with 1760
+    degrees of freedom.
 
     Parameters
     ----------
@@ -247,49 +245,12 @@ def make_kw51(
     Moduli E_bot (girders, transverse beams, stiffeners, plate), E_arc, E_br, E_con, E_pip and E_b (ballast) multiply
     the whole stiffness of their members. Areas A_c (connections), A_p (pipes), A_d (braces), A_a (arch) and A_tb
     (transverse beams) multiply stiffness, not mass; so do second moments of vertical bending, I_33p, I_33a and I_33g
-    (girders), and of lateral bending, I_22p, I_22a, I_22g and I_22s (stiffeners), and the torsion constant J_a.
-    M_a and M_g multiply the masses of arch and girders.
+    (girders), and of lateral bending, I_22p, I_22a, I_22g and I_22s (stiffeners), and the torsion constant J_a. M_a and
+    M_g multiply the masses of arch and girders.
 
-    Table A.1 gives the sections, the appendix the span, width, plate, ballast and moduli. Values that they do not give
-    are assumed here, before any updating:
-
-    ===================  ===========================================================================================
-    transverse beams     33, in 32 equal bays, as the monitoring numbers them; the first and the last 1.4 times as
-                         stiff, because of the mesh
-    arches               parabolas 12.4 m apart, upright, between the supports; rise 18 m (L/6.4 is usual)
-    braces               16 a side, in V-pairs from stations 2, 6, .., 30 to the arch 2 bays to either side (the
-                         outermost: 1 bay), as hangers usual in tied arches
-    connections          1.6 m at both ends of a brace, in line with it, upright: sensitivities to E_con and E_br
-                         then compare as in Table A.3
-    pipes                at x/L = 0.25, 0.385 and mirrored: f1, f2 and f4 together
-    mesh of the deck     4 panels across a bay, all members at one level: f3 is within 0.2 % of 8 panels
-    stiffeners           every 0.5 m, gathered along the lines of the mesh by width
-    materials            nu = 0.3; steel 7850 kg/m3; ballast 1500 kg/m3 over the whole width
-    mass                 lumped, translations only: default of the program that the paper used
-    supports 1 and 3     opposite ends of one side; elsewhere the order of modes is another
-    ===================  ===========================================================================================
-
-    Rise, braces, connections, pipes and supports are round numbers chosen with the paper's un-updated frequencies in
-    view, 0.4735 to 2.7810 Hz, which are met to 2 %; nothing was optimised. Beams have no shear deformation.
-
-    The updated model has eleven multipliers (``UPDATED`` in the source) fitted to six measured frequencies, modes
-    followed by shape, moduli within 10 % (E_bot within 30 %) and all else within 50 %, by ``python
-    examples/plot_kw51_updating.py`` ("followed, E_bot 30 %"). Six lie at their bounds, because six frequencies cannot
-    determine eleven multipliers:
-
-    =======================  ======  ======  ======  ======  ======  ======
-    frequency (Hz)               f1      f2      f3      f4      f5      f6
-    =======================  ======  ======  ======  ======  ======  ======
-    measured                  0.510   1.240   1.890   2.450   2.580   2.920
-    not updated               0.477   1.113   1.694   2.351   2.535   2.824
-    updated                   0.507   1.211   1.888   2.515   2.581   2.920
-    =======================  ======  ======  ======  ======  ======  ======
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
-
-    Maes & Lombaert, Journal of Bridge Engineering 26 (3) (2021) 04721001 [ML21]_.
+    :ref:`structure-of-kw51` lists the values that the paper gives, those that are assumed, and the frequencies of the
+    updated model, whose eleven multipliers ``python examples/plot_kw51_updating.py`` fits to six measured frequencies
+    [ML21]_.
 
     Examples
     --------
@@ -336,11 +297,9 @@ def kw51_sensors() -> dict[str, int]:
 
     Notes
     -----
-    The positions are read from the labels: the number of the transverse beam (1 to 33, 17 at mid-span), the side A or
-    C, and the direction. Assumed are the stations on the arch (10, 16 and 22, above the deck's sensors), side A as line
-    0 (y = -6.2 m), and positive signs along the model's axes. Check these assumptions by the MAC of measured and
-    computed shapes (`~skthermo.fem.match_modes`). For `load_kw51`, ``[kw51_sensors()[name] for name in data.sensors]``
-    are the degrees of freedom of the last axis of ``shapes``.
+    The positions are read from the labels, and partly assumed (:ref:`structure-of-kw51`): check them by the MAC of
+    measured and computed shapes (`~skthermo.fem.match_modes`). For `load_kw51`, ``[kw51_sensors()[name] for name in
+    data.sensors]`` are the degrees of freedom of the last axis of ``shapes``.
 
     Examples
     --------

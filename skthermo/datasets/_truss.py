@@ -46,13 +46,9 @@ def make_truss(n_modes: int = 6) -> AffineModel:
 
     Notes
     -----
-    The paper gives the members' groups and the material; its dimensions are given in a figure only. This
+    The paper [KCM26]_ gives the members' groups and the material; its dimensions are given in a figure only. This
     geometry is a reconstruction found by fitting the published Table 3. Three members belong
     to no group: 11 and 12, which carry the apex, and 28, the last end post.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------
@@ -96,7 +92,7 @@ def truth_model() -> AffineModel:
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
-    """Multiplier of Young's modulus at a temperature, equation (10).
+    """Multiplier of Young's modulus at a temperature, equation (10) [KCM26]_, a law of [SCG16]_.
 
     E(T) / E_0 = 1 - (T - 20) / 200 * exp(-0.01 T).
 
@@ -114,12 +110,6 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     ------
     ValueError
         If temperatures are not numbers, or all above 150 C, as kelvin are.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
-
-    Seif et al., Temperature-dependent material modeling for structural steels, NIST, 2016 [SCG16]_: source of the law.
 
     Examples
     --------
@@ -273,7 +263,6 @@ def stiffness_factors(
 
 
 def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[str]) -> Mapping[str, float]:
-    """The values, checked."""
     values = {} if values is None else values
     if not isinstance(values, Mapping) or not set(values) <= set(groups):
         raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
@@ -284,7 +273,6 @@ def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[
 
 
 def _onset(index: pd.DatetimeIndex, damage_from: Stamp) -> pd.Timestamp:
-    """When the damage begins."""
     if damage_from is None:
         return index[0]
     try:

@@ -48,7 +48,7 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     """Read the monitoring of the Z24 highway bridge, with its progressive damage.
 
     Z24 in Switzerland was a post-tensioned concrete box girder of 14 + 30 + 14 m, monitored for a
-    year, damaged step by step in its last month, and demolished in 1998 (KU Leuven). The data are not
+    year, damaged step by step in its last month, and demolished in 1998 (KU Leuven) [PD01]_. The data are not
     part of this package: their use is non-commercial.
 
     Parameters
@@ -84,11 +84,6 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     The time stamp is ``record``, in hours, added to 1997-11-11 00:00, the day on which monitoring began; the
     hour of the first record is not documented, so that times of day are nominal. Without ``idx``, rows of a MATLAB file
     are taken as consecutive hours.
-
-    References
-    ----------
-    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
 
     Examples
     --------
@@ -234,39 +229,10 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
 
     Notes
     -----
-    Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0. The model assumes:
-
-    =====================  =========================================================================================
-    spans                  14, 30 and 14 m [PD01]_; straight, without the bridge's skew, same at both ends
-    pier height            5.5 m from the girder's axis to the footing; assumed
-    element length         at most 1 m; halving it moves no frequency by 0.1 %
-    E and G                37.5 and 16 GPa: concrete, where FE models of this bridge begin [TD04]_
-    density                2700 kg/m3 (girder, with its pavement) and 2500 kg/m3 (piers)
-    girder A, I_zz         4.4 m2 and 17 m4: box girder with a deck slab 8.6 m wide, constant along the bridge; assumed
-    girder I_yy, J         0.609 and 1.27 m4: vertical bending and torsion, fitted, start 0.6 and 1.25
-    pier A, I_yy, I_zz, J  2.4 m2; 0.072, 3.2 and 0.26 m4: a wall, 0.6 m along and 4 m across the bridge; assumed
-    soil x, y, z           1.5, 2 and 3 GN/m: order of a footing on gravel
-    soil rx, ry, rz        9.95 (rocking across the bridge: fitted, start 10), 5 and 5 GN m/rad
-    abutment x, y          3 GN/m: earth behind it; half of that in x brings a longitudinal mode below f4
-    abutment z             0.539 GN/m: fitted, start 0.5
-    abutment rx            3 GN m/rad: z spread over the 8.6 m, 8.6**2 / 12 times as much; ry, rz free
-    =====================  =========================================================================================
-
-    ``tools/fit_z24_constants.py`` found the four fitted constants by `~skthermo.updating.ModelUpdater`, with a
-    weak prior centred on the start values, from the mean frequencies of the healthy records in which all seven
-    sensors are above 5 C, so that nothing is frozen.
-
-    Torsion (f4) has vertical modes close below and above it, so that modes change their order in most of the box of
-    +-30 %; columns therefore follow shapes. Only the abutments affect f1 and f3 differently, and weakly: the smallest
-    singular value of d ln f / d ln theta is 0.06, a tenth of the largest.
-
-    References
-    ----------
-    Peeters & De Roeck, One-year monitoring of the Z24-Bridge: environmental effects versus damage events,
-    Earthquake Engineering and Structural Dynamics 30 (2001) 149-171 [PD01]_.
-
-    Teughels & De Roeck, Structural damage identification of the highway bridge Z24 by FE model updating, Journal of
-    Sound and Vibration 278 (2004) 589-610 [TD04]_.
+    Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0.
+    :ref:`structure-of-z24` lists dimensions [PD01]_ and constants [TD04]_, four of which ``tools/fit_z24_constants.py``
+    found from the healthy records above 5 C. Torsion (f4) has vertical modes close below and above it, so that modes
+    change their order in most of the box of +-30 %; columns therefore follow shapes.
 
     Examples
     --------

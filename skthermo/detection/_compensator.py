@@ -25,7 +25,6 @@ from skthermo._estimators.warnings import (
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import (
     check_positions_are_names,
-    check_temperatures,
     column_names,
     frame_like,
     has_stamps,
@@ -60,6 +59,7 @@ from skthermo.residuals.weather import (
     TrainingRange,
     filled_text,
     unpredicted_text,
+    warn_of_implausible,
     warn_of_unseen_weather,
 )
 
@@ -121,63 +121,18 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     Notes
     -----
-    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design. A regressor partly learns the noise of the rows
-    it was fitted on: their residuals are smaller than those of new records, and a threshold set on them gives too many
-    false alarms. `fit_transform` predicts each row by a clone fitted on the other folds, and also fits on all rows for
-    the records to come. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``.
+    ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
+    fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
+    records. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``. Rows should be
+    in order of time.
 
-    Rows should be in order of time: with random folds, a row would be predicted by its neighbours in time, which are
-    nearly the same record. Blocks are as short as needed for each fold to see all seasons, and long beside the memory
-    of the residuals. Contiguous folds of a single year predict each season from the others; residuals and the threshold
-    are then too large, and hide damage. A warning says so where 10 % of a fold's records lie outside the weather of the
-    others.
+    A missing temperature is filled from the other sensors of its row. A missing target makes only its own residual NaN.
+    A row with a value that is still missing, such as a lag that finds no record, is used if the estimator accepts NaN;
+    otherwise it does not train, and its residuals are NaN.
 
-    Whitening multiplies residuals r - m by the symmetric root of the inverse of a covariance S, m being their mean:
-    each stays close to its own mode. "auto" and "local" take S from the records whose weather is most similar (in the
-    principal components of the standardised temperatures), drawn towards the covariance of all records by pseudo-rows.
-    Of seven pairs of their numbers, and one covariance for all weather, that is taken under which baseline records are
-    likeliest given the others, records of the same day (at least 24 rows around each) left out, as they are where the
-    baseline itself is whitened. At most 5000 baseline records, evenly spaced in time, teach the covariances. A new
-    record takes S from the baseline record with the most similar weather; where a value is missing that no sensor
-    tells, from all records. With "auto", a record that is farther from its neighbours in weather than 98 % of the
-    baseline's are from theirs, or outside the baseline's range, takes a covariance that is no smaller than S and than
-    that of all records: wholly at twice that distance, or a quarter of the range outside, before in proportion.
-
-    In weather that is colder or warmer than the baseline's, predictions err by an amount that the baseline's own
-    residuals do not show. "auto" therefore fits the estimator two more times, without the coldest and without the
-    warmest fifth of the records, and compares the residuals of these with the others'. Where the column that
-    is farthest outside is e ranges below or above the baseline's, g log(1 + e^2) times the covariance of all records is
-    added, with the g that this end has shown. An assumed value of 9 has the weight of some records in it. What no fifth
-    of the baseline shows remains unknown, as the slope above freezing after a winter: `extrapolated` marks such rows.
-
-    An estimator that states how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
-    n_targets, n_targets) in Hz squared, such as `~skthermo.fleet.FleetMapper` or a ``DataInformedFEM`` with one, has
-    residuals r with the covariance S + C: S, which the baseline's out-of-fold residuals teach once what C explains of
-    them is taken away, is the scatter of the measurement, and C that of each row, diagonal where each target has a
-    clone of its own. Whitened residuals are divided by the root of S + C; residuals in Hz are shrunk towards their mean
-    by the root of S over that of S + C, so that a detector behind keeps its rate of false alarms. Nothing is then added
-    for temperatures beyond the baseline's. What is not known yet of a structure stays the same for a season: alarms
-    that it causes come in runs, and damage that is smaller than C cannot be seen there. Weather that a fleet has seen
-    (``reach_`` and ``from_fleet`` of the estimator) counts as known.
-
-    Missing values:
-
-    - A missing temperature is filled by a linear regression on the other sensors of its row, learned in `fit`, whatever
-      the estimator would do with NaN; one warning counts what was filled. What that costs, the change of the prediction
-      when what was filled moves by one standard deviation, in quadrature over the sensors, is added to C. Records whose
-      prediction hangs on a filled value do not teach the spread, unless they are the half of all. Only a row without
-      any temperature has NaN.
-    - In a pipeline, the first transformers that accept NaN (scikit-learn's tag ``allow_nan``) are fitted to all rows,
-      so that lags are the true ones whatever the folds. What follows is fitted to the rows that they give to the rest.
-    - A missing target makes only its own residual NaN. Where targets are missing, each of them gets a clone of the
-      estimator of its own, fitted on the rows that have it. Only an estimator with an FE model (``DataInformedFEM``,
-      also at the end of a pipeline or in a search) gets all rows; it leaves out incomplete ones after its lags.
-    - A row with a value that is still missing, such as a lag that finds no record, is used if the estimator accepts
-      NaN. Otherwise the row does not train, and its residuals are NaN. To evaluate the records of a day with lags of 24
-      hours, give `transform` the records of the day before as well.
-    - Lags elsewhere, such as in the mapper of a ``DataInformedFEM``, see the rows of their folds only. On a
-      ``DatetimeIndex`` they go by time: a lag whose record is in another fold takes the last record before it, or NaN
-      if that is older than the tolerance of ``LagFeatures``. Without stamps, folds are then contiguous, with a warning.
+    An estimator may state how uncertain its predictions are by a method ``predict_covariance(X)``, (n_samples,
+    n_targets, n_targets) in Hz squared; residuals then count less by that uncertainty. :doc:`/guide/detectors_theory`
+    says this, the whitening, the folds and what is added outside the baseline's weather in full.
 
     Examples
     --------
@@ -409,7 +364,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
         predict = partial(self._predicted, temperatures)
-        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        weather, predicted, errors, unknown = answer_once(self, (temperatures,), 2 * np.size(X), predict)
         return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
 
     def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
@@ -434,13 +389,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Temperatures and frequencies of new records, with a warning of values that are none."""
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
-        names = _check_feature_names_in(self, None)
-        named = pd.DataFrame(values, columns=names, copy=False)
-        warn_of_markers(named[names[self.targets_]])
-        try:
-            check_temperatures(named.drop(columns=names[self.targets_]))
-        except ValueError as error:  # only a warning, as another column may be something else than a temperature
-            warn_user(str(error), RecordsWarning, "implausible-temperatures")
+        is_named = isinstance(X, pd.DataFrame)
+        warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
+        warn_of_implausible(self.training_range_, temperatures)
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:

@@ -35,6 +35,7 @@ from skthermo.residuals.weather import PredictionError, TrainingRange
 
 REPORTED = (
     "filled-temperatures",
+    "implausible-temperatures",
     "not-predicted",
     "outside-training-weather",
     "sensor-disagrees",
@@ -220,7 +221,6 @@ def has_lags_behind(estimator: BaseEstimator) -> bool:
 
 
 def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
-    """A fitted pipeline of its fitted parts."""
     tail = rest.steps if isinstance(rest, Pipeline) else [(pipeline.steps[-1][0], rest)]
     return Pipeline([*head.steps, *tail], memory=pipeline.memory, verbose=pipeline.verbose)
 

@@ -77,34 +77,10 @@ class MahalanobisDetector(DamageDetector):
     `fit` refuses a baseline whose covariance is singular: one with too few rows, a constant mode, or a mode that is a
     combination of others. The units of the modes do not matter, unless ``covariance`` depends on them.
 
-    The correlation time of the baseline is 1 + 2 times the sum of the autocorrelations up to the first that is not
-    clearly above zero, on the mean over the modes, of what the season does not explain: waves of a year and half a year
-    are left out first where the stamps reach over 300 days, or where there are 300 rows without stamps, which count as
-    one year. Records are neighbours in the order of the rows or, on the ``DatetimeIndex`` of a frame, in time. From the
-    mean and the covariance of all records, the sums over a record's neighbours are taken away, in closed form; four
-    fifths of the records stay at least. Where modes are missing, or with a ``covariance`` of your own, it is learned
-    ten times more, each time without a tenth of the blocks of time and without their neighbours; blocks last five
-    correlation times at least. Where the baseline counts as fewer than 50 independent records, a warning says so.
-
-    Neighbours of more than a fifth of the records are not left out: a mean and a covariance of the few others would
-    differ so much between baselines that the threshold would hide damage. The factor is that by which, on the mean over
-    drawn baselines of as many normally distributed records with the same correlation time, the distance that new
-    records exceed at the rate asked for is larger than that which the baseline's own exceed. After 144 records with a
-    correlation of 0.95, 2 % asked and 4 modes, new records raise 6.6 % false alarms, and 89 % of those shifted by five
-    standard deviations are found (by "quantile" 43.9 % and 99 %; ``python tests/benchmarks/short_baselines.py --seeds
-    40``). A warning says so where the threshold is far above the baseline's own distances, with the shift that it still
-    sees.
-
     A record with missing modes gets the distance in those that it has, expressed as the distance in all modes that a
-    normally distributed record exceeds as often, by the approximation of Wilson and Hilferty [WH31]_. Where the
-    baseline shows that rows with as many modes, or with the same modes, exceed the threshold more or less often than
-    others, a factor corrects it, shrunk to 1 as far as chance may explain the difference. Rows without any mode cannot
-    be evaluated: their index is NaN, and ``predict`` gives 0. Rows with gaps under a ``covariance`` of your own keep
-    the distances of the fit.
-
-    The rate of "conformal" is exact for independent records and thresholds that are computed anew with each new one;
-    this one is fixed, and keeps the rate nearly: 2 % asked and 6 modes give 1.9 % false alarms after 100 and after 365
-    independent records, and 2.0 and 2.2 % where neighbours in time have a correlation of 0.9.
+    normally distributed record exceeds as often [WH31]_. Rows without any mode cannot be evaluated: their index is NaN,
+    and ``predict`` gives 0. :doc:`/guide/detectors_theory` says how correlation times, thresholds and such distances
+    are found, and what false alarms they give.
 
     Examples
     --------

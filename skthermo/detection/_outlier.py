@@ -75,18 +75,9 @@ class OutlierDetector(DamageDetector):
     can. Estimators that measure distances, such as ``OneClassSVM``, give high modes more weight, because these vary
     more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
 
-    Correlation time, neighbours and expected rate are those of `MahalanobisDetector`; blocks last five correlation
-    times at least. Raw frequencies remember as long as the weather does. In a baseline of one winter, such blocks leave
-    out whole spells of frost, which nothing else in it resembles, and the threshold hides damage. A ``block`` of a day,
-    of hourly records, supposes that frost which comes will be like frost that was: false alarms are then those asked
-    for as long as the weather is none that the baseline lacks, and what else records remember is over within the day.
-    After 365 records of 6 modes, 2 % asked, ``LocalOutlierFactor``, ``IsolationForest``, ``EllipticEnvelope`` and
-    ``OneClassSVM`` raise 1.8, 1.7, 1.8 and 1.5 % false alarms; where neighbours in time have a correlation of 0.9, 2.1,
-    2.2, 1.6 and 1.1 % (by "quantile" 19.6, 7.3, 7.1 and 12.2 %). Clones are put on the scale of the estimator by their
-    quartiles on the records that both were fitted on.
-
     Rows with a missing mode are left out of the baseline and cannot be evaluated: their damage index is NaN, and
-    ``predict`` gives 0.
+    ``predict`` gives 0. :doc:`/guide/detectors_theory` has the false alarms of several estimators, and when to set
+    ``block``.
 
     Examples
     --------

@@ -71,17 +71,13 @@ class WindowedAlarm(DamageDetector):
 
     Notes
     -----
-    Residuals of neighbouring records are alike, so that the mean of 24 of them scatters more than one fifth of a single
-    one. The standard deviation of a mean therefore includes the mean correlation of two records in one window, mode by
-    mode. The threshold comes from the baseline's own windows, each evaluated by the other periods; the number of
-    independent ones, by the correlation time of the highest (at least half a window), decides which index it is. If
-    there are too few for the rate, it is the largest index, and a warning says so. For days to come, let the
-    compensator predict its baseline forward in time: ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
+    The threshold comes from the baseline's own windows, each evaluated by the other periods
+    (:doc:`/guide/detectors_theory`). For days to come, let the compensator predict its baseline forward in time:
+    ``TemperatureCompensator(..., cv=TimeSeriesSplit(5))``.
 
-    Windows with gaps are evaluated by the records that are there. Under "m-of-n", their index is the one that would be
-    as unlikely in a full window of independent records, by the binomial law. Windows with fewer records with a value
-    than ``fewest_`` are not evaluated: their index is NaN, and ``predict`` gives 0. So it is with the first windows of
-    a series: a call does not remember the records of the last one.
+    Windows with gaps are evaluated by the records that are there. Windows with fewer records with a value than
+    ``fewest_`` are not evaluated: their index is NaN, and ``predict`` gives 0. So it is with the first windows of a
+    series: a call does not remember the records of the last one.
 
     Examples
     --------

@@ -223,7 +223,6 @@ class SparsityPattern:
 
     @property
     def columns(self) -> NDArray[np.int32]:
-        """The column of each entry."""
         return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
 
     @cached_property
@@ -232,7 +231,6 @@ class SparsityPattern:
         return elimination(self.rows, self.pointers)
 
     def matrix(self, data: Array) -> scipy.sparse.csc_array:
-        """The matrix with these entries."""
         return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
 
 

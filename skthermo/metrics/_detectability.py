@@ -86,7 +86,7 @@ def probability_of_detection(damage_index: ArrayLike, threshold: float) -> float
 
 
 def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: float = 0.9) -> float:
-    """Smallest tested severity from which damage is detected reliably (MDD).
+    """Smallest tested severity from which damage is detected reliably (MDD) [KQP24]_.
 
     Parameters
     ----------
@@ -110,11 +110,6 @@ def minimum_detectable_damage(severities: ArrayLike, pod: ArrayLike, level: floa
     ValueError
         If lengths differ, a severity is not finite, is 1 or more or occurs twice, severities are not all positive
         or all negative, or a probability is not between 0 and 1.
-
-    References
-    ----------
-    Kamali, Quqa, Palermo & Marzani, An approach to define the minimum detectable damage and the alarm thresholds in
-    vibration-based SHM systems, Journal of Physics: Conference Series 2647 (2024) 182008 [KQP24]_.
 
     Examples
     --------

@@ -48,7 +48,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
 
 
 def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None) -> pd.DataFrame:
-    """Mean absolute percentage errors by scenario and mode, as in Table 2 of the paper.
+    """Mean absolute percentage errors by scenario and mode, as in Table 2 of [KCM26]_.
 
     Parameters
     ----------
@@ -71,10 +71,6 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
         If the shapes, the indices or the names of the columns differ; if a frequency is infinite, or a measured
         one not positive, or a predicted one stands for a missing value, such as -999; if there is not one
         scenario for each row, or one is called "Average".
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
 
     Examples
     --------

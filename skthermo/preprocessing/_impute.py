@@ -77,15 +77,11 @@ class KNNGapImputer(KNNImputer):
 
     Notes
     -----
-    The results are those of ``KNNImputer``. It computes the distances between all pairs of rows, so its time
-    grows with the square of the number of rows n. Here, rows with the same missing columns are searched
-    together by k-d trees, and the time grows as n log n. ``KNNImputer`` itself does the work for few rows,
-    for very many different patterns of missing columns, for another metric, and for other
-    ``missing_values`` than NaN.
-
-    Results can differ in two cases. Where several rows are equally far away, the two may choose different
-    neighbours. And ``KNNImputer`` computes distances by a formula that loses digits of very small ones,
-    which can change the ninth digit with ``weights="distance"``.
+    The results are those of ``KNNImputer``, whose time grows with the square of the number of rows n. Here, rows with
+    the same missing columns are searched together by k-d trees, and the time grows as n log n. ``KNNImputer`` itself
+    does the work for few rows, for very many different patterns of missing columns, for another metric, and for other
+    ``missing_values`` than NaN. Where several rows are equally far away, the two may choose different neighbours; and
+    with ``weights="distance"`` the ninth digit can differ, because ``KNNImputer`` loses digits of very small distances.
 
     Examples
     --------

@@ -68,19 +68,14 @@ class LagFeatures(PastFeatures):
 
     Notes
     -----
-    On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of
-    `fit` are not used in `transform`: give the rows before new records, too, and leave their results out. An
-    index of periods, or of other objects that are stamps, is taken as a DatetimeIndex, a period as its start.
+    On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of `fit` are not
+    used in `transform`: give the rows before new records, too, and leave their results out.
 
-    On a DatetimeIndex, lag k is the last record at or before t - k freq, or NaN if that record is older
-    than the tolerance. Records of `fit` and of `transform` are searched together; for a stamp in both, the
-    values of `transform` count. Rows may come in any order, which the result keeps.
-
-    A missing value is NaN in every lag that refers to it.
-
-    Lags that reach before the first row of records without a DatetimeIndex that do not begin as those of `fit` do give
-    a warning; so do, on a DatetimeIndex, lags of more than half of the rows that are before the first record given and
-    find none.
+    On a DatetimeIndex, or an index of periods or of other stamps, lag k is the last record at or before t - k freq, or
+    NaN if that record is older than the tolerance. Records of `fit` and of `transform` are searched together; for a
+    stamp in both, the values of `transform` count. Rows may come in any order, which the result keeps. A missing value
+    is NaN in every lag that refers to it. Lags that find no record before the first one give a warning
+    (``no-earlier-records``).
 
     Examples
     --------

@@ -50,7 +50,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     max_shift : float, default=0.15
         Largest relative difference of a pole's frequency from that of its mode.
     min_mac : float, default=0.8
-        Lowest modal assurance criterion (MAC) of a pole's shape and that of its mode.
+        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and that of its mode.
     follow : float, str, timedelta or None, default=None
         Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
         of records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step.
@@ -79,22 +79,13 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
     Notes
     -----
     A pole is a candidate for a mode if both tolerances hold. Candidates are assigned one-to-one in every record, at the
-    lowest sum of ``(1 - MAC) / (1 - min_mac) + |f / f_reference - 1| / max_shift``; a mode without a pole costs 3,
-    more than any candidate, so that no pole which fits stays unused without need. Modes that swap order thus follow
-    their shapes. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is lower
-    is added; with no more sensors than close modes, every shape lies in that space, and they count as distinct.
-    NaN components of a shape, from sensors that failed, are left out of its MAC. Noise of a share e of the root mean
-    square of a shape's components lowers its MAC to about 1 / (1 + e^2), which ``min_mac`` should be well below.
+    lowest sum of ``(1 - MAC) / (1 - min_mac) + |f / f_reference - 1| / max_shift``; a mode without a pole costs 3, more
+    than any candidate. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is
+    lower is added. NaN components of a shape, from sensors that failed, are left out of its MAC.
 
     With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
-    mode that is missing keeps its mean. Means are moved only by poles that have the shape of the reference.
-
-    Records have different numbers of poles, and the result is more than a table. The tracker therefore comes before a
+    mode that is missing keeps its mean. :doc:`/guide/modes` says how to set the tolerances. The tracker comes before a
     pipeline, not into it: its ``frequencies`` are what the other estimators take.
-
-    References
-    ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------

@@ -208,7 +208,6 @@ class ReferenceModes(NamedTuple):
 
 
 def read_reference(reference: Any) -> ReferenceModes:
-    """The reference modes, checked."""
     if isinstance(reference, Mapping):
         missing = [name for name in ("frequencies", "shapes") if name not in reference]
         if missing:
@@ -286,7 +285,6 @@ class Pairs(NamedTuple):
     frequency: Array
 
     def at(self, chosen: NDArray) -> "Pairs":
-        """Some of the pairs."""
         return Pairs(*(values[chosen] for values in self))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._estimators.warnings import explain_rows
 from skthermo._tables.arrays import as_floats, by_mode, is_model, means_of_known, piecewise_linear, real_array
-from skthermo._tables.frames import Table, as_stamps, check_columns, frame_like, row_weights, warn_of_markers
+from skthermo._tables.frames import Table, as_stamps, frame_like, row_weights, warn_of_markers
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -99,6 +99,12 @@ class RecordTransformer(TransformerMixin, Estimator):
         """
         check_is_fitted(self)
         return np.array(self._names(_check_feature_names_in(self, input_features)), dtype=object)
+
+    def _refuse_empty(self, values: NDArray) -> None:
+        empty = np.isnan(values).all(axis=0)
+        if empty.any():
+            name = _check_feature_names_in(self, None)[empty][0]
+            raise ValueError(f"column {name!r} is NaN in all {len(values)} rows; expected values")
 
     @abstractmethod
     def _learn(self, X: Table, values: NDArray) -> None:
@@ -266,10 +272,7 @@ class HingeFeatures(RecordTransformer):
         values = as_floats(values)
         if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
-        empty = np.isnan(values).all(axis=0)
-        if empty.any():
-            name = _check_feature_names_in(self, None)[empty][0]
-            raise ValueError(f"{name!r} is NaN in every row; expected values to place knots at")
+        self._refuse_empty(values)
         shares = np.linspace(0, 1, self.n_knots + 2)[1:-1]
         if weights is None:
             self.knots_ = np.nanquantile(values, shares, axis=0)
@@ -369,7 +372,6 @@ class SensorMeans(RecordTransformer):
         return list(self.columns_)
 
     def _read_roles(self) -> list[str | None]:
-        """Role of each column."""
         names = list(getattr(self, "feature_names_in_", range(self.n_features_in_)))
         if self.roles is None:
             return [EVERYWHERE] * len(names)
@@ -395,7 +397,7 @@ def offsets_between(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class BiasAligner(RecordTransformer):
-    """Move measured frequencies so that their means are the model's frequencies, equation (22).
+    """Move measured frequencies so that their means are the model's frequencies, equation (22) [KCM26]_.
 
     Parameters
     ----------
@@ -417,10 +419,6 @@ class BiasAligner(RecordTransformer):
     feature_names_in_ : ndarray of str
         Names of the modes, where `fit` saw a frame with such names.
 
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519 [KCM26]_.
-
     Examples
     --------
     >>> from skthermo.preprocessing import BiasAligner
@@ -441,7 +439,7 @@ class BiasAligner(RecordTransformer):
         self.method = method
 
     def _learn(self, X: Table, values: NDArray) -> None:
-        check_columns(frame_like(X, values), "frequency")
+        self._refuse_empty(values)
         warn_of_markers(frame_like(X, values))
         self.mean_ = np.nanmean(values, axis=0)
         self.reference_ = self._read_reference(values.shape[1])

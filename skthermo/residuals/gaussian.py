@@ -56,7 +56,8 @@ class Gaussian:
 
     def whiten(self, rows: Array) -> Array:
         """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
-        return whiten_by(self.covariance[np.newaxis], np.zeros(len(rows), dtype=np.intp), rows - self.mean)
+        present, all_alike = ~np.isnan(rows), np.zeros(len(rows), dtype=np.intp)
+        return whitenings_of(self.covariance[np.newaxis], all_alike, present).white(rows - self.mean)
 
     def distances(self, rows: Array) -> Array:
         """Mahalanobis distances in the modes that rows have; NaN where there is none."""
@@ -74,7 +75,8 @@ class Gaussian:
         scale = np.sqrt(np.diag(self.covariance))
         present, correlation = ~np.isnan(rows), self.covariance / np.outer(scale, scale)
         units = present @ np.log(2 * np.pi * scale**2)
-        volumes = units + log_determinants(correlation[np.newaxis], np.zeros(len(rows), dtype=np.intp), present)
+        all_alike = np.zeros(len(rows), dtype=np.intp)
+        volumes = units + whitenings_of(correlation[np.newaxis], all_alike, present).log_determinants
         return -0.5 * (np.nan_to_num(self.distances(rows)) ** 2 + volumes)
 
     def completed(self, rows: Array) -> tuple[Array, Array]:
@@ -103,17 +105,6 @@ class Gaussian:
         fill, rest = _conditionals(self.covariance, masks)
         complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
         return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
-
-
-def whiten_by(covariances: Array, which: NDArray[np.intp], centred: Array) -> Array:
-    """Centred rows in standard deviations and uncorrelated, each by one of several covariances."""
-    present = ~np.isnan(centred)
-    return whitenings_of(covariances, which, present).white(centred)
-
-
-def log_determinants(covariances: Array, which: NDArray[np.intp], present: Mask) -> Array:
-    """Logarithms of the determinants of one of several covariances for each row, in the modes that it has."""
-    return whitenings_of(covariances, which, present).log_determinants
 
 
 @dataclass(frozen=True)

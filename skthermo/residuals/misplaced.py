@@ -76,7 +76,6 @@ class Columns:
         return cls(as_floats(table)[rows], column_names(table, default))
 
     def named(self, chosen: NDArray[np.bool_]) -> list:
-        """Names of some columns."""
         return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
 
     def reach(self, others: Columns) -> NDArray[np.bool_]:

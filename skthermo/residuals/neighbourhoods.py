@@ -39,7 +39,6 @@ class Neighbourhoods:
 
     @cached_property
     def order(self) -> Rows:
-        """The records in order of time."""
         return np.argsort(self.times, kind="stable")
 
     @cached_property

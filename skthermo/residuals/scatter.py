@@ -64,11 +64,6 @@ class Scatter:
         return cls(np.array([covariance, 0 * covariance]), 0.0, np.full(len(deviations), n_records))
 
     @property
-    def n_pseudo(self) -> int:
-        """Weight of the correlations of single records beside those of a part, in independent records."""
-        return PSEUDO_RECORDS
-
-    @property
     def variances(self) -> Array:
         """Variance of single records, (n_modes,)."""
         return np.diag(self.parts.sum(axis=0))

@@ -47,14 +47,12 @@ class RandomisedResiduals:
         return [cls(residuals, row) for row in noise]
 
     def at(self, theta: Array) -> "RandomisedPoint":
-        """Residuals at one theta."""
         point = self.residuals.at(theta)
         weights = np.sqrt(np.repeat(self.residuals.precisions, len(self.residuals.measured.dofs)))
         weights = np.append(np.ones(self.residuals.n_plain), weights)
         return RandomisedPoint(point, weights, weights * point.values - self.noise)
 
     def loss(self, squares: Array) -> Array:
-        """The squares themselves."""
         return np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
 
 

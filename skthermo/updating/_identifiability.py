@@ -39,7 +39,7 @@ def sensitivity(
     method: Literal["exact", "central"] = "exact",
     step: float = 0.01,
 ) -> pd.DataFrame:
-    """Normalised sensitivities of frequencies to parameters, equation (A.1).
+    """Normalised sensitivities of frequencies to parameters, equation (A.1) [KCM26]_.
 
     Parameters
     ----------
@@ -71,10 +71,6 @@ def sensitivity(
     -----
     Eq. (A.2) is S_ij = (f_i(theta_j + h) - f_i(theta_j - h)) / (2 step f_i) with h = step theta_j. Where the model has
     no frequencies on one side, the difference to theta itself takes its place.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
 
     Examples
     --------
@@ -267,14 +263,9 @@ def identifiability(
     Notes
     -----
     With A = (d ln f / d ln theta) / noise, an unbiased estimate of ln theta has at least the covariance
-    (A' A)^-1. A shape of length 1 at n_d degrees of freedom adds its derivative in rows, divided by
-    shape_noise / sqrt(n_d). Parameters are ranked by QR factorisation of A with column pivoting.
-
-    References
-    ----------
-    Kay, Fundamentals of statistical signal processing: estimation theory, Prentice Hall, 1993, chapter 3 [Kay93]_.
-
-    Golub & Van Loan, Matrix computations, 4th ed., Johns Hopkins, 2013, section 5.4.2 [GV13]_.
+    (A' A)^-1 ([Kay93]_, chapter 3). A shape of length 1 at n_d degrees of freedom adds its derivative in rows, divided
+    by shape_noise / sqrt(n_d). Parameters are ranked by QR factorisation of A with column pivoting ([GV13]_, section
+    5.4.2).
 
     Examples
     --------

@@ -38,12 +38,10 @@ class Measured:
 
     @property
     def has_frequency(self) -> NDArray[np.bool_]:
-        """Modes with a measured frequency."""
         return np.isfinite(self.frequencies)
 
     @property
     def has_shape(self) -> NDArray[np.bool_]:
-        """Modes with a measured shape."""
         return _given(self.shapes)
 
     @property
@@ -256,7 +254,6 @@ class Residuals:
         self.n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
     def at(self, theta: Array) -> "Point":
-        """Residuals at one theta."""
         return Point(self, theta, paired_modes(self.model, self.measured, theta))
 
     @property

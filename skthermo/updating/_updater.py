@@ -65,7 +65,8 @@ class ModelUpdater(Estimator):
               + \\sum_p \\Bigl(\\frac{\\theta_p - 1}{\\sigma_p}\\Bigr)^2 ,
 
     with measured frequencies, their weights w = measured frequency / standard deviation (or 1), weights v of shapes,
-    and standard deviations of a prior. The first sum with unit weights is eq. (A.3).
+    and standard deviations of a prior. The first sum with unit weights is eq. (A.3) of
+    [KCM26]_; see [FM95]_, and for large models [MF98]_.
 
     Parameters
     ----------
@@ -126,31 +127,14 @@ class ModelUpdater(Estimator):
 
     Notes
     -----
-    *Pairing.* With shapes, each measured mode is paired one to one with the mode of the model that has the highest MAC
-    with it, among more modes than ``model.n_modes``; where several look the same at the sensors, the MAC with the
-    nominal mode of the same number decides. Without shapes, measured mode j is column j of the model. Columns that are
-    sorted by frequency (``track=False``) allow a false match, of which a warning is given.
+    With shapes, each measured mode is paired one to one with the mode of the model that has the highest MAC with it,
+    among more modes than ``model.n_modes``; where several look the same at the sensors, the MAC with the nominal mode
+    of the same number decides. Without shapes, measured mode j is column j of the model.
 
-    *Weights.* Shapes with noise of s times their root mean square at n degrees of freedom have the weight
-    v = sqrt(2 (n - 1)) / s^2; with weights thousands of times smaller a search takes many evaluations. ``covariance_``
-    holds if ``frequency_std`` and ``shape_weight`` (or 0) describe the noise of the measurement. Without
-    ``frequency_std``, every frequency counts as having noise of 100 %, and ``covariance_`` serves for comparison only.
-    It takes no account of bounds or of errors of the model itself.
-
-    *Method.* The residual of a MAC is quadratic in the error of the shape. Gauss-Newton steps are therefore taken on
-    the vectors phi / (u' phi) - u between shapes phi and measured unit shapes u, whose squared length is
-    1 / MAC - 1, weighted by the slope of the objective. Derivatives are exact, of shapes too; a model without
-    ``jacobian`` gets central differences. Both methods step back from theta at which the model has no modes; a
-    start that ends beside such theta has not converged.
-
-    References
-    ----------
-    Kamali, Ceravolo & Marzani, Mechanical Systems and Signal Processing 256 (2026) 114519, Appendix A [KCM26]_.
-
-    Friswell & Mottershead, Finite element model updating in structural dynamics, Kluwer, 1995 [FM95]_.
-
-    Möller & Friberg, Updating large finite element models in structural dynamics, AIAA Journal 36 (1998)
-    1861-1868 [MF98]_.
+    ``covariance_`` holds if ``frequency_std`` and ``shape_weight`` (or 0) describe the noise of the measurement: shapes
+    with noise of s times their root mean square at n degrees of freedom have the weight v = sqrt(2 (n - 1)) / s^2.
+    Without ``frequency_std`` it serves for comparison only. It takes no account of bounds or of errors of the model
+    itself. :doc:`/guide/updating` explains weights, close modes and the steps that are taken.
 
     Examples
     --------

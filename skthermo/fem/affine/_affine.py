@@ -94,11 +94,9 @@ class AffineModel(AffineBase):
 
     Notes
     -----
-    Up to 200 degrees of freedom eigenproblems are dense and solved in batches. A constant mass is factored once; a
-    mass that depends on theta or is singular, or a wide spectrum, is solved through the flexibility L^-1 M L^-T with K
-    = L L'. Larger problems are sparse and solved one by one by Lanczos iterations on K^-1 M, from a seeded start. All
-    solvers run on as many threads as BLAS may use. Where the stiffness is not positive definite, frequencies are NaN
-    and a warning says at which theta.
+    Up to 200 degrees of freedom eigenproblems are dense and solved in batches; larger ones are sparse and solved one by
+    one by Lanczos iterations, from a seeded start. All solvers run on as many threads as BLAS may use. Where the
+    stiffness is not positive definite, frequencies are NaN and a warning says at which theta.
 
     Examples
     --------

@@ -133,7 +133,6 @@ def drawn(bounds: Array, random: np.random.RandomState, n_points: int) -> tuple[
 
 
 def without(points: Array, others: Array) -> Array:
-    """The points that are not among others."""
     return points[~(points[:, np.newaxis] == others).all(axis=2).any(axis=1)]
 
 
@@ -229,20 +228,11 @@ class ReducedModel(AffineBase):
 
     Notes
     -----
-    The j-th lowest frequency is never below the full model's j-th (Rayleigh-Ritz). The
-    estimate of a relative error is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi
-    of a mode of unit modal mass and the nominal stiffness K_0. Within 30 % of K_0 it was found to be 0.64 to
-    1.3 times the error. Shapes are given at all degrees of freedom. A damaged model is checked anew, and its basis is
-    enlarged if necessary.
-
-    On the basis, the few lowest modes are found by iteration from the nominal ones. A bound certifies that none is
-    missed and that the error of iteration is at most a hundredth of ``tol``; LAPACK solves the rows that it does not
-    certify.
-
-    References
-    ----------
-    Machiels, Maday, Oliveira, Patera & Rovas, Output bounds for reduced-basis approximations of symmetric
-    positive definite eigenvalue problems, C. R. Acad. Sci. Paris I 331 (2000) 153-158 [MMO00]_.
+    The j-th lowest frequency is never below the full model's j-th (Rayleigh-Ritz). The estimate of a relative error
+    [MMO00]_ is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi of a mode of unit modal mass and
+    the nominal stiffness K_0: within 30 % of K_0, 0.64 to 1.3 times the error. Shapes are given at all degrees of
+    freedom. A damaged model is checked anew, and its basis is enlarged if necessary. Iteration on the basis errs by at
+    most a hundredth of ``tol``, which a bound certifies row by row; LAPACK solves the other rows.
 
     Examples
     --------

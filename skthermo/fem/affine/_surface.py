@@ -59,7 +59,6 @@ class PrincipalBox:
         )
 
     def places(self, theta: Array) -> Array:
-        """Coordinates of rows of theta."""
         return (np.log(theta) - self.centre) @ self.directions.T / self.half_widths
 
     def holds(self, theta: Array, places: Array) -> NDArray[np.bool_]:
@@ -163,9 +162,8 @@ class FrequencySurface:
     -----
     The box is that of the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %.
     The difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the
-    box; where that estimate is more than half of the least one at a check point of too large an error, or more than at
-    all check points; and where two modes are within 1 %, or a polynomial of their difference leaves open which is
-    higher.
+    box, where that estimate is more than half of the least one at a check point of too large an error, and where two
+    modes are within 1 %, or a polynomial of their difference leaves open which is higher.
 
     Examples
     --------

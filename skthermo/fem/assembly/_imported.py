@@ -16,14 +16,14 @@ from skthermo.fem.assembly._structure import (
     MASS,
     SAME,
     STIFFNESS,
-    Binding,
+    Assembled,
+    Key,
     Structure,
+    Target,
     check_same,
     read_coordinates,
 )
 from skthermo.fem.elements import ByProperties, PhysicalElement
-
-Contents = Sequence[tuple[Hashable, tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class ImportedMember(PhysicalElement):
 class ImportedStructure(Structure):
     """Nodes, members and groups of a model that another program has assembled, with a term for each member.
 
-    It serves wherever a `Structure` does: `assemble` makes groups of members the parameters, `divide` takes groups
-    apart, `skthermo.studies.locate_damage` finds damaged members, and displays draw them.
+    It serves wherever a `Structure` does: `assemble` makes the whole stiffness of groups of members the parameters,
+    `divide` takes groups apart, `skthermo.studies.locate_damage` finds damaged members, and displays draw them.
 
     Parameters
     ----------
@@ -130,67 +130,29 @@ class ImportedStructure(Structure):
     def n_dof(self) -> int:
         return self._mass.shape[0]
 
-    def assemble(
-        self,
-        parameters: Sequence[str] | Mapping[str, str | Binding],
-        *,
-        groups: Sequence[str] | Mapping[str, str | Binding] | None = None,
-        n_modes: int = 6,
-        track: bool = False,
-    ) -> AffineModel:
-        """The structure as an FE model.
-
-        Parameters
-        ----------
-        parameters : sequence of str, or mapping of str to group
-            What theta multiplies: the whole stiffness of a group.
-        groups : sequence of str, or mapping of str to group, optional
-            What can be damaged. By default all groups of the structure.
-        n_modes : int, default=6
-            Number of modes.
-        track : bool, default=False
-            Whether a column follows its mode rather than its rank.
-
-        Returns
-        -------
-        AffineModel
-            With the parameters and damage groups asked for.
-
-        Raises
-        ------
-        ValueError
-            If a group is unknown, a parameter is to multiply anything but stiffness, or the structure is a mechanism.
-        """
-        bindings = self._read_bindings(parameters, "parameter")
-        damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
-        for name, (what, _, _) in (bindings | damageable).items():
+    def _assembled(self, bindings: Mapping[str, Target], damageable: Mapping[str, Target]) -> Assembled:
+        for name, (what, _, _) in {**bindings, **damageable}.items():
             if what == MASS:
                 raise ValueError(f"{name!r} multiplies mass, which is not known by member; expected groups")
-        members_of: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Hashable]] = {}
+        members_of: dict[tuple[Key, Key], list[Hashable]] = {}
         for member in self._members:
             key, damage = (tuple(self._bound(member, bound, STIFFNESS)) for bound in (bindings, damageable))
             members_of.setdefault((key, damage), []).append(member)
         terms = [(key, self._sum_of(members)) for (key, _), members in members_of.items()]
-        contents: list[Contents] = [[(member, ()) for member in members] for members in members_of.values()]
+        contents: list[list[tuple[Hashable, Key]]] = [[(one, ()) for one in members] for members in members_of.values()]
         if self._rest.nnz:
             terms.append(((), self._rest))
             contents.append([])
-        return AffineModel(
-            terms,
-            self._mass,
-            n_modes=n_modes,
-            parameter_names=tuple(bindings),
-            groups={name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable},
-            track=track,
-            dofs=self.dofs,
-            contents=contents,
-        )
+        scaled = {name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable}
+        return Assembled(terms, self._mass, scaled, contents)
 
     def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
         self._fixed_dofs(supports)
         return self._labels
 
-    def _sum_by_part(self, contents: Contents, part_of: Mapping[Hashable, str], term: Matrix) -> dict[str, Matrix]:
+    def _sum_by_part(
+        self, contents: Sequence[tuple[Hashable, Key]], part_of: Mapping[Hashable, str], term: Matrix
+    ) -> dict[str, Matrix]:
         check_same(self._sum_of([member for member, _ in contents]), term, contents)
         parts: dict[str, list[Hashable]] = {}
         for member, _ in contents:

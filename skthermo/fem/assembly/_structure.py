@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -73,6 +74,16 @@ class TermAssembler:
 
 Binding = tuple[str, str] | tuple[str, str, str]
 Target = tuple[str, str, tuple[str, ...]]
+
+
+class Assembled(NamedTuple):
+    """Terms of stiffness and mass, stiffness terms of each damage group, and members and properties of each."""
+
+    stiffness: list[tuple[Key, Matrix]]
+    mass: list[tuple[Key, Matrix]] | Matrix
+    scaled: dict[str, list[int]]
+    contents: list[list[tuple[Hashable, Key]]]
+
 
 SAME = 1e-9  # relative difference of matrices up to which members are the model's
 
@@ -217,6 +228,19 @@ class Structure:
         """
         bindings = self._read_bindings(parameters, "parameter")
         damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
+        stiffness, mass, scaled, contents = self._assembled(bindings, damageable)
+        return AffineModel(
+            stiffness,
+            mass,
+            n_modes=n_modes,
+            parameter_names=tuple(bindings),
+            groups={name: terms for name, terms in scaled.items() if terms or groups is not None},
+            track=track,
+            dofs=self.dofs,
+            contents=contents,
+        )
+
+    def _assembled(self, bindings: Mapping[str, Target], damageable: Mapping[str, Target]) -> Assembled:
         stiffness, mass = TermAssembler(self.dofs), TermAssembler(self.dofs)
         for name, element in self._members.items():
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
@@ -226,16 +250,8 @@ class Structure:
             stiffness.add(name, matrices, dofs, self._bound(name, bindings, STIFFNESS), damage)
             masses = check_matrices(name, element, element.mass(coordinates), len(dofs), MASS)
             mass.add(name, masses, dofs, self._bound(name, bindings, MASS))
-        return AffineModel(
-            stiffness.terms(),
-            mass.terms(),
-            n_modes=n_modes,
-            parameter_names=tuple(bindings),
-            groups={name: terms for name in damageable if (terms := stiffness.positions(name)) or groups is not None},
-            track=track,
-            dofs=self.dofs,
-            contents=stiffness.contents,
-        )
+        scaled = {name: stiffness.positions(name) for name in damageable}
+        return Assembled(stiffness.terms(), mass.terms(), scaled, stiffness.contents)
 
     def divide(
         self, model: AffineModel | ReducedModel, groups: Mapping[str, Mapping[str, Collection[Hashable]]]

@@ -109,12 +109,8 @@ class Beam(PhysicalElement):
 
     Notes
     -----
-    Where an end is released, stiffness and mass of each of the four actions are condensed separately (Guyan), so that
-    matrices stay affine in the properties. Shear deformation and the rotary inertia of bending are left out.
-
-    References
-    ----------
-    Przemieniecki, Theory of Matrix Structural Analysis, McGraw-Hill, 1968, chapters 5 and 11 [Prz68]_.
+    Where an end is released, stiffness and mass of each of the four actions [Prz68]_ are condensed separately (Guyan),
+    so that matrices stay affine in the properties. Shear deformation and the rotary inertia of bending are left out.
 
     Examples
     --------

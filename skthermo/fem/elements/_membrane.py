@@ -33,13 +33,9 @@ class Membrane(PhysicalElement):
 
     Notes
     -----
-    Bilinear displacements, 2 x 2 Gauss points. Constant strain is exact; bending in the plane is too stiff unless
-    there are several elements across. Membranes have no stiffness out of their plane: other members must hold their
-    nodes.
-
-    References
-    ----------
-    Hughes, The Finite Element Method, Prentice-Hall, 1987, chapters 2 and 3 [Hug87]_.
+    Bilinear displacements, 2 x 2 Gauss points [Hug87]_. Constant strain is exact; bending in the plane is too stiff
+    unless there are several elements across. Membranes have no stiffness out of their plane: other members must hold
+    their nodes.
 
     Examples
     --------

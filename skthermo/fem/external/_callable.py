@@ -273,7 +273,6 @@ class CallableModel:
         return result.reshape(len(rows), self.n_modes)
 
     def _impossible(self, rows: Array, frequencies: Array) -> dict[int, RuntimeError]:
-        """Errors of the rows with an impossible frequency."""
         wrong = ~np.isnan(frequencies) & ~(np.isfinite(frequencies) & (frequencies > 0))
         return {
             int(row): RuntimeError(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import reduce
+from dataclasses import dataclass
+from functools import cached_property, reduce
 from operator import add
 from os import PathLike
 from pathlib import Path
@@ -153,45 +154,12 @@ def load_affine(
 
     Notes
     -----
-    These files are read:
+    :doc:`/guide/fe_programs` lists the files that are read, program by program, the names by which matrices of one job
+    belong together, and the rules that decide the role of each matrix. Roles that were found and are doubtful, such as
+    a total that is more than the sum of the terms, or a term proportional to the mass, give a warning.
 
-    =====================  =============================================================================================
-    program                files
-    =====================  =============================================================================================
-    Abaqus                 ``.mtx`` of ``*MATRIX GENERATE``, with ``FORMAT=MATRIX INPUT``, whose nodes and directions
-                           label the rows, or ``FORMAT=COORDINATE``. What is held (1e36 on the diagonal) is left out.
-    ANSYS                  Harwell-Boeing, as ``HBMAT`` writes it in ASCII, real, symmetric (RSA) or not (RUA), and its
-                           mapping file, which labels the rows; Rutherford-Boeing
-    Nastran, OptiStruct    DMIG in a punch file (small, large and free field; form 6 or 1), whose grid points and
-                           components label the rows; OUTPUT4 in ASCII, dense, sparse or big, or binary and dense
-    CalculiX, SAP2000      lines of row, column and value (``.sti``, ``.mas``; ``.TXK``, ``.TXM``), and CalculiX's
-                           ``.dof``, which labels the rows
-    MATLAB, Python         MATLAB v5 (``save -v7``), ``.npz`` of named arrays or of `scipy.sparse.save_npz`, Matrix
-                           Market
-    =====================  =============================================================================================
-
-    Rows with labels are joined by them, so that a group's matrix needs its own nodes only; ``model.dofs`` holds them.
-    A file in a folder that begins as none of these is ignored, unless its name ends like theirs.
-
-    Of a job ``E_deck`` that wrote stiffness and mass, the stiffness is called E_deck, and the mass is used as that of
-    the model if it is the same in all jobs: ``E_deck_STIF1.mtx`` and ``E_deck_MASS1.mtx`` (Abaqus), ``E_deck.sti`` and
-    ``.mas``, ``.TXK`` and ``.TXM``, ``.stif`` and ``.mass``, or K... and M... in ``E_deck.pch`` or ``E_deck.op4``. With
-    ``factor=2``, a folder of such jobs is one job called ``nominal``, and one for each group with its modulus doubled.
-
-    The role of each matrix is decided by these rules alone. Roles that were found and are doubtful, such as a total
-    that is more than the sum of the terms, or a term proportional to the mass, give a warning.
-
-    - Text, structs, numbers, vectors and matrices that are not square are ignored. A square matrix of another
-      size than the mass, not finite, skew-symmetric (gyroscopic), or of the mass's size and complex, is an error
-      unless ``stiffness`` names the terms; an imaginary part of zeros is dropped. If ``stiffness`` names the terms,
-      only the mass, the terms and the total are read from a folder.
-    - Without ``stiffness`` and a total, a matrix that equals the sum of all others (to 1e-8) is the total.
-    - Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
-      more for each MB, and ten times the memory of the files, or 256 MB.
-    - A total that equals the sum of the terms (to 1e-6 of its diagonal) is redundant and left out. If the total is
-      more, the rest is the constant part ``()`` of the stiffness; if it is less anywhere on its diagonal, that is an
-      error. If ``stiffness`` names only some of the terms in a file with a total, these terms vary and the others are
-      constant. To add K0 to the terms as a constant part, give ``stiffness={"K0": (), "K1": "E_deck", ...}``.
+    Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
+    more for each MB, and ten times the memory of the files, or 256 MB.
 
     Examples
     --------
@@ -227,54 +195,37 @@ def load_affine(
     for what, one in (("mass", mass), ("total", None if total is False else total)):
         if one is not None and (not isinstance(one, str) or not one):
             raise ValueError(f"{what} is {one!r:.100}; expected the name of a matrix")
-    named = None if stiffness is None else {*_keys(stiffness), mass, total}
+    keys = None if stiffness is None else _keys(stiffness)
     usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
 
     def is_used(name: str) -> bool:
-        return named is None or name in named or name.lower() in usual or (mass is None and name.endswith(MASS))
+        is_named = keys is None or name in (*keys, mass, total)
+        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS))
 
     matrices, dofs = read_named_matrices(file, is_used)
-    square = _square(matrices)
-    masses = [name for name in square if name.endswith(MASS)]
-    mass = mass or _usual(square, MASS_NAMES, "mass", file) or _mass_of_exports(masses, matrices, file)
-    if mass is None:
-        raise ValueError(f"{file}: {_no_mass(matrices)}; say mass=..., one of {square or list(matrices)}")
-    mass_matrix = _find(matrices, mass, file)
-    shape = mass_matrix.shape
+    exports = Exports(file, matrices)
+    mass = mass or exports.mass()
+    mass_matrix = exports.matrix(mass)
+    others = exports.beside(mass, mass_matrix.shape) if keys is None else {}
     says_total = total is not None
-    if total is None and stiffness is not None:
-        unnamed = [name for name in square if name not in (*_keys(stiffness), mass)]
-        fitting = [
-            name
-            for name in unnamed
-            if (matrix := matrices[name]) is not None and matrix.shape == shape and _is_finite(matrix)
-        ]
-        total = _usual(fitting, TOTAL_NAMES, "total", file)
-    if factor is not None and total is None:
-        total = _usual(square, TOTAL_NAMES, "total", file)
-    if stiffness is None:
-        others = {
-            name: _find(matrices, name, file, shape)
-            for name, one in matrices.items()
-            if name not in (mass, *masses)
-            and (name in square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
-        }
-        if total is None and len(others) > 1:
-            total = _usual(others, TOTAL_NAMES, "total", file)
-        stiffness = (
-            _terms(others, total, mass, mass_matrix, file) if factor is None else [n for n in others if n != total]
-        )
-    keys = _keys(stiffness)
+    if total is None:
+        candidates = exports.unnamed((*keys, mass), mass_matrix.shape) if keys else others if len(others) > 1 else ()
+        total = exports.usual(candidates, TOTAL_NAMES, "total")
+        if total is None and factor is not None:
+            total = exports.usual(exports.square, TOTAL_NAMES, "total")
+    if keys is None:
+        changed = [name for name in others if name != total]
+        keys = _keys(changed if factor is not None else exports.terms(others, total, mass))
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
-    terms = {name: _find(matrices, name, file, shape) for name in keys}
+    terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
-    if factor is not None:
-        pairs = _differences(matrices, total, keys, terms, factor, file)
-    elif total:
-        rest = _rest(_find(matrices, total, file, shape), terms, f"{file}: {total!r}", says_total)
-        pairs += [] if rest is None else [((), rest)]
+    pairs += exports.rest(total, terms, says_total) if total and factor is None else []
+    nominal = None if factor is None else exports.nominal(total, mass_matrix.shape)
     try:
+        if nominal is not None and factor is not None:
+            differences = difference_terms(nominal, terms, factor=factor)
+            pairs = [(keys[key[0]] if key else (), term) for key, term in differences.items()]
         return AffineModel(
             pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
@@ -282,102 +233,163 @@ def load_affine(
         raise ValueError(f"{file}: {error}") from error
 
 
-def _differences(
-    matrices: Mapping[str, Matrix | None],
-    total: Total,
-    keys: Mapping[str, Key],
-    changed: Mapping[str, Matrix],
-    factor: float | Mapping[str, float],
-    file: Path,
-) -> list[tuple[Key, Matrix]]:
-    """Terms from the nominal stiffness and the whole stiffness with each parameter multiplied."""
-    if not total:
-        raise ValueError(
-            f"{file}: factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the stiffness as "
-            f"built, or total=..., one of {list(matrices)}"
-        )
-    nominal = _find(matrices, total, file, next(iter(changed.values())).shape)
-    try:
-        terms = difference_terms(nominal, changed, factor=factor)
-    except ValueError as error:
-        raise ValueError(f"{file}: {error}") from error
-    return [(keys[key[0]] if key else (), term) for key, term in terms.items()]
+@dataclass(frozen=True)
+class Exports:
+    """Matrices by name that a program has written to a file or a folder, None for what is not one of numbers."""
 
+    file: Path
+    matrices: Mapping[str, Matrix | None]
 
-def _mass_of_exports(names: Sequence[str], matrices: Mapping[str, Matrix | None], file: Path) -> str | None:
-    """The mass that every export has; None without any."""
-    if not names:
-        return None
-    nominal = [name for name in names if name.removesuffix(MASS).lower() in TOTAL_NAMES]
-    chosen = (nominal or list(names))[0]
-    reference = _find(matrices, chosen, file)
-    for name in names:
-        if not _same(_find(matrices, name, file, reference.shape), reference, SAME):
+    @cached_property
+    def square(self) -> list[str]:
+        """Names of the real square matrices; single numbers count only if there is nothing larger."""
+        real = {name: one for name, one in self.matrices.items() if one is not None and not np.iscomplexobj(one)}
+        sizes = {name: one.shape[0] for name, one in real.items() if one.shape[0] == one.shape[1] > 0}
+        return [name for name, size in sizes.items() if size > 1] or list(sizes)
+
+    def matrix(self, name: str, shape: tuple[int, ...] = ()) -> Matrix:
+        """A matrix of finite real numbers, of a shape if one is given."""
+        if name not in self.matrices:
+            raise ValueError(f"{self.file}: no variable {name!r}; found {list(self.matrices)}")
+        matrix, what = self.matrices[name], f"{self.file}: variable {name!r}"
+        if matrix is None:
+            raise ValueError(f"{what} is not a matrix of real numbers")
+        if np.iscomplexobj(matrix):
             raise ValueError(
-                f"{file}: the mass of {name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}; "
-                "expected exports of the same mass, or mass=..., one of them"
+                f"{what} is not a matrix of real numbers: its imaginary part is not zero; expected real ones, or "
+                "stiffness=[...] that names the terms"
             )
-    return chosen
+        if not _is_finite(matrix):
+            raise ValueError(f"{what} holds values that are not finite")
+        if shape and matrix.shape != shape:
+            raise ValueError(
+                f"{what} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] that names the "
+                "terms"
+            )
+        return matrix
 
+    def usual(self, names: Collection[str], usual: Collection[str], what: str) -> str | None:
+        """The one name among the usual ones, if there is one."""
+        found = [name for name in names if name.lower() in usual]
+        if len(found) > 1:
+            raise ValueError(f"{self.file}: {found} could each be the {what}; say {what}=...")
+        return found[0] if found else None
 
-def _square(matrices: Mapping[str, Matrix | None]) -> list[str]:
-    """Names of the real square matrices; single numbers count only if there is nothing larger."""
-    real = {name: matrix for name, matrix in matrices.items() if matrix is not None and not np.iscomplexobj(matrix)}
-    sizes = {name: m.shape[0] for name, m in real.items() if m.shape[0] == m.shape[1] > 0}
-    return [name for name, size in sizes.items() if size > 1] or list(sizes)
+    def mass(self) -> str:
+        """The mass matrix: the one with a usual name, or that of all exports."""
+        found = self.usual(self.square, MASS_NAMES, "mass")
+        masses = [name for name in self.square if name.endswith(MASS)]
+        if found is None and not masses:
+            raise ValueError(f"{self.file}: {self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
+        if found is not None:
+            return found
+        nominal = [name for name in masses if name.removesuffix(MASS).lower() in TOTAL_NAMES]
+        chosen = (nominal or masses)[0]
+        reference = self.matrix(chosen)
+        for name in masses:
+            if not _same(self.matrix(name, reference.shape), reference, SAME):
+                both = f"{name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}"
+                raise ValueError(
+                    f"{self.file}: the mass of {both}; expected exports of the same mass, or mass=..., one of them"
+                )
+        return chosen
+
+    def _no_mass(self) -> str:
+        """Text for the error that no matrix can be the mass."""
+        for name, matrix in self.matrices.items():
+            if name.lower() in MASS_NAMES:
+                shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
+                is_complex = matrix is not None and np.iscomplexobj(matrix)
+                return f"{name!r} is {shape}, {'complex' if is_complex else 'not square'}, and so not the mass"
+        return f"no matrix is called {', '.join(MASS_NAMES)}"
+
+    def beside(self, mass: str, shape: tuple[int, ...]) -> dict[str, Matrix]:
+        """All square matrices except masses."""
+        return {
+            name: self.matrix(name, shape)
+            for name, one in self.matrices.items()
+            if name != mass
+            and not (name in self.square and name.endswith(MASS))
+            and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
+        }
+
+    def unnamed(self, named: Collection[str], shape: tuple[int, ...]) -> list[str]:
+        """Matrices that may be the total of terms that are named."""
+        found = {name: self.matrices[name] for name in self.square if name not in named}
+        return [name for name, one in found.items() if one is not None and one.shape == shape and _is_finite(one)]
+
+    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> list[str]:
+        """Names of the stiffness terms; warns of matrices that look like a total or like mass."""
+        found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
+        for name, term in found.items():
+            if term.nnz and not (term + term.T).count_nonzero():
+                raise ValueError(
+                    f"{self.file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric "
+                    "ones, or stiffness=[...] that names the terms"
+                )
+        mass_matrix = self.matrix(mass)
+        has_pattern = mass_matrix.shape[0] > 1
+        like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
+        similar = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
+        springs = {name: term for name, term in found.items() if name not in similar}
+        if total is None and len(springs) > 2:
+            whole = reduce(add, springs.values())
+            sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
+            if len(sums) == 1:
+                del springs[sums[0]], found[sums[0]]
+                self._warn(
+                    f"{sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it by "
+                    f"total={sums[0]!r}, or name the terms by stiffness=[...]"
+                )
+        if len(springs) > 1 and has_pattern:
+            whole = reduce(add, springs.values())
+            for name, term in springs.items():
+                if ratio := _ratio(term, whole - term):
+                    similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
+        for name, what in similar.items():
+            self._warn(
+                f"{name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
+                "terms by stiffness=[...]"
+            )
+        return list(found)
+
+    def nominal(self, total: Total, shape: tuple[int, ...]) -> Matrix:
+        """The stiffness as built, beside those with one parameter multiplied."""
+        if not total:
+            raise ValueError(
+                f"{self.file}: factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the "
+                f"stiffness as built, or total=..., one of {list(self.matrices)}"
+            )
+        return self.matrix(total, shape)
+
+    def rest(self, total: str, terms: Mapping[str, Matrix], is_meant: bool) -> list[tuple[Key, Matrix]]:
+        """The total minus all terms, as a constant term; nothing if nothing is left."""
+        whole, summed = self.matrix(total, next(iter(terms.values())).shape), reduce(add, terms.values())
+        if _same(summed, whole, SAME):
+            return []
+        rest = scipy.sparse.csc_array(whole - summed)
+        less = rest.diagonal() < -SAME * np.abs(whole.diagonal())
+        if less.any():
+            row = int(np.argmax(less))
+            raise ValueError(
+                f"{self.file}: {total!r} is {whole.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of "
+                f"{list(terms)}; expected a total of the stiffness, stiffness=... that says which matrices are terms, "
+                "or total=False if none is the total"
+            )
+        if not is_meant:
+            self._warn(
+                f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the "
+                "stiffness. Confirm it by total=..., or give total=False if the terms are all, or name the terms by "
+                "stiffness=[...]"
+            )
+        return [((), rest)]
+
+    def _warn(self, text: str) -> None:
+        warn_user(f"{self.file}: {text}", ModelWarning, "doubtful-matrices")
 
 
 def _is_finite(matrix: Matrix) -> bool:
     return bool(np.isfinite(matrix.data if scipy.sparse.issparse(matrix) else matrix).all())
-
-
-def _no_mass(matrices: Mapping[str, Matrix | None]) -> str:
-    """Text for the error that no matrix can be the mass."""
-    for name, matrix in matrices.items():
-        if name.lower() in MASS_NAMES:
-            shape = "no matrix" if matrix is None else " x ".join(map(str, matrix.shape))
-            is_complex = matrix is not None and np.iscomplexobj(matrix)
-            return f"{name!r} is {shape}, {'complex' if is_complex else 'not square'}, and so not the mass"
-    return f"no matrix is called {', '.join(MASS_NAMES)}"
-
-
-def _terms(others: Mapping[str, Matrix], total: Total, mass: str, mass_matrix: Matrix, file: Path) -> list[str]:
-    """Names of the stiffness terms; warns of matrices that look like a total or like mass."""
-    found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
-    for name, term in found.items():
-        if term.nnz and not (term + term.T).count_nonzero():
-            raise ValueError(
-                f"{file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric ones, or "
-                "stiffness=[...] that names the terms"
-            )
-    has_pattern = mass_matrix.shape[0] > 1
-    like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
-    similar = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
-    springs = {name: term for name, term in found.items() if name not in similar}
-    if total is None and len(springs) > 2:
-        whole = reduce(add, springs.values())
-        sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
-        if len(sums) == 1:
-            del springs[sums[0]], found[sums[0]]
-            warn_user(
-                f"{file}: {sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it "
-                f"by total={sums[0]!r}, or name the terms by stiffness=[...]",
-                ModelWarning,
-                "doubtful-matrices",
-            )
-    if len(springs) > 1 and has_pattern:
-        whole = reduce(add, springs.values())
-        for name, term in springs.items():
-            if ratio := _ratio(term, whole - term):
-                similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
-    for name, what in similar.items():
-        warn_user(
-            f"{file}: {name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
-            "terms by stiffness=[...]",
-            ModelWarning,
-            "doubtful-matrices",
-        )
-    return list(found)
 
 
 def _ratio(term: Matrix, reference: Matrix) -> float:
@@ -392,62 +404,9 @@ def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:
     return not (relative(scipy.sparse.coo_array(matrix - expected), expected.diagonal()) > tolerance).any()
 
 
-def _usual(names: Collection[str], usual: Collection[str], what: str, file: Path) -> str | None:
-    """The one name among the usual ones, if there is one."""
-    found = [name for name in names if name.lower() in usual]
-    if len(found) > 1:
-        raise ValueError(f"{file}: {found} could each be the {what}; say {what}=...")
-    return found[0] if found else None
-
-
 def _keys(stiffness: Collection[str] | Mapping[str, str | Key]) -> dict[str, Key]:
     """The parameters that multiply each term."""
     names = [stiffness] if isinstance(stiffness, str) else stiffness
     names = names if isinstance(names, Mapping) else check_names(names, "stiffness")
     keys = names if isinstance(names, Mapping) else {name: name for name in names}
     return {name: (key,) if isinstance(key, str) else tuple(key) for name, key in keys.items()}
-
-
-def _find(matrices: Mapping[str, Matrix | None], name: str, file: Path, shape: tuple[int, ...] = ()) -> Matrix:
-    if name not in matrices:
-        raise ValueError(f"{file}: no variable {name!r}; found {list(matrices)}")
-    matrix = matrices[name]
-    if matrix is None:
-        raise ValueError(f"{file}: variable {name!r} is not a matrix of real numbers")
-    if np.iscomplexobj(matrix):
-        raise ValueError(
-            f"{file}: variable {name!r} is not a matrix of real numbers: its imaginary part is not zero; expected real "
-            "ones, or stiffness=[...] that names the terms"
-        )
-    if not _is_finite(matrix):
-        raise ValueError(f"{file}: variable {name!r} holds values that are not finite")
-    if shape and matrix.shape != shape:
-        raise ValueError(
-            f"{file}: variable {name!r} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] "
-            "that names the terms"
-        )
-    return matrix
-
-
-def _rest(total: Matrix, terms: Mapping[str, Matrix], what: str, is_meant: bool) -> Matrix | None:
-    """The total minus all terms; None if nothing is left."""
-    summed = reduce(add, terms.values())
-    if _same(summed, total, SAME):
-        return None
-    rest = scipy.sparse.csc_array(total - summed)
-    less = rest.diagonal() < -SAME * np.abs(total.diagonal())
-    if less.any():
-        row = int(np.argmax(less))
-        raise ValueError(
-            f"{what} is {total.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; expected a "
-            "total of the stiffness, stiffness=... that says which matrices are terms, or total=False if none is the "
-            "total"
-        )
-    if not is_meant:
-        warn_user(
-            f"{what} is more than the sum of {list(terms)}: the rest is used as a constant part of the stiffness. "
-            "Confirm it by total=..., or give total=False if the terms are all, or name the terms by stiffness=[...]",
-            ModelWarning,
-            "doubtful-matrices",
-        )
-    return rest

@@ -230,11 +230,8 @@ def shape_jacobian(model: LocalModel, theta: ArrayLike, dofs: ArrayLike | None =
 
     Notes
     -----
-    `LocalModes.derivatives` explains the method.
-
-    References
-    ----------
-    Nelson, Simplified calculation of eigenvector derivatives, AIAA Journal 14 (1976) 1201-1205 [Nel76]_.
+    `LocalModes.derivatives` explains the method, which needs no factorisation of its own for each mode as [Nel76]_
+    does.
 
     Examples
     --------

@@ -29,7 +29,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     """Modal assurance criterion of every pair of mode shapes.
 
     ``|phi_a^H phi_b|^2 / (phi_a^H phi_a * phi_b^H phi_b)``: 1 for the same shape whatever its
-    scale, sign or phase, 0 for orthogonal ones.
+    scale, sign or phase, 0 for orthogonal ones [AB82]_.
 
     Parameters
     ----------
@@ -47,10 +47,6 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
     ------
     ValueError
         If the numbers of degrees of freedom differ, a shape is zero throughout, or a value is not a number.
-
-    References
-    ----------
-    Allemang & Brown, A correlation coefficient for modal vector analysis, Proc. 1st IMAC, 1982 [AB82]_.
 
     Examples
     --------

@@ -21,6 +21,7 @@ from skthermo.preprocessing.checks._kinds import Finding
 from skthermo.preprocessing.checks._reading import finding, period_of
 from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table
 from skthermo.preprocessing.checks._signs import (
+    Inputs,
     TimeShift,
     best_shift,
     explained,
@@ -84,35 +85,8 @@ def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", mode
 
     Notes
     -----
-    - *Gross errors* are found by column, from its values in order, before anything else. A number stands for a missing
-      value (*placeholders*) if it is beyond -90 to 100 degrees Celsius and 50 degrees away from the others, or one that
-      loggers write (such as -999 or 9999) and far from the others. An *isolated-level* is up to three values that
-      repeat exactly, 30 degrees away from all others, or, of frequencies, beyond half and twice their median. Sensors
-      are compared with the median of the others for another unit (*fahrenheit*, *scaled-temperatures*) and for
-      *opposite-signs*. A mode is far from the model's at a ratio above 1.6; *unit-of-frequencies* is named if the
-      typical ratio is within a fifth of that of the unit. Their ``severity`` is in the table: "meaningless" if results
-      of a fit would be.
-    - *stuck-sensor*, *stuck-mode*: a run of at least five equal values. Where neighbouring records are equal by
-      rounding, it has to be four times as long as all but three runs of the column are. Nearly all other periods of its
-      length must vary by at least three steps of rounding, and its value must not be one at which the column rests
-      again and again, as rain does at zero.
-    - *no-thermal-effect*: piecewise-linear regression in up to three principal components of the temperatures,
-      predicted out of fold (`BlockedKFold`). It explains nothing if it explains less than 2 % of the variance of every
-      mode.
-    - *time-shift*: temperatures of earlier or later rows, up to a quarter of the records away, leave at least a tenth
-      less of the variance than those of the row itself and of the past do, on (geometric) average over the modes.
-      Temperatures of up to a day before (24 rows without a ``DatetimeIndex``) are no finding: that may be inertia.
-    - *exchanged-modes*: in some rows, at least three, the values of two columns lie nearer to what the weather explains
-      of the other column, and ordering them at least halves what it leaves.
-    - *frequency-outliers*: values more than eight robust standard deviations away from the median of the 25 rows
-      around, and from what the weather explains.
-    - *thermal-memory*: an exponentially weighted mean of a sensor with a time constant of five days or more lowers the
-      out-of-fold error clearly, as `find_memory` finds it. Steps and trends are looked for beside this mean.
-    - *sudden-change*: the level of a frequency beside what the weather explains changes at once, by at least five
-      standard errors, and this leaves at least a tenth less of its variance than a straight line does; not in fewer
-      than 90 days, nor beside a stuck sensor. The row is the best of a hundred places.
-    - *trend*: as `residual_trend` finds it, fitted together with the weather; at least five standard errors, and half
-      the scatter of a single record; not in fewer than 90 days, nor beside a stuck sensor.
+    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` what its findings mean. The ``severity`` of a
+    gross error is "meaningless" if results of a fit would be.
 
     Examples
     --------
@@ -193,11 +167,9 @@ class _Records:
         return INERTIA if self.hours is None else max(int(24 / self.hours), 1)
 
     def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> Finding:
-        """A finding in some rows."""
         return finding(self.index, what, column, rows, detail)
 
     def period(self, rows: NDArray[np.intp]) -> str:
-        """First and last of some rows."""
         return period_of(self.index, rows)
 
 
@@ -341,11 +313,12 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
     if records.has_faulty_sensors or records.has_wrong_times or (timed and index[-1] - index[0] < SHORTEST_TREND):
         return found, level
     times = row_times(pd.DataFrame(index=records.index))
-    table = trend_table(inputs[rows], F, times[rows], records.modes, timed)
-    for mode, (name, row) in enumerate(table.iterrows()):
+    beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
+    for mode, name in enumerate(records.modes):
         known = np.flatnonzero(~np.isnan(records.F[:, mode]))
-        of_frequency = LEAST_OF_ALL * robust_deviation(F)[mode]
-        step = largest_step(inputs[rows], F[:, mode])
+        of_frequency = LEAST_OF_ALL * deviations[mode]
+        row = trend_table(beside, F[:, [mode]], times[rows], [name], timed).iloc[0]
+        step = largest_step(beside, F[:, mode])
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
             detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,9 +32,14 @@ class Plausible:
     def of(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
         """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
         is_target = baseline.columns.isin(targets)
-        least, most = _range(baseline.to_numpy())
-        lowest = np.where(is_target, -np.inf, np.fmin(least - 100, -80))
-        return cls(lowest, np.where(is_target, np.inf, np.fmax(most + 100, 100)), least, most)
+        found = cls.beside(*_range(baseline.to_numpy()))
+        lowest, highest = np.where(is_target, -np.inf, found.lowest), np.where(is_target, np.inf, found.highest)
+        return replace(found, lowest=lowest, highest=highest)
+
+    @classmethod
+    def beside(cls, least: Array, most: Array) -> Plausible:
+        """Temperatures where these are known: none in kelvin, and none that is 100 degrees beyond them."""
+        return cls(np.fmin(least - 100, -80), np.fmax(most + 100, 100), least, most)
 
     @classmethod
     def of_weather(cls, temperatures: Array) -> Plausible:

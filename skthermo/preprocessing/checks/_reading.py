@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import HUGE, Array, as_floats
-from skthermo._tables.frames import PREFIXES, as_stamps
+from skthermo._tables.frames import as_stamps
 from skthermo.preprocessing.checks._kinds import Finding
 
 NUMBERED = pd.Timestamp("1970-03-01")  # before which numbers that are read as nanoseconds fall
@@ -77,7 +77,6 @@ class Reading:
 
     @property
     def whole(self) -> NDArray[np.intp]:
-        """All rows."""
         return np.arange(len(self.values))
 
     def finding(
@@ -88,7 +87,6 @@ class Reading:
         return finding(self.index, what, column, rows, detail + where)
 
     def found(self, *args: Any, **options: Any) -> None:
-        """Add a finding."""
         self.findings.append(self.finding(*args, **options))
 
     def _read_array(self, table: Any) -> None:
@@ -103,7 +101,7 @@ class Reading:
         if values.ndim not in (1, 2):
             return
         values = values[:, np.newaxis] if values.ndim == 1 else values
-        prefix = PREFIXES["temperature" if self.what == "temperatures" else "frequency"]
+        prefix = "T" if self.what == "temperatures" else "f"
         self.values, self.index = values, pd.RangeIndex(len(values))
         self.columns = names or [f"{prefix}{place + 1}" for place in range(values.shape[1])]
 
@@ -156,7 +154,6 @@ def _frame_values(table: pd.DataFrame, reading: Reading) -> Array:
 
 
 def _reason(error: Exception) -> str:
-    """The first part of an error."""
     return f"{str(error).partition(';')[0]:.150}"
 
 

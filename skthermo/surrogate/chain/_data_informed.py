@@ -18,6 +18,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import (
     Array,
@@ -67,7 +68,7 @@ from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, g
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._regression import TemperatureMapper, remembered
+from skthermo.surrogate._regression import TemperatureMapper
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
@@ -194,18 +195,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     -----
     ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T))) * exp(discrepancy_(T))``,
     and simulations of damage have the same discrepancy, as Kennedy and O'Hagan [KOH01]_ separate the parameters of a
-    calibrated model from it. Outliers, as `~skthermo.preprocessing.check_records` finds them, train neither aligner nor
-    M1; they stay in the records, so that ``recorder_`` knows them. If temperatures are a frame, results are
-    frames. A missing temperature is filled from the other sensors, in `fit` and later, by what they showed together in
-    the training records, also if the mapper would deal with it in another way. A row that cannot be computed, such as
+    calibrated model from it. Outliers train neither aligner nor M1; they stay in the records, so that ``recorder_``
+    knows them. A missing temperature is filled from the other sensors, in `fit` and later, also if the mapper would
+    deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
-
-    Similar weather, for intervals and fitted noise, is looked for among at most 20,000 training records, spread evenly,
-    so that time and memory grow in proportion to the rows.
 
     A mapper with a method ``predict_covariance(X)``, (n_samples, n_parameters, n_parameters), such as one that has
     learned from a fleet, makes standard deviations and intervals as wide as it is uncertain. With ``reach_``, a range
     of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others.
+    :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty` explain each step.
 
     Examples
     --------
@@ -623,15 +621,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals [LGR18]_ from `residuals`. The width is a multiple of their spread in similar weather;
-        the multiple is the order statistic that the folds themselves needed. If new records are exchangeable with the
-        training records, the interval holds a mode with about the probability asked; the share of a short period varies
-        more, because records are serially correlated. Beyond the training range, the interval is widened by the
-        distance (see `extrapolation_distance`), and where a temperature was filled, by what its standard deviation
-        changes in the prediction.
-
-        With a mapper that states its uncertainty (`predict_covariance`), its standard deviation is added in quadrature
-        in place of that distance, which counts beyond its ``reach_`` only.
+        Split-conformal intervals [LGR18]_ from `residuals`, in multiples of their spread in similar weather
+        (:doc:`/guide/uncertainty`). If new records are exchangeable with the training records, an interval holds a mode
+        with about the probability asked; the share of a short period varies more, because records are serially
+        correlated. Beyond the training range, and where a temperature was filled, it is wider.
 
         Examples
         --------
@@ -787,7 +780,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(weather.filled))
+        theta = self.thermal_.learned(weather.filled)
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         excess = excess.assign(outside_bounds=outside)
         if offers(self.mapper_, "from_fleet"):

@@ -140,24 +140,9 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     Notes
     -----
     Frequencies cannot determine more parameters than there are modes, and an estimate is an effective stiffness, not a
-    material property.
-
-    The steps of a row start on a response surface, a polynomial fitted to the simulations and to solutions near 200 of
-    the records of `fit`, or at the regressor's estimate with ``dofs``. They end with a step below 0.1 % of each
-    parameter's posterior standard deviation whose curvature changes no frequency by more than 0.1 % of the noise, or,
-    where frequencies count as exact, with a step below 1e-6.
-
-    Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 %. Not refined, the default
-    network errs by 2.4 % on the truss and 4.0 % on KW51, quadratic polynomials by 0.11 and 1.3 %, a Gaussian process by
-    0.01 and 0.14 % (``examples/plot_regressors.py``).
-
-    Refined on frequencies and shapes, errors of the truss's verticals are 39 % lower with four sensors than from
-    frequencies alone, those of KW51's pipes 31 % lower with its 12 channels (box of 30 %, noise of 0.1 % on frequencies
-    and 1 % on shapes; ``python tests/benchmarks/shape_inputs.py``).
-
-    A ``memory`` holds ``8 * (n_parameters + n_modes)`` bytes for each simulation, more with ``dofs``, and about
-    ``8 * (2 n_parameters + n_modes + 3)`` for each record of each set of training records; with ``reduce`` also the
-    models. ``reduce_size`` of ``joblib.Memory(folder)`` removes what has not been used for longest.
+    material property. Refined estimates do not depend on the regressor: noise-free, they are exact to 1e-5 %.
+    :doc:`/guide/estimation` says what the steps minimise, where they begin and end, and what shapes add;
+    :doc:`/accuracy_regressors` compares regressors, :doc:`/guide/costs` has the size of a ``memory``.
 
     Examples
     --------

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import combinations_with_replacement
 from math import comb
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,17 +67,14 @@ class ShapeInputs:
 
     @property
     def n_sensors(self) -> int:
-        """Number of sensors."""
         return len(self.dofs)
 
     @property
     def n_modes(self) -> int:
-        """Number of modes."""
         return self.reference.shape[1]
 
     @property
     def n_columns(self) -> int:
-        """Number of columns of inputs."""
         return self.n_modes * (1 + self.n_sensors)
 
     @property
@@ -108,41 +105,23 @@ class ShapeInputs:
         return self.normalised(np.hstack([inputs[:, : self.n_modes], inputs[:, self.n_modes :] + noise]))
 
 
-@dataclass(frozen=True)
-class MeasuredShapes:
-    """Measured shapes u of unit length, (n_samples, n_modes, n_sensors), NaN where a mode is missing."""
+def shape_misfit(units: Array, shapes: Array, slopes: Array) -> tuple[Array, Array]:
+    """Differences u - v of measured shapes u, (n_samples, n_modes, n_sensors), and computed shapes v of unit length,
+    and the derivatives of v.
 
-    units: Array
-
-    @property
-    def missing(self) -> NDArray[np.bool_]:
-        """Which components are missing, (n_samples, n_modes * n_sensors)."""
-        return np.isnan(self.units).reshape(len(self.units), -1)
-
-    def of(self, rows: NDArray) -> MeasuredShapes:
-        """Some rows."""
-        return MeasuredShapes(self.units[rows])
-
-    def with_modes(self, order: NDArray) -> MeasuredShapes:
-        """The measured modes in another order."""
-        return MeasuredShapes(self.units[:, order])
-
-    def misfit(self, shapes: Array, slopes: Array) -> tuple[Array, Array]:
-        """Differences u - v from computed shapes v of unit length, and the derivatives of v.
-
-        Computed shapes, (n_samples, n_sensors, n_modes), get the signs of the measured ones. Where a mode is missing,
-        the difference is 0.
-        """
-        phi, d_phi = shapes.swapaxes(1, 2), slopes.swapaxes(1, 2)
-        length = np.linalg.norm(phi, axis=2, keepdims=True)
-        v = phi / length
-        along = np.einsum("smd,smdp->smp", v, d_phi)
-        dv = (d_phi - v[:, :, :, np.newaxis] * along[:, :, np.newaxis]) / length[:, :, :, np.newaxis]
-        u = np.where(np.isnan(self.units), v, self.units)
-        signs = np.where(np.einsum("smd,smd->sm", u, v) < 0, -1.0, 1.0)[:, :, np.newaxis]
-        n_samples, n_parameters = len(u), slopes.shape[3]
-        residual = (u - signs * v).reshape(n_samples, -1)
-        return residual, (signs[:, :, :, np.newaxis] * dv).reshape(n_samples, -1, n_parameters)
+    Computed shapes, (n_samples, n_sensors, n_modes), get the signs of the measured ones. Where a mode is missing, the
+    difference is 0.
+    """
+    phi, d_phi = shapes.swapaxes(1, 2), slopes.swapaxes(1, 2)
+    length = np.linalg.norm(phi, axis=2, keepdims=True)
+    v = phi / length
+    along = np.einsum("smd,smdp->smp", v, d_phi)
+    dv = (d_phi - v[:, :, :, np.newaxis] * along[:, :, np.newaxis]) / length[:, :, :, np.newaxis]
+    u = np.where(np.isnan(units), v, units)
+    signs = np.where(np.einsum("smd,smd->sm", u, v) < 0, -1.0, 1.0)[:, :, np.newaxis]
+    n_samples, n_parameters = len(u), slopes.shape[3]
+    residual = (u - signs * v).reshape(n_samples, -1)
+    return residual, (signs[:, :, :, np.newaxis] * dv).reshape(n_samples, -1, n_parameters)
 
 
 Linearise = Callable[[Array], tuple[Array, ...]]
@@ -196,28 +175,33 @@ class Prior:
 class Objective:
     """Half of the squared misfits of ln f, of shapes and of ln theta, in standard deviations of noise and prior.
 
-    ``log_measured`` is NaN where a mode is missing; ``noise``, (n_samples, n_observations), holds standard deviations
-    of ln f and, mode by mode, of the components of shapes of unit length.
+    ``log_measured`` and ``units``, measured shapes of unit length, (n_samples, n_modes, n_sensors), are NaN where a
+    mode is missing; without shapes, there are no sensors. ``noise``, (n_samples, n_observations), holds standard
+    deviations of ln f and, mode by mode, of the components of shapes.
     """
 
     linearise: Linearise
     log_measured: Array
     noise: Array
     prior: Prior
-    shapes: MeasuredShapes | None = None
+    units: Array
+
+    @property
+    def n_sensors(self) -> int:
+        return self.units.shape[2]
 
     @property
     def missing(self) -> NDArray[np.bool_]:
         """Which observations are missing, (n_samples, n_observations)."""
-        missing = np.isnan(self.log_measured)
-        return missing if self.shapes is None else np.hstack([missing, self.shapes.missing])
+        n_components = self.log_measured.shape[1] * self.n_sensors
+        return np.isnan(np.hstack([self.log_measured, self.units.reshape(len(self.units), n_components)]))
 
     def at(self, x: Array) -> Local:
         """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
         (frequencies, sensitivity, *modes), missing = self.linearise(np.exp(x)), self.missing
         residual = self.log_measured - np.log(frequencies)
-        if self.shapes is not None:
-            misfit, change = self.shapes.misfit(*modes)
+        if self.n_sensors:
+            misfit, change = shape_misfit(self.units, *modes)
             residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
         residual = np.where(missing, 0.0, residual)
         distance = (x - self.prior.mean) / self.prior.width
@@ -227,25 +211,42 @@ class Objective:
         return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
 
     def of(self, rows: NDArray) -> Objective:
-        """The objective of some rows."""
-        shapes = None if self.shapes is None else self.shapes.of(rows)
-        return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], shapes=shapes)
+        return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], units=self.units[rows])
 
     def without_shapes(self) -> Objective:
         """The objective of frequencies alone."""
-        return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], shapes=None)
+        return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], units=self.units[:, :, :0])
 
     def with_modes(self, order: NDArray) -> Objective:
         """The objective with the measured modes in another order."""
-        shapes = None if self.shapes is None else self.shapes.with_modes(order)
         n_modes, n_observations = self.log_measured.shape[1], self.noise.shape[1]
         later = np.arange(n_modes, n_observations).reshape(n_modes, -1)[order]
         noise = self.noise[:, np.append(order, later)]
-        return replace(self, log_measured=self.log_measured[:, order], noise=noise, shapes=shapes)
+        return replace(self, log_measured=self.log_measured[:, order], noise=noise, units=self.units[:, order])
+
+
+class Rows:
+    """Arrays of the same rows, and further objects of the same rows."""
+
+    def of(self, rows: NDArray) -> Self:
+        return type(self)(*(part.of(rows) if isinstance(part, Rows) else part[rows] for part in vars(self).values()))
+
+    def put(self, rows: NDArray, other: Self) -> None:
+        for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
+            if isinstance(mine, Rows):
+                mine.put(rows, theirs)
+            else:
+                mine[rows] = theirs
+
+    @classmethod
+    def together(cls, parts: Sequence[Self]) -> Self:
+        """The rows of all parts, one after the other."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(type(c[0]).together(c) if isinstance(c[0], Rows) else np.concatenate(c) for c in columns))
 
 
 @dataclass
-class Local:
+class Local(Rows):
     """An `Objective` at ln theta = x, row by row, with residuals and derivatives of the observations."""
 
     x: Array
@@ -289,19 +290,6 @@ class Local:
         value = self.value - self.gain(step)
         return replace(self, x=self.x + step, value=value, residual=np.where(missing, 0.0, residual))
 
-    def put(self, rows: NDArray, other: Local) -> None:
-        """Replace some rows."""
-        for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
-            mine[rows] = theirs
-
-    def beside(self, other: Local) -> Local:
-        """These rows, and then others."""
-        return Local(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)))
-
-    def of(self, rows: NDArray) -> Local:
-        """Some rows."""
-        return Local(*(values[rows] for values in vars(self).values()))
-
 
 SMALL_STEP = 1e-6  # a Gauss-Newton step of ln theta that counts as none
 SMALL_SHARE = 0.001
@@ -323,7 +311,7 @@ CLOSE = 0.1  # difference of ln f up to which two neighbouring modes may have cr
 
 
 @dataclass
-class Refined:
+class Refined(Rows):
     """Where the steps of each row have ended, whether it has converged or stalled, and how often models were solved."""
 
     local: Local
@@ -332,62 +320,48 @@ class Refined:
     solves: NDArray[np.intp]
     full_solves: NDArray[np.intp]
 
-    def of(self, rows: NDArray) -> Refined:
-        """Some rows."""
-        return Refined(self.local.of(rows), *(state[rows] for state in self._states))
-
-    def put(self, rows: NDArray, other: Refined) -> None:
-        """Replace some rows."""
-        self.local.put(rows, other.local)
-        for mine, theirs in zip(self._states, other._states, strict=True):
-            mine[rows] = theirs
-
-    def beside(self, other: Refined) -> Refined:
-        """These rows, and then others."""
-        states = zip(self._states, other._states, strict=True)
-        return Refined(self.local.beside(other.local), *(np.append(*pair) for pair in states))
-
-    @property
-    def _states(self) -> tuple[NDArray, ...]:
-        return self.converged, self.stalled, self.solves, self.full_solves
-
 
 def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
 
-    Rows that stall where a model that sorts its modes has kinks start again beyond; rows with a large misfit, where two
-    modes exchange their shapes, start again at the estimate from frequencies alone.
+    Rows that stall where a model that sorts its modes has kinks start again beyond, and so do those with a misfit, if
+    two modes are exchanged there; rows with a large misfit, where two modes exchange their shapes, start again at the
+    estimate from frequencies alone.
     """
     found = minimise(objective, start, n_steps)
 
-    def again(rows: NDArray[np.intp], beyond: Array) -> None:
-        there = minimise(objective.of(rows), beyond, n_steps)
+    def again(rows: NDArray[np.intp], start: Array | Local) -> None:
+        there = minimise(objective.of(rows), start, n_steps)
         there.solves += found.solves[rows]
         better = there.local.value < found.local.value[rows]
         found.solves[rows] = there.solves
         found.put(rows[better], there.of(better))
 
+    def doubtful(misfit: float) -> NDArray[np.intp]:
+        return np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > misfit))
+
     for lower in range(objective.log_measured.shape[1] - 1 if sorts else 0):
-        doubtful = ~found.converged | (normalised_misfit(objective, found.local) > SOME_MISFIT)
-        rows = np.flatnonzero(doubtful & (np.abs(gap(objective, found.local, lower)) < CLOSE))
+        rows = doubtful(SOME_MISFIT)
+        rows = rows[np.abs(gap(objective.of(rows), found.local.of(rows), lower)) < CLOSE]
         if rows.size:
-            again(rows, across(objective.of(rows), found.local.of(rows), lower))
-    if sorts:
-        rows = np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > LARGE_MISFIT))
-        if rows.size:
-            again(rows, np.tile(objective.prior.mean, (len(rows), 1)))
-    if objective.shapes is not None:
-        rows = np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > LARGE_MISFIT))
-        if rows.size:
-            again(rows, minimise(objective.of(rows).without_shapes(), start[rows], n_steps).local.x)
+            here, some = found.local.of(rows), objective.of(rows)
+            beyond = some.at(across(some, here, lower))
+            goes_on = ~found.converged[rows] | exchanged(here, beyond, lower)
+            found.solves[rows[~goes_on]] += 1
+            if goes_on.any():
+                again(rows[goes_on], beyond.of(goes_on))
+    if sorts and (rows := doubtful(LARGE_MISFIT)).size:
+        again(rows, np.tile(objective.prior.mean, (len(rows), 1)))
+    if objective.n_sensors and (rows := doubtful(LARGE_MISFIT)).size:
+        again(rows, minimise(objective.without_shapes().of(rows), start[rows], n_steps).local.x)
     return found
 
 
-def minimise(objective: Objective, start: Array, n_steps: int) -> Refined:
-    """Levenberg-Marquardt steps from each start."""
-    found = objective.at(start.copy())
-    converged, damping = np.zeros(len(start), dtype=bool), np.zeros(len(start))
-    solves = np.ones(len(start), dtype=np.intp)
+def minimise(objective: Objective, start: Array | Local, n_steps: int) -> Refined:
+    """Levenberg-Marquardt steps from each start, ln theta or the objective there."""
+    found = start if isinstance(start, Local) else objective.at(start.copy())
+    converged, damping = np.zeros(len(found.x), dtype=bool), np.zeros(len(found.x))
+    solves = np.ones(len(found.x), dtype=np.intp)
     active = np.flatnonzero(np.isfinite(found.value))
     for remaining in range(n_steps, -1, -1):
         here, problem = found.of(active), objective.of(active)
@@ -436,10 +410,20 @@ def gap(objective: Objective, found: Local, lower: int) -> Array:
 
 def across(objective: Objective, found: Local, lower: int) -> Array:
     """One Gauss-Newton step that aims at the measured modes ``lower`` and ``lower + 1`` in exchanged order."""
-    order = np.arange(objective.log_measured.shape[1])
+    n_modes = objective.log_measured.shape[1]
+    order = np.arange(n_modes)
     order[[lower, lower + 1]] = order[[lower + 1, lower]]
-    here = objective.with_modes(order).at(found.x)
+    fitted = np.exp(objective.log_measured - found.residual[:, :n_modes]), found.sensitivity[:, :n_modes]
+    here = replace(objective.without_shapes().with_modes(order), linearise=lambda theta: fitted).at(found.x)
     return here.x + here.step(objective.prior, np.zeros(len(here.x)))
+
+
+def exchanged(before: Local, after: Local, lower: int) -> NDArray[np.bool_]:
+    """Whether the modes ``lower`` and ``lower + 1`` have each other's derivatives afterwards, as beyond a crossing."""
+    pair = slice(lower, lower + 2)
+    mine, others = before.sensitivity[:, pair], before.sensitivity[:, pair][:, ::-1]
+    same, other = (((after.sensitivity[:, pair] - one) ** 2).sum(axis=(1, 2)) for one in (mine, others))
+    return other < same
 
 
 SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
@@ -629,9 +613,9 @@ class Refinement:
         prior, frequencies = self.prior, inputs[:, : len(self.noise)]
         gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
         noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT))
-        shapes = None if self.shapes is None else MeasuredShapes(self.shapes.unit_shapes(inputs))
-        observed = np.log(frequencies), self._with_shapes(noise)
-        objective = Objective(self._by(self.simulator.approximate), *observed, prior, shapes)
+        units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
+        linearise = self._by(self.simulator.approximate)
+        objective = Objective(linearise, np.log(frequencies), self._with_shapes(noise), prior, units)
         start = np.clip(np.where(np.isnan(guess), prior.mean, np.log(guess)), prior.lowest, prior.highest)
         if self.surface is not None:
             start = minimise(replace(objective, linearise=self.surface.linearise), start, STEPS_ON_SURFACE).local.x
@@ -652,7 +636,7 @@ class Refinement:
         new = np.flatnonzero(place < 0)
         if new.size:
             place[new] = len(known_inputs) + np.arange(new.size)
-            found = found.beside(self._refine(objective.of(new), start[new]))
+            found = Refined.together([found, self._refine(objective.of(new), start[new])])
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
@@ -661,7 +645,7 @@ class Refinement:
         blocks = np.split(np.arange(len(start)), range(size, len(start), size))
         refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
         parts = with_progress(refined, len(start), None, count=lambda part: len(part.converged), unit="records")
-        return reduce(Refined.beside, parts)
+        return Refined.together([*parts])
 
     def _refine_block(self, objective: Objective, start: Array) -> Refined:
         """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
