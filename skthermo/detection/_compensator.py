@@ -75,7 +75,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single target is
         fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
-        Names of the frequency columns in a frame, or their positions counted from 0, in the order of the output.
+        Names of the frequency columns in a frame, or their positions counted from 0.
     cv : "contiguous", int, cross-validation splitter or iterable, default=None
         Folds by which the baseline is predicted:
 
@@ -102,11 +102,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     block_ : timedelta64, int or None
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
-        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and their
-        standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
+        What each of the other columns shows, given any others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     spread_ : object
         Covariance of the residuals, by weather with "auto" and "local". ``spread_.smoothing`` says over how many
-        records of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        records it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int

@@ -173,32 +173,29 @@ class FitReport(SavesFrames):
     outside : Series
         Share of rows outside, by parameter.
     deviations : Series
-        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
-        from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
-        determine a parameter.
+        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound);
+        infinite where the modes do not determine a parameter.
     errors : DataFrame
-        MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
+        In-sample MAPE of the chain and of the training mean, by mode, in percent.
     n_scored : int
         Number of rows used for ``errors``, spread evenly over the training rows.
     n_unconverged : int or None
         Rows whose parameters have not converged in refining; None without refining.
     n_by_full_model, n_full_solves : int
         Rows whose refined parameters are outside the box of the reduced model, and how often the full model was solved
-        for them; 0 without a reduced model.
+        for them.
     round_trip : Series or None
-        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
-        where the inverse does not give it.
+        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent.
     scatter : Series or None
         Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
     variation : DataFrame or None
-        By mode, in percent: ``noise``, the standard deviation of the records about a regression on their weather, out
-        of fold; ``weather``, the standard deviation of what the weather does to the FE model's frequencies; and
-        ``discrepancy``, its root mean square over the training records.
+        By mode, in percent: ``noise`` of the records, ``weather``, the standard deviation of what it does to the FE
+        model's frequencies, and ``discrepancy``, its root mean square over the training records.
     findings : RecordFindings or None
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
-        With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
-        records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
+        With a mapper that has learned from a fleet: lowest and highest value of each input in these records and in the
+        fleet's.
     follows : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
