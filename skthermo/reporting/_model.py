@@ -133,7 +133,7 @@ def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _doubts(report: FitReport) -> list[str]:
     """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
-    found = [*([] if report.findings is None else report.findings.warnings()), *report.warnings()]
+    found = [*report.findings.warnings(), *report.warnings()]
     doubts += [f"{text[0].upper()}{text[1:]}." for text in (warning.args[0] for warning in found)]
     for name, deviation in report.deviations.items():
         if not deviation < LARGE_DEVIATION:

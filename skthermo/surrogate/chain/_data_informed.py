@@ -290,28 +290,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             `~skthermo.preprocessing.check_records` finds.
         """
         T, F = self._read_records(X, y)
-        tolerance(self.model, self.reduce)
-        self.mode_names_ = column_names(F, "f")
-        self.parameter_names_ = list(self.model.parameter_names)
-        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
-        inverse = ChainInverse(self.inverse_)
-        surrogate = next(iter(inverse.surrogates), None)
-        self.box_ = None if surrogate is None else Box.of(surrogate.bounds, self.parameter_names_)
-        if shapes is None and inverse.shape_inputs is not None:
-            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
+        inverse = self._begin(F, shapes)
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
-        findings = findings_of(self._findings, T, F, mended=mended)
-        warn_each(misplaced_columns(T, F))
-        warn_each(mode_warnings(self.model, F))
-        self.sensors_ = SensorRegression.of(T)
-        filled = frame_like(T, self.sensors_.fill(T)[0])
-        usable = without_outliers(findings, F)
-        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
-        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
-            self.mapper_ = make_pipeline(means, self.mapper_)
+        findings = self._look_at(T, F)
+        filled, usable = frame_like(T, self.sensors_.fill(T)[0]), without_outliers(findings, F)
         stages = Stages(self, 5, X, y)
         with stages.stage("noise"):
             self.noise_ = measurement_noise(self.mapper_, filled, usable)
@@ -322,32 +306,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with stages.stage("temperature mapper", self.mapper_):
             fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
-            inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-            known = getattr(surrogate, "simulator_", None)
-            simulator = Simulator.around(self.model, learned, self.reduce, known)
-            records = TrainingRecords(
-                temperatures=T,
-                frequencies=F,
-                inputs=as_floats(inputs),
-                targets=estimates.theta,
-                learned=learned,
-                usable=as_floats(usable),
-                modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
-                weights=weights,
-                parameter_names=self.parameter_names_,
-            )
-            thermal = ThermalModel(
-                mapper=self.mapper_,
-                simulator=simulator,
-                aligner=self.aligner_,
-                discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
-                sensors=self.sensors_,
-                training_range=TrainingRange.of(inputs, records.trained),
-                parameter_names=self.parameter_names_,
-                mode_names=self.mode_names_,
-                n_jobs=self.n_jobs,
-            )
-            self._hold(thermal, RecordSimulator(thermal, records))
+            self._learn_discrepancy(inverse, T, F, filled, usable, estimates.theta, weights)
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -430,7 +389,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
         learned = possible(mapper.predict(filled))[0]
         records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
-        discrepancy = self.discrepancy_.again(records.inputs, records.ratios, records.weights, mapper)
+        discrepancy = self.discrepancy_.again(records.ratios, mapper)
         thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
         return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.recorder_.service))
 
@@ -864,6 +823,30 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         gross_errors(T, F, model=self.model).refuse_meaningless()
         return T, F
 
+    def _begin(self, F: Table, shapes: ArrayLike | None) -> ChainInverse:
+        """Clone the parts for frequencies and, perhaps, shapes; the inverse."""
+        tolerance(self.model, self.reduce)
+        self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
+        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
+        inverse = ChainInverse(self.inverse_)
+        bounds = [part.bounds for part in inverse.surrogates]
+        self.box_ = Box.of(bounds[0], self.parameter_names_) if bounds else None
+        if shapes is None and inverse.shape_inputs is not None:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
+        return inverse
+
+    def _look_at(self, T: Table, F: Table) -> RecordFindings:
+        """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
+        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
+        findings = findings_of(self._findings, T, F, mended=mended)
+        warn_each(misplaced_columns(T, F))
+        warn_each(mode_warnings(self.model, F))
+        self.sensors_ = SensorRegression.of(T)
+        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
+        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
+            self.mapper_ = make_pipeline(means, self.mapper_)
+        return findings
+
     def _findings(self, T: Table, F: Table) -> RecordFindings:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
@@ -881,6 +864,37 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         if shapes is not None:
             warn_each(inverse.shape_warnings(aligned))
         return aligned
+
+    def _learn_discrepancy(
+        self, inverse: ChainInverse, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Any
+    ) -> None:
+        """Learn what the model cannot follow, and hold all that predicts."""
+        inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
+        known = next((getattr(part, "simulator_", None) for part in inverse.surrogates), None)
+        simulator = Simulator.around(self.model, learned, self.reduce, known)
+        records = TrainingRecords(
+            temperatures=T,
+            frequencies=F,
+            inputs=as_floats(inputs),
+            targets=theta,
+            learned=learned,
+            usable=as_floats(usable),
+            modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
+            weights=weights,
+            parameter_names=self.parameter_names_,
+        )
+        thermal = ThermalModel(
+            mapper=self.mapper_,
+            simulator=simulator,
+            aligner=self.aligner_,
+            discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
+            sensors=self.sensors_,
+            training_range=TrainingRange.of(inputs, records.trained),
+            parameter_names=self.parameter_names_,
+            mode_names=self.mode_names_,
+            n_jobs=self.n_jobs,
+        )
+        self._hold(thermal, RecordSimulator(thermal, records))
 
     def _hold(self, thermal: ThermalModel, recorder: RecordSimulator) -> Self:
         """Hold what was learned, and its parts by the names that users know."""

@@ -186,12 +186,12 @@ class FitReport(SavesFrames):
         for them.
     round_trip : Series or None
         Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent.
-    scatter : Series or None
+    scatter : Series
         Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
-    variation : DataFrame or None
+    variation : DataFrame
         By mode, in percent: ``noise`` of the records, ``weather``, the standard deviation of what it does to the FE
         model's frequencies, and ``discrepancy``, its root mean square over the training records.
-    findings : RecordFindings or None
+    findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
         With a mapper that has learned from a fleet: lowest and highest value of each input in these records and in the
@@ -224,16 +224,16 @@ class FitReport(SavesFrames):
     deviations: pd.Series
     errors: pd.DataFrame
     n_scored: int
-    n_unconverged: int | None = None
-    n_by_full_model: int = 0
-    n_full_solves: int = 0
-    round_trip: pd.Series | None = None
-    scatter: pd.Series | None = None
-    variation: pd.DataFrame | None = None
-    findings: RecordFindings | None = None
-    fleet: pd.DataFrame | None = None
-    follows: Mapping[Any, float] | None = None
-    solved: str = ""
+    n_unconverged: int | None
+    n_by_full_model: int
+    n_full_solves: int
+    round_trip: pd.Series | None
+    scatter: pd.Series
+    variation: pd.DataFrame
+    findings: RecordFindings
+    fleet: pd.DataFrame | None
+    follows: Mapping[Any, float] | None
+    solved: str
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -244,8 +244,7 @@ class FitReport(SavesFrames):
         return text + self._modes().to_html() + self._parameters().to_html()
 
     def _sentences(self) -> list[str]:
-        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
-        lines += [self.solved] if self.solved else []
+        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper.", self.solved]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         lines += [
             f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
@@ -277,9 +276,9 @@ class FitReport(SavesFrames):
         if self.follows is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
             lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
-        if self.findings is not None and getattr(self.findings.memory, "features", None) is not None:
+        if getattr(self.findings.memory, "features", None) is not None:
             lines.append(self.findings.memory.summary())
-        if self.findings is not None and len(self.findings.table):
+        if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.n_scored} rows spread evenly over the training rows."]
 
@@ -300,9 +299,7 @@ class FitReport(SavesFrames):
 
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
-        table = table.join(self.errors.round(3).add_suffix(" (%)"))
-        if self.variation is not None:
-            table = table.join(self.variation.round(3).add_suffix(" (%)"))
+        table = table.join([part.round(3).add_suffix(" (%)") for part in (self.errors, self.variation)])
         if self.round_trip is not None:
             table = table.assign(**{"round trip (%)": self.round_trip.round(3) + 0.0})  # not -0.0
         return table
@@ -389,7 +386,7 @@ class FitReport(SavesFrames):
         )
 
     def _many_outliers(self) -> Iterator[SkthermoWarning]:
-        far = np.zeros(0, dtype=bool) if self.findings is None else self.findings.outliers.to_numpy()
+        far = self.findings.outliers.to_numpy()
         if far.sum() <= MANY_OUTLIERS * far.size:
             return
         yield RecordsWarning(
@@ -399,8 +396,6 @@ class FitReport(SavesFrames):
         )
 
     def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
-        if self.variation is None:
-            return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
         modes = ", ".join(
