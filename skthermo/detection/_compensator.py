@@ -371,13 +371,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
-        outside = reach.warning(inputs)
-        if outside:
-            warn_user(outside, WeatherWarning, "outside-training-weather")
+        warn_user(reach.warning(inputs), WeatherWarning, "outside-training-weather")
         warn_of_fleet(self.regression_.from_fleet(filled), "Their residuals count less, by that uncertainty")
-        apart = self.sensors_.warning(temperatures)
-        if apart:
-            warn_user(apart, RecordsWarning, "sensor-disagrees")
+        warn_user(self.sensors_.warning(temperatures), RecordsWarning, "sensor-disagrees")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -526,8 +522,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     filled, deviations = sensors.fill(temperatures)
     consequence = "The spread of residuals includes the error of that"
     message = filled_text(deviations, column_names(temperatures, "x"), consequence)
-    if message:
-        warn_user(message, RecordsWarning, "filled-temperatures")
+    warn_user(message, RecordsWarning, "filled-temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -536,8 +531,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     unknown = np.isnan(predicted).all(axis=1)
     others = "for which the estimator predicts nothing, such as those with lags that reach to no record"
     message = unpredicted_text(unknown & ~explained_rows(predicted), weather, others)
-    if message:
-        warn_user(message, UnevaluatedRowsWarning, "not-predicted")
+    warn_user(message, UnevaluatedRowsWarning, "not-predicted")
     return unknown
 
 

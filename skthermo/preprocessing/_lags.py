@@ -122,9 +122,9 @@ class LagFeatures(PastFeatures):
                     )
         else:
             self.freq_ = _most_frequent_step(stamps) if self.freq is None else as_duration(self.freq, "freq")
-            self.tolerance_ = (
-                DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else as_duration(self.tolerance, "tolerance")
-            )
+            self.tolerance_ = DEFAULT_TOLERANCE * self.freq_
+            if self.tolerance is not None:
+                self.tolerance_ = as_duration(self.tolerance, "tolerance", may_be_zero=True)
             if max(self.lags_) > LONGEST_LAG / self.freq_:
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"

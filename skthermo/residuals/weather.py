@@ -102,8 +102,7 @@ def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: s
                 f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}. "
                 f"{consequence}. Train on a whole year, in folds that each have all seasons, such as blocks of a week"
             )
-    if text:
-        warn_user(text, WeatherWarning, "weather-of-one-fold")
+    warn_user(text, WeatherWarning, "weather-of-one-fold")
 
 
 @dataclass(frozen=True)

@@ -80,42 +80,16 @@ class FittedChain(Protocol):
         """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
 
     def weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them."""
 
     def predict(self, X: ArrayLike) -> Table:
-        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them."""
 
     def predict_parameters(self, X: ArrayLike) -> Table:
-        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them."""
 
     def simulate(self, X: ArrayLike, **options: Any) -> Table:
-        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        **options : dict
-            Damage, noise, gaps and outliers.
-        """
+        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them."""
 
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero

@@ -15,7 +15,7 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
+from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import (
     HUGE,
     Array,
@@ -397,7 +397,7 @@ class ThermalModel(SavesFrames):
 
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
-        warn_each(self._warnings(weather))
+        self._warn_of(weather)
         theta, impossible = possible(self.mapper.predict(weather.filled))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
@@ -410,25 +410,18 @@ class ThermalModel(SavesFrames):
             )
         return theta
 
-    def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
-        """Warnings about what is unusual about weather."""
+    def _warn_of(self, weather: Weather) -> None:
+        """Say what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
         consequence = "Standard deviations and intervals of predictions include the error of that"
         message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
-        if message:
-            yield RecordsWarning(message, "filled-temperatures")
-        message = unpredicted_text(unknown, as_floats(filled))
-        if message:
-            yield UnevaluatedRowsWarning(message, "not-predicted")
+        warn_user(message, RecordsWarning, "filled-temperatures")
+        warn_user(unpredicted_text(unknown, as_floats(filled)), UnevaluatedRowsWarning, "not-predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
-        message = learned.warning(inputs)
-        if message:
-            yield WeatherWarning(message, "outside-training-weather")
+        warn_user(learned.warning(inputs), WeatherWarning, "outside-training-weather")
         consequence = "Standard deviations and intervals include that uncertainty"
         warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
-        message = self.sensors.warning(weather.given)
-        if message:
-            yield RecordsWarning(message, "sensor-disagrees")
+        warn_user(self.sensors.warning(weather.given), RecordsWarning, "sensor-disagrees")
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""

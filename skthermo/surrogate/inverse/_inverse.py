@@ -611,5 +611,4 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         message = "" if self.box_ is None else self.box_.warning(theta, far, tested)
         if message and self.prior is not None:
             message += ", or a wider prior"
-        if message:
-            warn_user(message, ModelWarning, "outside-prior")
+        warn_user(message, ModelWarning, "outside-prior")
