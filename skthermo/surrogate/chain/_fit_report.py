@@ -402,19 +402,14 @@ class FitReport(SavesFrames):
 def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
-    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-    measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
+    measured, of_model, predicted = _in_sample(chain)
     hidden = hidden_offsets(chain.aligner_, records.frequencies)
     errors_of_means = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
-    unexplained = unexplained_offset(hidden, predicted, records.temperatures, errors_of_means)
-    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
     full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
     known, scatter = ~np.isnan(theta).any(axis=1), np.nan_to_num(robust_deviation(measured / predicted))
-    delta = chain.discrepancy_.at(records.inputs[records.trained])
-    effect = np.log(records.modelled[records.trained])
     last = last_step(chain.inverse_)
     round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
     return FitReport(
@@ -424,29 +419,41 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
         filled=filled(records.temperatures, chain.sensors_),
         offsets=mode_offsets(chain.model, records.frequencies),
         hidden_offsets=hidden,
-        unexplained_offset=unexplained,
+        unexplained_offset=unexplained_offset(hidden, of_model, records.temperatures, errors_of_means),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
         deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
         errors=pd.DataFrame(errors, index=modes),
-        n_scored=len(rows),
+        n_scored=len(measured),
         n_unconverged=estimates.n_unconverged,
         n_by_full_model=int((full_solves > 0).sum()),
         n_full_solves=int(full_solves.sum()),
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
-        variation=pd.DataFrame(
-            {
-                "noise": 100 * chain.noise_,
-                "weather": 100 * np.nanstd(effect, axis=0),
-                "discrepancy": 100 * np.sqrt((delta**2).mean(axis=0)),
-            },
-            index=modes,
-        ),
+        variation=_variation(chain),
         findings=findings,
         fleet=weather_of_fleet(chain),
         follows=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         solved=chain.simulator_.described,
+    )
+
+
+def _in_sample(chain: FittedChain) -> tuple[Array, Array, Array]:
+    """Frequencies of some training rows: measured, of the model itself, and predicted by the chain."""
+    records = chain.records_
+    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
+    of_model = chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
+    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
+    return as_floats(records.frequencies)[rows], of_model, predicted
+
+
+def _variation(chain: FittedChain) -> pd.DataFrame:
+    """What noise, the weather and the discrepancy do to each mode, in percent."""
+    records = chain.records_
+    weather = np.nanstd(np.log(records.modelled[records.trained]), axis=0)
+    discrepancy = np.sqrt((chain.discrepancy_.at(records.inputs[records.trained]) ** 2).mean(axis=0))
+    return 100 * pd.DataFrame(
+        {"noise": chain.noise_, "weather": weather, "discrepancy": discrepancy}, index=chain.mode_names_
     )
 
 
