@@ -2,10 +2,11 @@
 
 from skthermo._io._matrix_files import MASS, read_half, read_matlab, read_named_matrices
 from skthermo._io._progress import as_they_come, bars_of, run_jobs, with_progress, without_bars
-from skthermo._io._shared_files import alone_with, lock, write_when_complete
+from skthermo._io._shared_files import ReadWhenAsked, alone_with, lock, write_when_complete
 
 __all__ = [
     "MASS",
+    "ReadWhenAsked",
     "alone_with",
     "as_they_come",
     "bars_of",

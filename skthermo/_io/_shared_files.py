@@ -4,11 +4,11 @@ import os
 import shutil
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 from uuid import uuid4
 
 try:
@@ -58,6 +58,28 @@ def _has_locked(file: IO) -> bool:
     except BlockingIOError:
         return False
     return True
+
+
+class ReadWhenAsked(Mapping[Any, Any]):
+    """Objects by name, each read anew when it is asked for: a function for each does that."""
+
+    def __init__(self, readers: Mapping[Any, Callable[[], Any]]):
+        self._readers = readers
+
+    def __getitem__(self, name: Any) -> Any:
+        return self._readers[name]()
+
+    def __contains__(self, name: Any) -> bool:
+        return name in self._readers
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._readers)
+
+    def __len__(self) -> int:
+        return len(self._readers)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} objects by name, read when asked for>"
 
 
 def write_when_complete(path: Path, content: str | bytes) -> None:

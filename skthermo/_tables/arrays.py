@@ -141,7 +141,7 @@ def as_random_state(seed: Any) -> np.random.RandomState:
 
 def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """At most that many of the rows, spread evenly over them."""
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
+    return rows if len(rows) <= most else rows[np.linspace(0, len(rows) - 1, most).astype(int)]
 
 
 def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
@@ -214,6 +214,11 @@ def is_real(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
 
 
+def is_frame_of_floats(values: Any) -> bool:
+    """Whether a frame of pandas holds floats of 64 bits, and nothing else, which needs no further check of types."""
+    return hasattr(values, "iloc") and values.ndim == 2 and {*values.dtypes} == {np.dtype(float)}
+
+
 def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     """Raise an error for an array, a table or nested lists with values that are no numbers.
 
@@ -246,12 +251,16 @@ def refuse_no_table(
     """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
     whose names are not all text or all numbers; a vector may stand for a table of one column."""
     expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
-    refuse_no_array(values, what, expected)
-    refuse_no_numbers(values, what)
-    array: Any = values if hasattr(values, "dtypes") else np.asarray(values)
-    shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])
-    if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
-        raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    if is_frame_of_floats(values):
+        array: Any = values
+    else:
+        refuse_no_array(values, what, expected)
+        refuse_no_numbers(values, what)
+        array = values if hasattr(values, "dtypes") else np.asarray(values)
+        dtypes = getattr(array, "dtypes", [getattr(array, "dtype", None)])
+        if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
+            raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    shape = array.shape
     if len(shape) == 1 and or_vector:
         shape = (*shape, 1)
     if len(shape) == 1 and hasattr(values, "iloc"):
@@ -454,13 +463,16 @@ def check_jobs(n_jobs: Any) -> None:
         raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
 
 
-def check_names(names: Any, what: str) -> list[str]:
-    """Different names as a list; one text in place of several is an error."""
+def check_names(names: Any, what: str, known: Iterable[Any] | None = None) -> list[str]:
+    """Different names as a list, some of those that are known; one text in place of several is an error."""
     given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
     if len(set(given)) < len(given):
         raise ValueError(f"{what} are {given!r:.200}; expected each name once")
+    unknown = [] if known is None else [name for name in given if name not in known]
+    if unknown:
+        raise ValueError(f"{what} names {unknown!r:.200}; expected some of {list(known)}")
     return given
 
 
@@ -469,6 +481,11 @@ def check_size(value: Any, what: str, lowest: float, highest: float, expected: s
     if not is_real(value) or not lowest < float(value) < highest:
         raise ValueError(f"{what} is {value!r:.100}; expected {expected}")
     return float(value)
+
+
+def check_probability(value: Any, what: str) -> float:
+    """A probability strictly between 0 and 1."""
+    return check_size(value, what, 0, 1, "a probability between 0 and 1, such as 0.9")
 
 
 def integer_row(values: Any, what: str, expected: str = "integers in one row") -> NDArray[np.integer]:

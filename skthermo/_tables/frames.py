@@ -236,6 +236,20 @@ def check_duration(value: Any, name: str) -> pd.Timedelta:
     return pd.Timedelta(as_duration(value, name, may_be_zero=True))
 
 
+def usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
+    """Median time between records in order of time; zero for one record alone."""
+    steps = np.diff(stamps.as_unit("ns").asi8)
+    return pd.Timedelta(np.median(steps) if len(steps) else 0, "ns")
+
+
+def as_index(times: ArrayLike, zone: Any) -> pd.DatetimeIndex:
+    """Times in nanoseconds as stamps in a time zone, if there is one; missing for None."""
+    missing = np.datetime64("NaT", "ns").astype(np.int64)
+    numbers = np.array([missing if time is None else time for time in times], dtype=np.int64)
+    stamps = pd.DatetimeIndex(numbers.view("M8[ns]"))
+    return stamps.tz_localize("UTC").tz_convert(zone) if zone else stamps
+
+
 def has_stamps(T: Any) -> bool:
     """Whether rows have times: a frame on a ``DatetimeIndex``."""
     return isinstance(getattr(T, "index", None), pd.DatetimeIndex)

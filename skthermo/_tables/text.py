@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -76,9 +77,15 @@ def printable(text: Any) -> str:
     )
 
 
-def listed(names: Sequence[Any]) -> str:
+def listed(names: Sequence[Any], word: str = "and") -> str:
+    """Names in a sentence."""
     *first, last = [str(name) for name in names] or [""]
-    return f"{', '.join(first)} and {last}" if first else last
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
+def capital(text: str) -> str:
+    """A text as the beginning of a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def duration_text(wait: Any) -> str:
@@ -97,8 +104,68 @@ def duration_text(wait: Any) -> str:
     return f"{text} {unit}{'' if text == '1' else 's'}"
 
 
+def plain(value: Any) -> Any:
+    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if value is pd.NaT:
+        return None
+    if isinstance(value, pd.Timestamp | pd.Timedelta):
+        return value.isoformat() if isinstance(value, pd.Timestamp) else value.total_seconds()
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
+
+
 def period_text(index: pd.Index | None) -> str:
     """First and last day of records on an index of times; nothing for others."""
     if not isinstance(index, pd.DatetimeIndex) or not len(index):
         return ""
     return f"from {index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}"
+
+
+class Sentences(ABC):
+    """What a result says: an answer, what is not known, and remarks."""
+
+    @abstractmethod
+    def _answer(self) -> Iterator[str]: ...
+
+    def _limits(self) -> Iterator[str]:
+        yield from ()
+
+    def _remarks(self) -> Iterator[str]:
+        yield from ()
+
+    def answer(self) -> list[str]:
+        """What was found, and how surely.
+
+        Returns
+        -------
+        list of str
+            Sentences. The first says what is most probable.
+        """
+        return list(self._answer())
+
+    def limits(self) -> list[str]:
+        """What is not known.
+
+        Returns
+        -------
+        list of str
+            Sentences; none if nothing is left open.
+        """
+        return list(self._limits())
+
+    def summary(self) -> str:
+        """What was found, and what is not known.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        return "\n".join([*self._answer(), *self._limits(), *self._remarks()]).replace(SPACE, " ")

@@ -63,7 +63,6 @@ class Done:
         self.code = self.code if self.code == ALARM else FAILED
 
     def facts(self) -> dict[str, Any]:
-        """Plain values for JSON and metrics."""
         return {
             "name": self.name,
             "state": self.state,
@@ -85,17 +84,14 @@ class Bridge:
 
     @cached_property
     def settings(self) -> Settings | None:
-        """The settings, if there are any."""
         return read_settings(self.file) if self.file.suffix == ".toml" else None
 
     @property
     def name(self) -> str:
-        """Name of the bridge."""
         return self.file.stem if self.settings is None else self.settings.name
 
     @property
     def monitor_file(self) -> Path:
-        """File of the monitor."""
         return self.file if self.settings is None else self.settings.path(self.settings.files.monitor)
 
     @property
@@ -203,7 +199,6 @@ def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done,
 
 
 def fit(bridge: Bridge, done: Done) -> None:
-    """Fit a monitor to its baseline, and save it."""
     settings = _of_file(bridge)
     files = [settings.path(name) for name in settings.records.baseline]
     records, layouts = read_baseline(files, settings.csv, settings.records)
@@ -388,7 +383,6 @@ def status(bridge: Bridge, done: Done) -> None:
 
 
 def report(bridge: Bridge, done: Done) -> None:
-    """Write the page for the owner."""
     monitor = bridge.load()
     bridge.described(monitor, done)
     bridge.write_page(monitor, done)
@@ -397,54 +391,46 @@ def report(bridge: Bridge, done: Done) -> None:
 
 
 def acknowledge(bridge: Bridge, done: Done) -> None:
-    """Say what an event was, and save the monitor."""
     options = bridge.options
-    with bridge.alone():
-        monitor = bridge.load()
+
+    def said(monitor: Monitor) -> list[str]:
         monitor.acknowledge(options.event, harmless=options.harmless, note=options.note)
-        monitor.save(bridge.monitor_file)
-        kind = "harmless" if options.harmless else "damage"
-        done.lines.append(f"event {options.event} is acknowledged as {kind}")
-        bridge.described(monitor, done)
-        done.code = HEALTHY
-        bridge.append_transitions(monitor, done)
+        return [f"event {options.event} is acknowledged as {'harmless' if options.harmless else 'damage'}"]
+
+    _changed(bridge, done, said)
+
+
+def discard(bridge: Bridge, done: Done) -> None:
+    """Take back records that should not have been taken in, and save the monitor."""
+    options = bridge.options
+    _changed(bridge, done, lambda monitor: [f"records taken back: {monitor.discard(options.since, options.until)}"])
 
 
 def refit(bridge: Bridge, done: Done) -> None:
     """Learn anew from the baseline and the records since, and save the monitor."""
     options = bridge.options
-    _retrained(bridge, done, lambda monitor: monitor.refit(until=options.until, force=options.force))
+    _changed(bridge, done, lambda monitor: monitor.refit(until=options.until, force=options.force))
 
 
 def rebaseline(bridge: Bridge, done: Done) -> None:
     """Begin a new baseline after a repair, and save the monitor."""
     options = bridge.options
-    _retrained(bridge, done, lambda monitor: monitor.rebaseline(options.since, until=options.until))
+    _changed(bridge, done, lambda monitor: monitor.rebaseline(options.since, until=options.until))
 
 
-def _retrained(bridge: Bridge, done: Done, retrain: Callable[[Monitor], Retraining]) -> None:
+def _changed(bridge: Bridge, done: Done, change: Callable[[Monitor], list[str] | Retraining]) -> None:
+    """Change the monitor and save it, unless that was refused; say what was changed, and how things stand."""
     with bridge.alone():
         monitor = bridge.load()
-        retraining = retrain(monitor)
-        if retraining.accepted:
+        said = change(monitor)
+        refused = isinstance(said, Retraining) and not said.accepted
+        if not refused:
             monitor.save(bridge.monitor_file)
-        done.lines += retraining.summary().splitlines()
+        done.lines += said.summary().splitlines() if isinstance(said, Retraining) else said
         bridge.described(monitor, done)
         done.code = HEALTHY
-        if not retraining.accepted:
-            done.failed(ValueError(f"the {retraining.kind} was refused, and the monitor is as it was before"))
-        bridge.append_transitions(monitor, done)
-
-
-def discard(bridge: Bridge, done: Done) -> None:
-    """Take back records that should not have been taken in, and save the monitor."""
-    with bridge.alone():
-        monitor = bridge.load()
-        number = monitor.discard(bridge.options.since, bridge.options.until)
-        monitor.save(bridge.monitor_file)
-        done.lines.append(f"records taken back: {number}")
-        bridge.described(monitor, done)
-        done.code = HEALTHY
+        if refused:
+            done.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
         bridge.append_transitions(monitor, done)
 
 

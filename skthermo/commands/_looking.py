@@ -58,7 +58,6 @@ class Look:
 
 
 def look_at(file: Path, zone: str | None = None) -> Look:
-    """Find the form of a file and read it."""
     if not file.is_file():
         raise FileNotFoundError(f"there is no file {str(file)!r}; expected a CSV or parquet file with records")
     if file.suffix.lower() in PARQUET:
@@ -159,7 +158,6 @@ def _divided(text: str) -> tuple[str, str, list[tuple[int, list[str]]]]:
 
 
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Share of cells that are numbers, of those with a value."""
     given = [cell for cell in cells if cell.lower() not in MISSING]
     return sum(_is_number(cell, decimal) for cell in given) / len(given) if given else 0.0
 
@@ -221,5 +219,4 @@ def _no_measurements(records: pd.DataFrame) -> Iterator[tuple[str, str]]:
 
 
 def is_in_kelvin(column: pd.Series) -> bool:
-    """Whether values can only be temperatures in kelvin."""
     return bool(column.between(*KELVIN).mean() > MOSTLY)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from skthermo._io import write_when_complete
+from skthermo._tables.text import plain
 
 STATES = ("healthy", "watch", "alarm", "not evaluated")
 GAUGES = {
@@ -35,23 +34,7 @@ GAUGES = {
 KINDS = ("damage", "watch", "stiffening", "measurement or structure")
 
 
-def plain(value: Any) -> Any:
-    """A value as JSON has it: times as texts of ISO 8601, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(name): plain(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    if isinstance(value, pd.Timestamp) or value is pd.NaT:
-        return None if pd.isna(value) else value.isoformat()
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
-
-
 def as_json(facts: Mapping[str, Any]) -> str:
-    """Facts as text of JSON."""
     return json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False)
 
 

@@ -13,11 +13,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 import skthermo
 from skthermo._io import write_when_complete
+from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
 from skthermo.commands._choice import Candidate, candidates
 from skthermo.commands._looking import Look, is_in_kelvin, look_at
@@ -46,6 +46,17 @@ FEATURES = {
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
 WIDTH = 110  # of comments
+OTHERS = """
+# An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives one,
+# or a folder of matrices that another program exported. Other settings are those of DataInformedFEM.
+# [fem]
+# model = "model.py:make_model"
+# random_state = 0
+
+# The page for the owner.
+# [page]
+# title = "Bridge over the river"
+# drift_limit = 0.1"""
 
 
 @dataclass(frozen=True)
@@ -105,12 +116,9 @@ class Proposal:
 
     @property
     def step(self) -> pd.Timedelta:
-        """Usual time between records."""
-        steps = np.diff(self.baseline.index.as_unit("ns").asi8)
-        return pd.Timedelta(int(np.median(steps)) if len(steps) else 0, "ns")
+        return usual_step(self.baseline.index)
 
     def account(self) -> Iterator[str]:
-        """What was found in the files."""
         for look in self.looks:
             form, index = look.form, look.records.index
             is_csv = look.file.suffix.lower() not in PARQUET
@@ -199,7 +207,7 @@ class Proposal:
         ]
         parts += [_comment("Found in the records:"), *(_comment(f"- {one}") for one in found)]
         parts += [_section(*call) for call in calls]
-        parts += [_fem(), _page()]
+        parts.append(OTHERS)
         return "\n".join(parts) + "\n"
 
 
@@ -269,38 +277,12 @@ def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) 
     return "\n".join(lines)
 
 
-def _fem() -> str:
-    lines = [
-        "",
-        _comment(
-            "An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives "
-            "one, or a folder of matrices that another program exported. Other settings are those of DataInformedFEM."
-        ),
-        "# [fem]",
-        '# model = "model.py:make_model"',
-        "# random_state = 0",
-    ]
-    return "\n".join(lines)
-
-
-def _page() -> str:
-    lines = [
-        "",
-        _comment("The page for the owner."),
-        "# [page]",
-        '# title = "Bridge over the river"',
-        "# drift_limit = 0.1",
-    ]
-    return "\n".join(lines)
-
-
 def _comment(text: str, sign: str = "# ") -> str:
     lines = textwrap.wrap(text, WIDTH, initial_indent=sign, subsequent_indent=sign, break_long_words=False)
     return "\n".join(lines)
 
 
 def toml(value: Any) -> str:
-    """A value as TOML has it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, Mapping):

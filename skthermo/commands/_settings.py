@@ -96,7 +96,6 @@ class Records:
 
     @property
     def columns(self) -> list[str]:
-        """All columns that are used."""
         return [*self.temperatures, *self.reference, *self.responses]
 
 
@@ -108,22 +107,7 @@ class Setting(NamedTuple):
 
     @property
     def is_required(self) -> bool:
-        """Whether it has no default."""
         return self.default is inspect.Parameter.empty
-
-
-def page_maker() -> Callable[..., Any]:
-    """What writes pages; drawings are not needed by other commands."""
-    from skthermo.reporting import owner_report
-
-    return owner_report
-
-
-def chain_maker() -> Callable[..., Any]:
-    """The chain of an FE model, which few monitors need."""
-    from skthermo.surrogate import DataInformedFEM
-
-    return DataInformedFEM
 
 
 SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
@@ -132,10 +116,13 @@ SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = 
     "csv": (lambda: CsvFormat, ()),
     "compensator": (lambda: TemperatureCompensator, ("estimator", "targets")),
     "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
-    "fem": (chain_maker, ("inverse", "mapper", "imputer")),
-    "page": (page_maker, ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now")),
+    "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
+    "page": (
+        lambda: import_module("skthermo.reporting").owner_report,
+        ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now"),
+    ),
 }
-"""What each section calls, and which parameters come from elsewhere."""
+"""What each section calls, imported when it is needed, and which parameters come from elsewhere."""
 
 CLASSES: dict[str, tuple[str, ...]] = {
     "features": ("skthermo.preprocessing", "sklearn"),
@@ -192,7 +179,6 @@ class Settings:
 
     @property
     def name(self) -> str:
-        """Name of the bridge."""
         return self.files.name or self.file.resolve().parent.name
 
     @property
@@ -230,7 +216,7 @@ class Settings:
         options = dict(self.options["fem"])
         if not options:
             return None
-        return chain_maker()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+        return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
 
 
 def _model(path: Path, settings: Path) -> Any:
@@ -251,7 +237,6 @@ def _model(path: Path, settings: Path) -> Any:
 
 
 def read_settings(file: Path) -> Settings:
-    """Read and check a file of settings; errors name the line."""
     return _Reader.of(file).settings()
 
 
@@ -274,7 +259,6 @@ class _Reader:
             raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
 
     def settings(self) -> Settings:
-        """All that the file says."""
         known = [*SECTIONS, *CLASSES]
         for name, given in self.content.items():
             is_list, wants_list = isinstance(given, list), name == "features"

@@ -28,7 +28,7 @@ import logging
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -37,6 +37,8 @@ from typing import Any, NoReturn
 import pandas as pd
 
 import skthermo
+from skthermo._io import ReadWhenAsked
+from skthermo._tables.text import capital
 from skthermo.commands import _bridge
 from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt
 from skthermo.commands._outputs import as_json, write_metrics
@@ -53,7 +55,6 @@ class Parser(argparse.ArgumentParser):
     """A parser whose exit code for wrong arguments is not that of a monitor that was not evaluated."""
 
     def error(self, message: str) -> NoReturn:
-        """Print usage and message, and end the program."""
         self.print_usage(sys.stderr)
         self.exit(FAILED, f"error: {message}\n")
 
@@ -62,12 +63,10 @@ class Spoken(logging.Formatter):
     """Messages as lines such as "warning: text"."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The level in small letters, and the text."""
         return f"{record.levelname.lower()}: {record.getMessage()}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; its exit code."""
     options = _parser().parse_args(arguments)
     facts: dict[str, Any] = {"skthermo": skthermo.__version__, "command": options.name, "exit_code": FAILED}
     facts |= {"time": pd.Timestamp.now("UTC"), "bridges": [], "fleet": None, "findings": None, "settings": None}
@@ -119,10 +118,10 @@ def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
             handler.close()
 
 
-def _complain(error: Exception) -> None:
+def _complain(error: Exception, what: str = "") -> None:
     if not isinstance(error, EXPLAINED):
         traceback.print_exception(error)
-    logger.error("%s", error)
+    logger.error("%s%s", what, error)
 
 
 def _parser() -> Parser:
@@ -131,7 +130,7 @@ def _parser() -> Parser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, text: str, command: Callable[..., int]) -> argparse.ArgumentParser:
-        one = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        one = commands.add_parser(name, help=text, description=f"{capital(text)}.")
         one.set_defaults(command=command, name=name, metrics=None, now=None, report=None, title=None)
         one.add_argument("--json", action="store_true", help="print JSON in place of text")
         one.add_argument("--log", type=Path, metavar="FILE", help="append warnings, errors and what was done")
@@ -160,7 +159,6 @@ def _parser() -> Parser:
 
 
 def _on_records(one: argparse.ArgumentParser) -> None:
-    """Options of commands that look at files of records."""
     one.add_argument("files", nargs="+", type=Path, help="T.csv F.csv, or one file with all columns")
     one.add_argument("--temperatures", nargs="+", metavar="COLUMN", help="by default as files or names tell")
     one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
@@ -170,7 +168,6 @@ def _on_records(one: argparse.ArgumentParser) -> None:
 
 
 def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
-    """Options of commands on monitors."""
     many = {} if name in OF_ONE else {"nargs": "+"}
     what = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
     one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
@@ -187,7 +184,6 @@ def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
 
 
 def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
-    """Options of single commands."""
     parsers["fit"].add_argument("--replace", action="store_true", help="fit anew; the old monitor is kept beside")
     update = parsers["update"]
     update.add_argument("--separator", help="between values of a CSV file (default: as the settings say, or a comma)")
@@ -208,7 +204,6 @@ def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
 
 
 def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Do the work of a command on each bridge; the exit code of all."""
     given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
     files = [file for file in given if file.suffix in MONITORS]
     records = [file for file in given if file.suffix not in MONITORS]
@@ -258,7 +253,6 @@ def _for_one(options: argparse.Namespace, number: int) -> argparse.Namespace:
 
 
 def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:
-    """Print what a command says of a bridge, and its errors."""
     where = f"{done.name}: " if number > 1 else ""
     if not options.json and done.lines:
         print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
@@ -280,7 +274,7 @@ def _as_fleet(
     """Say which alarms are significant among those of several bridges, and write their page; the exit code."""
     from skthermo.fleet import Fleet  # a job of one bridge needs none
 
-    loaded = {one.name: bridge for bridge, one in zip(bridges, done, strict=True) if one.state is not None}
+    loaded = {one.name: bridge.load for bridge, one in zip(bridges, done, strict=True) if one.state is not None}
     if len(loaded) + sum(one.state is None for one in done) < len(done):
         raise ValueError(
             f"bridges are called {[one.name for one in done]}; expected another name for each, as in [files]"
@@ -304,33 +298,14 @@ def _as_fleet(
     return code
 
 
-class ReadWhenAsked(Mapping[str, Any]):
-    """Monitors by name, each read from its file when it is asked for."""
-
-    def __init__(self, bridges: Mapping[str, Bridge]):
-        self._bridges = bridges
-
-    def __getitem__(self, name: str) -> Any:
-        return self._bridges[name].load()
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._bridges)
-
-    def __len__(self) -> int:
-        return len(self._bridges)
-
-
 def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> int:
     """Say that something beside the monitors failed; the exit code, which stays that of an alarm."""
-    if not isinstance(error, EXPLAINED):
-        traceback.print_exception(error)
-    logger.error("%s%s", what, error)
+    _complain(error, what)
     facts["errors"].append(f"{what}{error}")
     return code if code == ALARM else FAILED
 
 
 def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Look at files of records, and say what was found."""
     from skthermo.commands._proposal import Proposal  # for jobs that look at files
 
     found = Proposal.of(options)
@@ -341,7 +316,6 @@ def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
 
 
 def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    """Look at files of records, and write settings that fit them."""
     from skthermo.commands._proposal import Proposal
 
     found = Proposal.of(options)

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 import skthermo
+from skthermo._estimators.answers import content_of
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import counted_warnings
 from skthermo._io import without_bars
@@ -58,7 +59,6 @@ class Failure:
 
     @classmethod
     def of(cls, stage: str, error: BaseException) -> Failure:
-        """What is known of an error that was caught."""
         return cls(stage, type(error).__name__, str(error), _place(error))
 
     def __str__(self) -> str:
@@ -101,7 +101,6 @@ class BridgeOutcome:
 
     @property
     def is_watched(self) -> bool:
-        """Whether there is a monitor."""
         return self.events is not None
 
 
@@ -135,7 +134,7 @@ class BridgeFit:
                 stage = "maker"
                 estimator = clone(call(self.maker))
                 seed_parts(estimator, np.random.RandomState(self.seed))
-                content = content_of(estimator, (T, F), self.monitor)
+                content = identity_of(estimator, T, F, self.monitor)
                 if self.known is not None and self.known.content == content:
                     return Result(self.known, is_as_before=True)
                 outcome, stage = replace(outcome, content=content), "fit"
@@ -239,7 +238,6 @@ def call(given: Any) -> Any:
 
 
 def pair(records: Any, name: Hashable) -> tuple[Table, Table]:
-    """Temperatures and frequencies."""
     if not isinstance(records, tuple | list) or len(records) != 2:
         raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
     shapes = [np.shape(table) for table in records]
@@ -262,7 +260,6 @@ def joined(T: Table, F: Table) -> pd.DataFrame:
 
 
 def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
-    """A monitor that is fitted to the records."""
     if not hasattr(monitor, "update") or not hasattr(monitor, "fit"):
         raise ValueError(f"monitor gave {type(monitor).__name__!r}; expected an unfitted Monitor")
     seed_parts(monitor, np.random.RandomState(seed))
@@ -270,26 +267,22 @@ def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
 
 
 def _facts(T: Table, F: Table) -> dict[str, float]:
-    """Number of records, and share of values that are missing."""
     missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
     return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
 
 
 def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
-    """Mean absolute error of the training frequencies in percent."""
     report = getattr(chain, "report_", None)
     errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
 
 
 def known_of(monitor: Monitor) -> dict[str, Any]:
-    """What an outcome holds of a monitor."""
     status = monitor.status(monitor.last_)
     return {"standing": standing_of(monitor), "events": monitor.events_, "status": status}
 
 
 def standing_of(monitor: Monitor) -> dict[str, Any]:
-    """What a monitor says of its bridge."""
     days, events, drift = monitor.days_, monitor.events_, monitor.drift_
     damage = events[events["kind"] == "damage"]
     n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
@@ -310,14 +303,12 @@ def standing_of(monitor: Monitor) -> dict[str, Any]:
 
 
 def _answers(name: Hashable, evaluations: pd.DataFrame) -> pd.DataFrame:
-    """Evaluations with the name of their bridge."""
     table = evaluations.rename_axis("time").reset_index()
     table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
     return table
 
 
 def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
-    """One row for a bridge of which no new record was evaluated."""
     row = {
         "bridge": name,
         "time": pd.NaT,
@@ -340,7 +331,6 @@ def pickled(fitted: Any) -> bytes:
 
 
 def unpickled(content: bytes) -> Any:
-    """Fitted objects from bytes."""
     return pickle.loads(zlib.decompress(content))
 
 
@@ -354,23 +344,23 @@ def seed_of(base: int, name: Hashable) -> int:
     return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
 
 
-def content_of(
-    estimator: BaseEstimator, records: tuple[Table, Table], monitor: Callable[[BaseEstimator], Monitor] | None
-) -> str:
-    """A text that is another one for other records, another estimator or monitor, or other versions."""
-    versions = (skthermo.__version__, sklearn.__version__, joblib.__version__)
-    return joblib.hash((versions, *(_content(part) for part in (estimator, records, monitor))))
+def identity_of(*parts: Any) -> str:
+    """A text that is another one for other records, another estimator or monitor, or other versions.
+
+    Functions of scripts and notebooks count with their code.
+    """
+    return content_of(skthermo.__version__, sklearn.__version__, joblib.__version__, *map(_content, parts))
 
 
 def _content(part: Any) -> str:
-    """Content of one part; functions of scripts and notebooks count with their code."""
+    """Content of one part, or of its code."""
     code = by_value(part)
     if b"__main__" not in code:
         try:
-            return joblib.hash(part)
+            return content_of(part)
         except pickle.PicklingError:  # a function within a function
             pass
-    return joblib.hash(code)
+    return content_of(code)
 
 
 def _place(error: BaseException) -> str:

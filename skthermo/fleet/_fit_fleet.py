@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,10 +83,9 @@ def fit_fleet(
     The result is the same, bit for bit, whatever the number of jobs, the back end of joblib (its own processes, Dask,
     Ray) and the other bridges are. Parallel parts within a bridge run one after another.
 
-    If a process is killed, for lack of memory, say, what is finished stays, and the rest is begun again in new
-    processes. A bridge that may have killed its process twice is run alone, and given up when it does so again. With
-    one job and no such back end, all runs in this process, which nothing protects. The back end "multiprocessing" of
-    joblib hangs when a process is killed.
+    If a process is killed, for lack of memory, say, the rest is begun again in new processes; a bridge that kills its
+    process repeatedly is given up (:ref:`fleet-cluster`). With one job and no such back end, all runs in this process,
+    which nothing protects. The back end "multiprocessing" of joblib hangs when a process is killed.
 
     Changes are found by content: records, the estimator with its model, versions, and the code of ``monitor``. Code
     that other modules hold is not looked into: use another folder when it has changed. Files are read with ``pickle``,
@@ -116,33 +114,13 @@ def fit_fleet(
     storage = Storage(None if folder is None else check_path(folder, "folder"))
     with storage.alone():
         storage.read()
+        known = {name: storage.outcomes[name] for name in estimators if name in storage.outcomes}
         tasks = {
-            name: BridgeFit(
-                name, estimators[name], records[name], monitor, seed_of(base, name), storage.outcomes.get(name)
-            )
+            name: BridgeFit(name, estimators[name], records[name], monitor, seed_of(base, name), known.get(name))
             for name in estimators
         }
-        storage.outcomes = {name: storage.outcomes[name] for name in estimators if name in storage.outcomes}
-        n_done, begun_again = 0, []
-        try:
-            work = run_tasks(tasks, n_jobs)
-            for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
-                if not result.is_as_before:
-                    before = tasks[name].known
-                    if (
-                        before is not None
-                        and before.standing["n_evaluated"]
-                        and before.content != result.outcome.content
-                    ):
-                        storage.set_aside(name)
-                        begun_again.append(name)
-                    storage.put(result.outcome, result.fitted)
-                elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
-                    _restore(storage, name)
-                n_done += 1
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note(_where_to_go_on(n_done, len(tasks), storage.folder))
-            raise
+        storage.outcomes = known
+        begun_again = _work(tasks, storage, n_jobs, progress)
     storage.outcomes = {name: storage.outcomes[name] for name in estimators}
     fleet = Fleet._of(storage)
     warn_of_bridges(fleet)
@@ -155,6 +133,33 @@ def fit_fleet(
             "monitors-restarted",
         )
     return fleet
+
+
+def _work(
+    tasks: Mapping[Hashable, BridgeFit], storage: Storage, n_jobs: int | None, progress: bool | None
+) -> list[Hashable]:
+    """Fit bridges, and keep each as soon as it is fitted; those whose monitor was replaced."""
+    n_done, begun_again = 0, []
+    try:
+        work = run_tasks(tasks, n_jobs)
+        for name, result in with_progress(work, len(tasks), progress, count=lambda _: 1, unit="bridges"):
+            if not result.is_as_before:
+                before = tasks[name].known
+                is_watched = before is not None and before.standing["n_evaluated"]
+                if is_watched and before.content != result.outcome.content:
+                    storage.set_aside(name)
+                    begun_again.append(name)
+                storage.put(result.outcome, result.fitted)
+            elif result.outcome.failures and result.outcome.failures[0].stage not in ("new records", "update"):
+                _restore(storage, name)
+            n_done += 1
+    except KeyboardInterrupt as interrupt:
+        left = f"are finished and kept in {storage.folder}; the same call goes on there"
+        if storage.folder is None:
+            left = "were finished, and are lost; expected folder=... to keep them"
+        interrupt.add_note(f"{n_done} of {len(tasks)} bridges {left}")
+        raise
+    return begun_again
 
 
 def _restore(storage: Storage, name: Hashable) -> None:
@@ -177,7 +182,6 @@ def _base(random_state: Any) -> int:
 
 
 def _check_names(estimators: Any, records: Any) -> None:
-    """Raise an error unless both are mappings of the same names."""
     for what, given in (("estimators", estimators), ("records", records)):
         if not isinstance(given, Mapping):
             raise ValueError(f"{what} are {type(given).__name__!r}; expected a mapping of names of bridges")
@@ -189,10 +193,3 @@ def _check_names(estimators: Any, records: Any) -> None:
         )
     if not estimators:
         raise ValueError("estimators are empty; expected at least one bridge")
-
-
-def _where_to_go_on(n_done: int, total: int, folder: Path | None) -> str:
-    """What an interrupt leaves."""
-    if folder is None:
-        return f"{n_done} of {total} bridges were finished, and are lost; expected folder=... to keep them"
-    return f"{n_done} of {total} bridges are finished and kept in {folder}; the same call goes on there"

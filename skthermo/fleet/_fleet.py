@@ -6,6 +6,7 @@ import os
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import with_progress
+from skthermo._io import ReadWhenAsked, with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning
@@ -35,11 +36,15 @@ from skthermo.monitoring import Monitor, MonitorStatus
 MOST_NAMED = 5  # bridges or kinds in a sentence
 SILENT = 7  # days without a record, after which a bridge counts as silent
 
+SAID = {
+    "alarm": "In alarm",
+    "watch": "Raised damage index without an alarm (watch)",
+    "not evaluated": "Not evaluated, state not known",
+}
 ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
 
 
 def _sentences(fleet: Fleet) -> Iterator[str]:
-    """What was fitted, and how the bridges stand."""
     table = fleet.table
     broken = table.index[~table["is_fitted"]]
     yield f"{int(table['is_fitted'].sum())} of {len(table)} bridges are fitted."
@@ -63,12 +68,9 @@ def _sentences(fleet: Fleet) -> Iterator[str]:
             f"Newest records of {len(watched)} monitors: {(state == 'alarm').sum()} in alarm, "
             f"{(state == 'healthy').sum()} healthy, {(state == 'not evaluated').sum()} not evaluated."
         )
-        if (state == "alarm").any():
-            yield f"In alarm: {named(watched.index[state == 'alarm'])}."
-        if (state == "watch").any():
-            yield f"Raised damage index without an alarm (watch): {named(watched.index[state == 'watch'])}."
-        if (state == "not evaluated").any():
-            yield f"Not evaluated, state not known: {named(watched.index[state == 'not evaluated'])}."
+        for one, text in SAID.items():
+            if (state == one).any():
+                yield f"{text}: {named(watched.index[state == one])}."
         silent = watched.index[(state != "not evaluated") & (watched["days_silent"] > SILENT)]
         if len(silent):
             yield f"Without a record for more than {SILENT} days before the newest of all: {named(silent)}."
@@ -230,13 +232,14 @@ class Fleet:
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
         """Fitted estimators by name, read when asked for."""
-        return ReadWhenAsked({n: (self._storage, 0) for n, one in self._outcomes.items() if one.is_fitted})
+        fitted = (name for name, one in self._outcomes.items() if one.is_fitted)
+        return ReadWhenAsked({name: partial(self._storage.estimator, name) for name in fitted})
 
     @property
     def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
-        watched = (n for n, one in self._outcomes.items() if one.is_fitted and one.is_watched)
-        return ReadWhenAsked(dict.fromkeys(watched, (self._storage, 1)))
+        watched = (name for name, one in self._outcomes.items() if one.is_fitted and one.is_watched)
+        return ReadWhenAsked({name: partial(self._storage.monitor, name) for name in watched})
 
     @property
     def table(self) -> pd.DataFrame:
@@ -447,28 +450,7 @@ class Fleet:
         return pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts().to_dict()
 
 
-class ReadWhenAsked(Mapping):
-    """Fitted objects by name, each read from the storage when it is asked for."""
-
-    def __init__(self, places: Mapping[Hashable, tuple[Storage, int]]):
-        self._places = places
-
-    def __getitem__(self, name: Hashable) -> Any:
-        storage, place = self._places[name]
-        return storage.objects(name)[place]
-
-    def __iter__(self) -> Iterator[Hashable]:
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __repr__(self) -> str:
-        return f"<{len(self)} fitted objects by name, read when asked for>"
-
-
 def _row(one: BridgeOutcome) -> dict[str, Any]:
-    """One bridge in the table."""
     facts = {"n_records": 0, "gaps": np.nan, "mape": np.nan} | one.facts
     standing = one.standing if one.is_fitted else NOT_WATCHED
     n_warnings = sum(times for _, _, times in (*one.warnings, *one.late_warnings))

@@ -68,6 +68,12 @@ class Storage:
             return None, self.elsewhere[name]
         return unpickled(self.fitted(name))
 
+    def estimator(self, name: Hashable) -> Any:
+        return self.objects(name)[0]
+
+    def monitor(self, name: Hashable) -> Any:
+        return self.objects(name)[1]
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Be the only process that works on the folder; what killed processes left half written is removed."""

@@ -12,9 +12,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY
+from skthermo._tables.frames import DAY, check_duration, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import BaseSearchCV, last_step
 from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
@@ -80,7 +81,6 @@ class Branch:
 
 
 def _steps(detector: Any) -> Iterator[Any]:
-    """The fitted steps of a detector, one after the other."""
     if isinstance(detector, BaseSearchCV):
         yield from _steps(detector.best_estimator_)
     elif isinstance(detector, Pipeline):
@@ -117,24 +117,13 @@ class ActiveDetector(SavesFrames):
 
     @classmethod
     def of(
-        cls,
-        detector: Any,
-        trained: pd.DataFrame,
-        columns: list[Any],
-        targets: list[Any],
-        corrections: Corrections,
-        memory: Memory,
-        *,
-        by_direction: bool,
-        per_year: float,
-        watch_per_year: float | None = None,
-        persistence: int = 1,
+        cls, monitor: Any, detector: Any, trained: pd.DataFrame, columns: list[Any], corrections: Corrections
     ) -> ActiveDetector:
-        """Learned from what the detector was fitted on; ``by_direction`` distinguishes stiffening.
-
-        ``per_year`` damage events are expected of a healthy structure, and ``watch_per_year`` in which its index is
-        raised, if they are asked for.
-        """
+        """Learned from what the detector was fitted on, with the parameters and the responses of its monitor."""
+        targets, persistence = monitor.targets_, monitor.persistence
+        memory = Memory.of(detector)
+        if monitor.lookback is not None:
+            memory = Memory.of_time(check_duration(monitor.lookback, "lookback"))
         temperatures = [name for name in trained.columns if name not in targets]
         frequencies = as_floats(trained[targets])
         deviation = np.nanstd(frequencies, axis=0)
@@ -142,23 +131,27 @@ class ActiveDetector(SavesFrames):
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
         direction, by_kind, release = None, {DAMAGE: index}, release_level(index, DAY, persistence)
-        if by_direction:
+        if monitor.direction == "softening":
             direction = Direction.of(detector, trained[columns], targets)
             is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
-        step = pd.Timedelta(np.median(np.diff(trained.index.as_unit("ns").asi8)), "ns")
+        step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         changes = LoweredIndices.of(partial(_index_of, detector, columns), trained, targets, usual[1], within)
         options = {"hold": DAY, "persistence": persistence, "release": release}
         estimates = {
             kind: estimate_false_alarms(
-                one, per_year, **options, smallest_at=changes.smallest if kind == DAMAGE else None
+                one,
+                monitor.false_alarms_per_year,
+                **options,
+                smallest_at=changes.smallest if kind == DAMAGE else None,
             )
             for kind, one in by_kind.items()
         }
-        if watch_per_year is not None:
+        if monitor.watch_per_year is not None:
             with without_warnings():  # those of the higher threshold have been given
-                watch = estimate_false_alarms(by_kind[DAMAGE], watch_per_year, **options, name="watch_per_year")
+                per_year = monitor.watch_per_year
+                watch = estimate_false_alarms(by_kind[DAMAGE], per_year, **options, name="watch_per_year")
             lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)
             estimates[WATCH] = replace(watch, rule=replace(watch.rule, threshold=lower))
         parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)
@@ -171,9 +164,13 @@ class ActiveDetector(SavesFrames):
         return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
 
     @property
+    def estimate(self) -> FalseAlarmEstimate:
+        """That of damage events."""
+        return self.estimates[DAMAGE]
+
+    @property
     def threshold(self) -> float:
-        """A damage event opens with an index above it."""
-        return self.estimates[DAMAGE].rule.threshold
+        return self.estimate.rule.threshold
 
     @property
     def watch_threshold(self) -> float | None:
@@ -191,7 +188,6 @@ class ActiveDetector(SavesFrames):
         return pd.Series(last_step(self.detector).baseline_index_, self.trained.index)
 
     def ratio(self, records: pd.DataFrame) -> Array:
-        """Damage index over threshold."""
         return self._exact(records) / self.threshold
 
     def own_ratio(self, times: pd.DatetimeIndex) -> Array:
@@ -207,7 +203,7 @@ class ActiveDetector(SavesFrames):
         if self.direction is None:
             return dict.fromkeys([DAMAGE, *watch], index)
         with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimates[DAMAGE].rule.release)
+            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimate.rule.release)
         stiffer = np.zeros(len(index), dtype=bool)
         if wanted.any():
             begin = self.memory.start(records.index.asi8, first)
@@ -243,6 +239,7 @@ class ActiveDetector(SavesFrames):
         self._check_memory()
         self._check_monotone()
 
+    @answers_kept()
     def _check_monotone(self) -> None:
         """Refuse a detector by which a response that changes more is in alarm less; warn where no change is seen."""
         times, blind = self.trained.index.asi8, []
@@ -313,7 +310,6 @@ class ActiveDetector(SavesFrames):
         return names
 
     def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
-        """Why some records have no damage index."""
         if not len(rows):
             return []
         branches = list(Branch.all_of(self.detector))
@@ -378,7 +374,6 @@ class ActiveDetector(SavesFrames):
 
 
 def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
-    """Damage index of records by a fitted detector."""
     with without_warnings():
         return -np.asarray(detector.score_samples(records[columns]), dtype=float)
 

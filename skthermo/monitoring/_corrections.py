@@ -49,7 +49,6 @@ class Corrected:
 
     @classmethod
     def joined(cls, parts: Sequence[Corrected]) -> Corrected:
-        """One after the other."""
         return cls(
             pd.concat([part.records for part in parts]),
             np.concatenate([part.n_held for part in parts]),
@@ -92,7 +91,6 @@ class Corrections:
         return cls(list(T.columns), list(targets), list(reference), dict(units), plausible, watch, follower)
 
     def start(self) -> CorrectionState:
-        """The states after the baseline."""
         return CorrectionState(*(None if one is None else one.start() for one in (self.sensors, self.drift)))
 
     def cleaned(self, raw: pd.DataFrame) -> pd.DataFrame:
@@ -154,7 +152,6 @@ class Corrections:
         return notes
 
     def faults(self, state: CorrectionState) -> pd.DataFrame:
-        """Sensors that have failed."""
         if self.sensors is None:
             return pd.DataFrame({name: [] for name in ("column", "kind", "since", "detected", "until", "detail")})
         return self.sensors.faults(state.sensors)
@@ -167,5 +164,4 @@ class Corrections:
             yield from fault_changes(*lists, names, self.sensors.units, newest)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
-        """The drift of each group; None where none is followed."""
         return None if self.drift is None else self.drift.report(state.drift)

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import as_index
 from skthermo.monitoring._false_alarms import EventRule, EventState
 
 DAMAGE, STIFFENING, MEASUREMENT, WATCH = "damage", "stiffening", "measurement or structure", "watch"
@@ -47,8 +48,7 @@ class EventLog:
         """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
         is_open, levels, states = {}, {}, dict(self.states)
         for kind, index in by_kind.items():
-            before = states.get(kind, EventState())
-            is_open[kind], levels[kind], states[kind] = rules[kind].follow(before, index, times)
+            is_open[kind], levels[kind], states[kind] = rules[kind].follow(self.state(kind), index, times)
         events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
         for row, kind in self._openings(is_open):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", 0))
@@ -63,12 +63,6 @@ class EventLog:
                 events[n] = _grown(events[n], level, times, modes[kind], inside, end_time)
         return numbers, EventLog(states, tuple(events))
 
-    def is_open_after(
-        self, rules: dict[str, EventRule], kind: str, index: Array, times: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
-        """Whether an event of a kind is open after each of some records."""
-        return rules[kind].follow(self.states.get(kind, EventState()), index, times)[0]
-
     def ended(self, end: int) -> EventLog:
         """The log in which open events ended at a time, or at their start if that is later."""
         events = tuple(e if e.end is not None else replace(e, end=max(e.start, end)) for e in self.events)
@@ -78,13 +72,16 @@ class EventLog:
         """Record and kind of each event that opens, in order of time."""
         found = []
         for kind, after in is_open.items():
-            before = kind in self.states and self.states[kind].is_open
-            found += [(int(row), kind) for row in np.flatnonzero(np.diff(after.astype(int), prepend=int(before)) == 1)]
+            before = int(self.is_open(kind))
+            found += [(int(row), kind) for row in np.flatnonzero(np.diff(after.astype(int), prepend=before) == 1)]
         return sorted(found)
 
     def is_open(self, kind: str) -> bool:
-        """Whether an event of a kind is open."""
-        return kind in self.states and self.states[kind].is_open
+        return self.state(kind).is_open
+
+    def state(self, kind: str) -> EventState:
+        """Where events of a kind stand."""
+        return self.states.get(kind, EventState())
 
 
 def _grown(
@@ -120,24 +117,17 @@ class Acknowledgement:
 
 
 def event_table(events: Sequence[Event], said: Sequence[Acknowledgement], zone: Any) -> pd.DataFrame:
-    """Events as a frame, with what the owner says of them."""
     by_event: list[Acknowledgement | None] = [
-        next((a for a in reversed(said) if a.kind == e.kind and e.start <= a.peak_time and _before(a, e)), None)
+        next((a for a in reversed(said) if a.kind == e.kind and e.start <= a.peak_time < (e.end or np.inf)), None)
         for e in events
     ]
-
-    def stamps(values: Sequence[int | None]) -> pd.DatetimeIndex:
-        missing = np.datetime64("NaT", "ns").astype(np.int64)
-        numbers = np.array([missing if value is None else value for value in values], dtype=np.int64)
-        return pd.DatetimeIndex(numbers.view("M8[ns]"), tz="UTC").tz_convert(zone)
-
     return pd.DataFrame(
         {
             "kind": pd.Series([e.kind for e in events], dtype=object),
-            "start": stamps([e.start for e in events]),
-            "end": stamps([e.end for e in events]),
+            "start": as_index([e.start for e in events], zone),
+            "end": as_index([e.end for e in events], zone),
             "peak": np.array([e.peak for e in events], dtype=float),
-            "peak_time": stamps([e.peak_time for e in events]),
+            "peak_time": as_index([e.peak_time for e in events], zone),
             "modes": pd.Series([e.modes for e in events], dtype=object),
             "n_alarms": np.array([e.n_alarms for e in events], dtype=np.int64),
             "acknowledged": np.array([a is not None for a in by_event], dtype=bool),
@@ -145,7 +135,3 @@ def event_table(events: Sequence[Event], said: Sequence[Acknowledgement], zone: 
             "note": pd.Series(["" if a is None else a.note for a in by_event], dtype=object),
         }
     ).set_axis(pd.RangeIndex(1, len(events) + 1, name="event"))
-
-
-def _before(said: Acknowledgement, event: Event) -> bool:
-    return event.end is None or said.peak_time < event.end

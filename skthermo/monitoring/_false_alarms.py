@@ -135,7 +135,6 @@ class Tail:
 
     @cached_property
     def excess(self) -> float:
-        """Sum of the excesses."""
         return sum(self.excesses)
 
     def has_outlier(self, probability: float) -> bool:
@@ -152,7 +151,6 @@ class Tail:
         return float(((1 + excess) ** -self.k).mean() ** (-1 / self.k) - 1)
 
     def threshold(self, asked: float) -> float:
-        """The index that so many peaks exceed."""
         height = self.factor(asked)
         square = self.base + height * self.excess
         if len(self.scales) > 1:

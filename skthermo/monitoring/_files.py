@@ -123,7 +123,6 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
 
 
 def _checked(path: Any) -> Path:
-    """A path with the ending of one of the forms."""
     file = check_path(path)
     if file.suffix not in ENDINGS:
         raise ValueError(f"path is {str(file)!r}; expected a file that ends with {' or '.join(ENDINGS)}")
@@ -148,7 +147,6 @@ def _from_joblib(content: bytes) -> Any:
 
 
 def _by_skops(monitor: Any, file: Path) -> bytes:
-    """A file of skops; an error if it could not be read again."""
     skops = import_optional("skops.io", extra="drop-ins")
     try:
         content: bytes = skops.dumps(monitor)

@@ -33,7 +33,6 @@ class Memory:
 
     @classmethod
     def of_time(cls, duration: pd.Timedelta) -> Memory:
-        """The records of some time."""
         return cls((((0, duration.value),),))
 
     def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:

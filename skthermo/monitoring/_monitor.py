@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
@@ -14,10 +14,9 @@ import pandas as pd
 from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_flag, is_real, robust_deviation
-from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, positions_of
+from skthermo._tables.arrays import check_flag, is_real
+from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp
 from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import counted, probability_text
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -25,28 +24,26 @@ from skthermo._validation import (
     StrOptions,
     _fit_context,
     check_is_fitted,
+    held,
     seed_parts,
     seeded,
 )
-from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._columns import Columns, refuse_meaningless
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement, event_table
+from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._records import OF_TRAINING, RecordStore, read_records
 from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.monitoring._state import MonitorState
-from skthermo.monitoring._status import MonitorStatus, facts_of
+from skthermo.monitoring._status import MonitorStatus, facts_of, summary_lines
 from skthermo.monitoring._transitions import Transition
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
-from skthermo.preprocessing.checks import gross_errors
 
-TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
 MOST_CAUSES = 3  # in a warning
-MOST_EVENTS = 5  # in a summary, the latest ones
 
 
 class Monitor(SavesFrames, Estimator):
@@ -165,21 +162,10 @@ class Monitor(SavesFrames, Estimator):
     The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
     how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
 
-    More change is never less alarm. A response that is far from what the weather predicts while the others stay, beyond
-    25 robust deviations and a quarter of its level, is implausible: its value is left out, and the record is not
-    evaluated, or in alarm if the others are. With three such records of the last five, an event of kind "measurement or
-    structure" opens. While it is open, or while a response repeats one value, no record is healthy and no damage event
-    closes, until a day after the response has come back, or `acknowledge` says that its sensor is at fault. Smaller
-    changes, and those of most responses at once, are left to the detector; `fit` refuses one that drops large changes.
-
     A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
     a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in
-    kelvin. Whatever is left out has its reason in the row and counts in ``counts_``.
-
-    A logger's clock may be wrong. After a jump of more than ``max_jump``, records are taken in if they are of the
-    present by the clock of this computer, or if ten or more of them confirm each other and none is in the future.
-    Otherwise they are set aside, and never make true records late. Where earlier records are in the future already, as
-    in a simulation, only a year or more is a jump.
+    kelvin. Whatever is left out has its reason in the row and counts in ``counts_``. :doc:`/guide/in_service` says what
+    becomes of responses that are implausible, of sensors that fail, and of records from a clock that is wrong.
 
     Examples
     --------
@@ -250,6 +236,39 @@ class Monitor(SavesFrames, Estimator):
         self.lookback = lookback
         self.random_state = random_state
 
+    detector_: Any = held("active_.detector")
+    lookback_: Memory = held("active_.memory")
+    false_alarm_estimate_: FalseAlarmEstimate = held("active_.estimate")
+    threshold_: float = held("active_.threshold")
+    clear_threshold_: float = held("active_.estimate.rule.release")
+    watch_threshold_: float | None = held("active_.watch_threshold")
+    smallest_changes_: SmallestChanges = held("active_.smallest")
+    trained_: pd.DataFrame = held("active_.trained", is_copied=True)
+    prior_: pd.DataFrame | None = held("active_.prior")
+    since_: pd.Timestamp | None = held("active_.since")
+    baseline_: pd.DataFrame = held("status_.store.baseline", is_copied=True)
+    records_: pd.DataFrame = held("status_.store.kept", is_copied=True)
+    last_: pd.Timestamp = held("status_.store.last")
+    evaluations_: pd.DataFrame = held("status_.evaluations", is_copied=True)
+    days_: pd.DataFrame = held("status_.days", is_copied=True)
+    counts_: dict[str, int] = held("status_.counts")
+    events_: pd.DataFrame = held("status_.event_table")
+
+    @property
+    def corrected_(self) -> pd.DataFrame:
+        """Records kept since the baseline as the detector sees them."""
+        return self.status_.corrected.loc[self.status_.store.kept.index]
+
+    @property
+    def faults_(self) -> pd.DataFrame:
+        """Sensors that have failed."""
+        return self.active_.corrections.faults(self.status_.corrections)
+
+    @property
+    def drift_(self) -> pd.DataFrame | None:
+        """Drift that was followed, by group."""
+        return self.active_.corrections.drifts(self.status_.corrections)
+
     def __sklearn_clone__(self) -> Monitor:
         return type(self)(**self.get_params(deep=False) | {"detector": clone(self.detector)})  # the chain is shared
 
@@ -295,53 +314,17 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
-        if max_jump is not None and not max_jump:
-            raise ValueError(f"max_jump is {self.max_jump!r}; expected longer than zero, such as '28D'")
-        if retention < max_delay + 2 * DAY:
-            raise ValueError(
-                f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
-                "least two days longer than they may be late"
-            )
-        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
-            raise ValueError(
-                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
-                "expected more watches than alarms a year, such as 12 and 1"
-            )
-        baseline = read_records(X)
-        if not len(baseline):
-            raise ValueError(
-                "the baseline has no records; expected those of the healthy structure, of a year if possible"
-            )
-        if baseline.index.has_duplicates:
-            again = baseline.index[baseline.index.duplicated()]
-            raise ValueError(
-                f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once"
-            )
+        max_delay, max_jump, retention = self._checked_times()
+        baseline = _read_baseline(X)
         detector = clone(self.detector)
         seed_parts(detector, seeded(self.random_state))
-        parts = [detector, *detector.get_params(deep=True).values()]
-        compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
-        reference = _among(self.reference or [], list(baseline.columns), "reference")
-        inputs = [name for name in baseline.columns if name not in reference]
-        self.targets_ = self._responses(inputs, compensators)
-        self.units_ = self._units(baseline.columns)
-        options = {"fem": self.fem, "sensors": self.sensors}
-        corrections = Corrections.of(baseline, self.targets_, reference, self.units_, **options)
-        trained = corrections.cleaned(baseline)
-        n_markers = int((trained.isna() & baseline.notna()).to_numpy().sum())
-        if n_markers:
-            warn_user(
-                f"{n_markers} of {baseline.size} values of the baseline are codes for missing values, such as -999. "
-                "They count as missing. Put NaN there",
-                RecordsWarning,
-                "placeholders",
-            )
-        _refuse_meaningless(trained, self.targets_, self.units_)
-        trained = trained if len(inputs) == trained.shape[1] else trained[inputs]
-        columns = inputs if compensators else self.targets_
-        active = self._activated(detector.fit(trained[columns]), trained, columns, corrections)
+        columns = Columns.of(self, detector, list(baseline.columns))
+        self.targets_, self.units_ = columns.targets, columns.units
+        corrections = self._corrections(baseline, columns.reference, self.fem)
+        trained = _without_markers(baseline, corrections)
+        refuse_meaningless(trained, self.targets_, self.units_)
+        trained = trained if len(columns.inputs) == trained.shape[1] else trained[columns.inputs]
+        active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)
         active.check()
         store = RecordStore.of(baseline, max_delay, max_jump, retention)
         self.active_, self.status_ = active, MonitorState.of(active, store)
@@ -622,21 +605,13 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        Records never train of events that were not acknowledged as harmless, from a week before their start (or the
-        detector's window, if that is longer) to their end; while such an event is open, nothing after that trains.
-        Values of faulty sensors do not train, nor do records that came too late.
-
-        The new detector is refused if the new records differ from the baseline, beyond the weather, from some day on or
-        steadily, by more than chance (probability below 1 % among all that is tried) and by more than a fifth of a
-        record's standard deviation: a detector that learned them would not see that change any more. It is refused if
-        more of the new records are above its threshold, each evaluated by the others, than above the old one; if it
-        finds only clearly larger changes, unless it has fewer false alarms; and if it no longer finds a past event.
+        Which records never train, and when the new detector is refused: :doc:`/guide/in_service`.
         """
         check_is_fitted(self)
         if records is not None:
             records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
             records = self.active_.corrections.cleaned(records)
-            _refuse_meaningless(records, self.targets_, self.units_, exclude=OF_TRAINING)
+            refuse_meaningless(records, self.targets_, self.units_, exclude=OF_TRAINING)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -668,16 +643,36 @@ class Monitor(SavesFrames, Estimator):
         been said of them. Records of an event that began since, and was acknowledged as damage, do not train.
 
         The records of the baseline stand in for the weather that has not come since: each mode is moved to its new
-        level, which is the mean of what the old regression on the weather leaves of the new records. As few days tell
-        a level only roughly, each week of old records is moved besides by what another stretch of the old baseline, as
-        long as the new one, misses its level by: the threshold allows for that. Old weeks drop out when new records
-        cover their time of the year. Call again as days come; `refit` goes on in the same way.
+        level, the mean of what the old regression on the weather leaves of the new records. The threshold allows for
+        how roughly few days tell it. Call again as days come; `refit` goes on in the same way.
         """
         check_is_fitted(self)
         retraining = begun_again(self, since, self._activated, until=until)
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
+
+    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta | None, pd.Timedelta]:
+        """``max_delay``, ``max_jump`` and ``retention``; an error for parameters that contradict each other."""
+        max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
+        max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
+        if max_jump is not None and not max_jump:
+            raise ValueError(f"max_jump is {self.max_jump!r}; expected longer than zero, such as '28D'")
+        if retention < max_delay + 2 * DAY:
+            raise ValueError(
+                f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
+                "least two days longer than they may be late"
+            )
+        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
+            raise ValueError(
+                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
+                "expected more watches than alarms a year, such as 12 and 1"
+            )
+        return max_delay, max_jump, retention
+
+    def _corrections(self, baseline: pd.DataFrame, reference: list[Any], fem: Any) -> Corrections:
+        options = {"fem": fem, "sensors": self.sensors}
+        return Corrections.of(baseline, self.targets_, reference, self.units_, **options)
 
     def _activated(
         self,
@@ -687,18 +682,9 @@ class Monitor(SavesFrames, Estimator):
         corrections: Corrections | None = None,
     ) -> ActiveDetector:
         """All by which a detector evaluates that was fitted on some records; by default as the one in charge."""
-        return ActiveDetector.of(
-            detector,
-            trained,
-            self.active_.columns if columns is None else columns,
-            self.targets_,
-            self.active_.corrections if corrections is None else corrections,
-            Memory.of(detector) if self.lookback is None else Memory.of_time(check_duration(self.lookback, "lookback")),
-            by_direction=self.direction == "softening",
-            per_year=self.false_alarms_per_year,
-            watch_per_year=self.watch_per_year,
-            persistence=self.persistence,
-        )
+        columns = self.active_.columns if columns is None else columns
+        corrections = self.active_.corrections if corrections is None else corrections
+        return ActiveDetector.of(self, detector, trained, columns, corrections)
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
@@ -717,8 +703,7 @@ class Monitor(SavesFrames, Estimator):
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
             raw = pd.concat([self.baseline_, self.records_]).reindex(trained.index)
             whole = trained.join(raw[corrections.reference])[list(raw.columns)]
-            options = {"fem": fem, "sensors": self.sensors}
-            corrections = Corrections.of(whole, self.targets_, corrections.reference, self.units_, **options)
+            corrections = self._corrections(whole, corrections.reference, fem)
         active = self._activated(retraining.detector, trained, corrections=corrections)
         self.active_ = replace(active, prior=retraining.prior, since=retraining.since)
         now = self.last_.as_unit("ns").value
@@ -755,234 +740,31 @@ class Monitor(SavesFrames, Estimator):
             State, records, events, sensors and drift.
         """
         check_is_fitted(self)
-        counts, drift = self.counts_, self.drift_
-        evaluations = self.status_.evaluations
-        newest = [f"newest record {self.last_}", evaluations["reason"].iloc[-1]] if len(evaluations) else []
-        lines = [
-            f"state: {self.state()} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})",
-            f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
-            f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too "
-            f"far ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out",
-            f"damage events: open when {self.persistence} of {2 * self.persistence - 1} damage indices exceed "
-            f"{self.threshold_:.4g}, close at or below {self.clear_threshold_:.4g}",
-            f"expected: {self.false_alarm_estimate_}",
-            *_watch_in_words(self.watch_threshold_, self.watch_per_year, self.events_),
-            f"smallest change: {self.smallest_changes_} in weather of the baseline",
-            *_events_in_words(self.events_[self.events_["kind"] != WATCH]),
-        ]
-        faults = self.faults_
-        for _, fault in faults[faults["until"].isna()].iterrows():
-            lines.append(f"sensor: {fault['column']} {fault['kind']} since {fault['since']}")
-        if drift is not None:
-            found = "significant" if drift["significant"].any() else "not significant"
-            lines.append(f"drift: {found} (p value {probability_text(drift['p_value'].iloc[0])})")
-            lines += [
-                f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year"
-                f"{'; beyond the limit' if one['beyond_limit'] else ''}"
-                for group, one in drift[drift["significant"]].iterrows()
-            ]
-            n_days = self.status_.corrections.drift.n_left_out
-            lines += [f"drift: {counted(n_days, 'day')} left out, on which responses changed abruptly"] * (n_days > 0)
-        return "\n".join(lines)
-
-    @property
-    def detector_(self) -> Any:
-        """The fitted detector."""
-        return self.active_.detector
-
-    @property
-    def trained_(self) -> pd.DataFrame:
-        """What the detector in charge was fitted on."""
-        return self.active_.trained.copy()
-
-    @property
-    def lookback_(self) -> Memory:
-        """Which earlier records the evaluation of a record needs."""
-        return self.active_.memory
-
-    @property
-    def false_alarm_estimate_(self) -> FalseAlarmEstimate:
-        """How the threshold was set, and how many false events to expect."""
-        return self.active_.estimates[DAMAGE]
-
-    @property
-    def threshold_(self) -> float:
-        """A damage event opens with an index above it."""
-        return self.false_alarm_estimate_.rule.threshold
-
-    @property
-    def clear_threshold_(self) -> float:
-        """An event closes when the index has stayed at or below it."""
-        return self.false_alarm_estimate_.rule.release
-
-    @property
-    def watch_threshold_(self) -> float | None:
-        """An event of kind "watch" opens with an index above it."""
-        return self.active_.watch_threshold
-
-    @property
-    def smallest_changes_(self) -> SmallestChanges:
-        """By how much responses have to fall until there is an alarm."""
-        return self.active_.smallest
-
-    @property
-    def prior_(self) -> pd.DataFrame | None:
-        """Records from before the intervention after which the baseline began anew."""
-        return self.active_.prior
-
-    @property
-    def since_(self) -> pd.Timestamp | None:
-        """When that intervention was complete."""
-        return self.active_.since
-
-    @property
-    def baseline_(self) -> pd.DataFrame:
-        """Records of the baseline, raw."""
-        return self.status_.store.baseline.copy()
-
-    @property
-    def records_(self) -> pd.DataFrame:
-        """Records kept since the baseline, raw."""
-        return self.status_.store.kept.copy()
-
-    @property
-    def corrected_(self) -> pd.DataFrame:
-        """Records kept since the baseline as the detector sees them."""
-        return self.status_.corrected.loc[self.status_.store.kept.index]
-
-    @property
-    def last_(self) -> pd.Timestamp:
-        """Stamp of the newest record."""
-        return self.status_.store.last
-
-    @property
-    def evaluations_(self) -> pd.DataFrame:
-        """The latest evaluation of each record that is kept."""
-        return self.status_.evaluations.copy()
-
-    @property
-    def days_(self) -> pd.DataFrame:
-        """Daily summaries."""
-        return self.status_.days.copy()
-
-    @property
-    def counts_(self) -> dict[str, int]:
-        """Numbers of records, and of values that were left out."""
-        return self.status_.counts
-
-    @property
-    def events_(self) -> pd.DataFrame:
-        """Events, counted from 1."""
-        return event_table(self.status_.log.events, self.status_.acknowledgements, self.last_.tz)
-
-    @property
-    def faults_(self) -> pd.DataFrame:
-        """Sensors that have failed."""
-        return self.active_.corrections.faults(self.status_.corrections)
-
-    @property
-    def drift_(self) -> pd.DataFrame | None:
-        """Drift that was followed, by group."""
-        return self.active_.corrections.drifts(self.status_.corrections)
-
-    def _responses(self, columns: list[Any], compensators: Sequence[TemperatureCompensator]) -> list[Any]:
-        """Names of the responses: as given, those of the compensators, or those of the chain."""
-        names = np.array(columns, dtype=object)
-        places = [positions_of(one.targets, len(columns), names) for one in compensators]
-        own = [columns[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
-        if self.targets is None and own is not None:
-            return own
-        if self.targets is None and self.fem is None:
-            raise ValueError(
-                "the detector has no TemperatureCompensator whose targets say which columns are responses, and there "
-                "is no fem; expected targets=[names of the responses]"
-            )
-        if self.targets is None:
-            check_is_fitted(self.fem)
-        wanted = _among(self.fem.mode_names_ if self.targets is None else self.targets, columns, "targets")
-        if not wanted or (own is not None and set(wanted) != set(own)):
-            raise ValueError(
-                f"targets are {wanted}; expected {'some of the columns' if own is None else 'those of the compensator'}"
-                f" {columns if own is None else own}"
-            )
-        return [name for name in columns if name in wanted]
-
-    def _units(self, columns: pd.Index) -> dict[Any, str]:
-        """Unit of each column."""
-        of_targets = self.units if isinstance(self.units, str) else "" if self.fem is None else "Hz"
-        given = dict(self.units) if isinstance(self.units, Mapping) else {}
-        unknown = [name for name in given if name not in columns]
-        if unknown or not all(isinstance(unit, str) for unit in given.values()):
-            raise ValueError(f"units are {given}; expected a text for some of the columns {list(columns)}")
-        return {name: of_targets if name in self.targets_ else "°C" for name in columns} | given
+        return "\n".join(summary_lines(self))
 
 
-def _refuse_meaningless(
-    baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], exclude: Collection[str] = ()
-) -> None:
-    """Raise an error that lists all that makes records useless for training: gross errors, responses of another size.
+def _read_baseline(X: pd.DataFrame) -> pd.DataFrame:
+    baseline = read_records(X)
+    if not len(baseline):
+        raise ValueError("the baseline has no records; expected those of the healthy structure, of a year if possible")
+    if baseline.index.has_duplicates:
+        again = baseline.index[baseline.index.duplicated()]
+        raise ValueError(f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once")
+    return baseline
 
-    ``exclude`` are kinds of gross errors that do no harm.
-    """
-    F, T = baseline[targets], baseline.drop(columns=targets)
-    unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
-    wrong = []
-    try:
-        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless(exclude=exclude)
-    except ValueError as error:
-        wrong.append(str(error))
-    values = F.to_numpy()
-    if not len(values):
-        return
-    level, deviation = np.nanmedian(values, axis=0), robust_deviation(values)
-    limit = np.where(deviation > 0, np.maximum(TIMES_DEVIATION * deviation, TIMES_LEVEL * np.abs(level)), np.inf)
-    far = np.abs(values - level) > limit
-    for column in np.flatnonzero(far.any(axis=0)):
-        rows = np.flatnonzero(far[:, column])
-        wrong.append(
-            f"{targets[column]!r} is {values[rows[0], column]:.4g} at {F.index[rows[0]]}"
-            + (f", and as far off in {len(rows) - 1} other records" if len(rows) > 1 else "")
-            + f"; expected values near its median {level[column]:.4g}, and NaN where a value is wrong"
+
+def _without_markers(baseline: pd.DataFrame, corrections: Corrections) -> pd.DataFrame:
+    """The baseline without numbers that stand for missing ones, of which it warns."""
+    cleaned = corrections.cleaned(baseline)
+    n_markers = int((cleaned.isna() & baseline.notna()).to_numpy().sum())
+    if n_markers:
+        warn_user(
+            f"{n_markers} of {baseline.size} values of the baseline are codes for missing values, such as -999. They "
+            "count as missing. Put NaN there",
+            RecordsWarning,
+            "placeholders",
         )
-    if wrong:
-        raise ValueError("; ".join(wrong))
-
-
-def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
-    """Different names of columns."""
-    wanted = [names] if isinstance(names, str) else list(names)
-    if any(name not in columns for name in wanted) or len(set(wanted)) < len(wanted):
-        raise ValueError(f"{what} is {wanted}; expected different names among the columns {columns}")
-    return wanted
-
-
-def _watch_in_words(threshold: float | None, per_year: float | None, events: pd.DataFrame) -> list[str]:
-    """A line for the lower level, if there is one."""
-    if threshold is None:
-        return []
-    events = events[events["kind"] == WATCH]
-    opened = [
-        f"event {number} is open since {event['start']}" for number, event in events.iterrows() if pd.isna(event["end"])
-    ]
-    said = [f"opens above {threshold:.4g}", f"{per_year:g} false a year expected", f"{len(events)} so far", *opened]
-    return [f"watch: {'; '.join(said)}"]
-
-
-def _events_in_words(events: pd.DataFrame) -> list[str]:
-    """A line for each of the latest events, and one for those that nobody has acknowledged."""
-    if not len(events):
-        return ["events: none"]
-    lines, n_earlier = [], max(len(events) - MOST_EVENTS, 0)
-    for number, event in events.iloc[n_earlier:].iterrows():
-        until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
-        said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
-        note = f" ({event['note']})" if event["note"] else ""
-        peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
-        lines.append(f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}")
-    lines += [f"events: {n_earlier} earlier ones are in events_"] if n_earlier else []
-    waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
-    which = f"event{'s' if len(waiting) > 1 else ''} {', '.join(map(str, waiting))}"
-    return lines + ([f"ended, not acknowledged: {which}"] if len(waiting) else [])
+    return cleaned
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import as_floats, refuse_no_table
-from skthermo._tables.frames import DAY_NS, YEAR
+from skthermo._tables.frames import DAY_NS, YEAR, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
 from skthermo._validation import with_nan
@@ -100,16 +100,14 @@ class RecordStore(SavesFrames):
         cls, baseline: pd.DataFrame, max_delay: pd.Timedelta, max_jump: pd.Timedelta | None, retention: pd.Timedelta
     ) -> RecordStore:
         """With no record since the baseline; by default a jump is one that no outage of the baseline explains."""
-        steps = np.diff(baseline.index.asi8)
-        longest, usual = (pd.Timedelta(int(of(steps)) if len(steps) else 0, "ns") for of in (np.max, np.median))
         if max_jump is None:
-            max_jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual)
+            longest = pd.Timedelta(np.diff(baseline.index.asi8).max(initial=0), "ns")
+            max_jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual_step(baseline.index))
         nothing = baseline.iloc[:0]
         return cls(baseline, nothing, nothing, max_delay, max_jump, retention)
 
     @property
     def last(self) -> pd.Timestamp:
-        """Stamp of the newest record."""
         return (self.kept if len(self.kept) else self.baseline).index[-1]
 
     def sort_in(self, batch: pd.DataFrame, are_confirmed: bool = False) -> Intake:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text, percent
@@ -37,7 +38,6 @@ def whole_weeks(records: pd.DataFrame, most: int) -> pd.DataFrame:
 
 
 def lowered(records: pd.DataFrame, falls: Mapping[Any, Any]) -> pd.DataFrame:
-    """Records of which some responses are lower."""
     changed = records.copy()
     for name, fall in falls.items():
         changed[name] -= fall
@@ -114,6 +114,7 @@ class LoweredIndices(SavesFrames):
     within: pd.Timedelta
 
     @classmethod
+    @answers_kept()  # of the weather, which is the same in all calls
     def of(
         cls,
         index_of: Callable[[pd.DataFrame], Array],

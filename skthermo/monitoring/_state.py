@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -15,8 +15,8 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog
-from skthermo.monitoring._false_alarms import FalseAlarmEstimate
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog, event_table
+from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
 from skthermo.monitoring._transitions import Transition, event_changes
 
@@ -63,12 +63,16 @@ class MonitorState(SavesFrames):
         checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
         memory = active.corrections.cleaned(store.baseline.iloc[start:])[list(active.trained.columns)]
         days = _days_of(nothing, np.zeros(0, dtype=np.int64))
-        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimates[DAMAGE]),))
+        return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimate),))
 
     @property
     def corrections(self) -> CorrectionState:
-        """States of the corrections at the beginning of the newest day."""
         return self.checkpoints[-1].corrections
+
+    @property
+    def event_table(self) -> pd.DataFrame:
+        """Events as a frame, counted from 1, with what the owner has said of them."""
+        return event_table(self.log.events, self.acknowledgements, self.store.last.tz)
 
     @property
     def acknowledged(self) -> list[int]:
@@ -78,7 +82,6 @@ class MonitorState(SavesFrames):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of records, and of values that were left out."""
         n_outside = self.n_too_late + len(self.store.ahead)
         n_records, n_evaluated, n_left_out = (
             int(self.days[name].sum()) for name in ("n_records", "n_evaluated", "n_left_out")
@@ -130,7 +133,7 @@ class MonitorState(SavesFrames):
         place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
         begin = self.checkpoints[place]
         raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
-        days, states, seen = self._corrected_by_day(active.corrections, begin, raw)
+        states, seen = self._corrected_by_day(active.corrections, begin, raw)
         memory = self.corrected.iloc[: self.corrected.index.searchsorted(raw.index[0])]
         records, n_memory = pd.concat([memory, seen.records]), len(memory)
         known = self.evaluations.iloc[slice(*self.evaluations.index.searchsorted(pd.DatetimeIndex([begin.day, first])))]
@@ -142,22 +145,13 @@ class MonitorState(SavesFrames):
         is_doubtful = seen.is_held | is_contested
         series = active.by_kind(records, n_memory, _not_closing(index, is_doubtful, active))
         times = raw.index.asi8
+        after = (rules[kind].follow(begin.log.state(kind), one, times)[0] for kind, one in series.items())
+        rows = np.flatnonzero(np.any(list(after), axis=0) & ~np.isnan(index))
         drivers = np.full(len(raw), "", dtype=object)
-        is_open = np.any([begin.log.is_open_after(rules, kind, one, times) for kind, one in series.items()], axis=0)
-        rows = np.flatnonzero(is_open & ~np.isnan(index))
         drivers[rows] = active.drivers(records, rows + n_memory)
         series |= {MEASUREMENT: seen.n_held}
         modes = dict.fromkeys(series, drivers) | {MEASUREMENT: np.array(seen.held, dtype=object)}
-        bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
-        log, numbers, points = begin.log, {kind: np.zeros(len(raw), dtype=np.int64) for kind in series}, []
-        for day, state, (start, stop) in zip(days, states, pairwise(bounds), strict=True):
-            points.append(Checkpoint(day, state, log))
-            own = slice(start, stop)
-            found, log = log.follow(
-                rules, *({kind: one[own] for kind, one in parts.items()} for parts in (series, modes)), times[own]
-            )
-            for kind, number in found.items():
-                numbers[kind][own] = number
+        log, numbers, points = _followed(rules, begin.log, states, series, modes, raw.index)
         reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :], outside[len(known) :])
         reasons = known["reason"].tolist() + reasons
         before = self.evaluations["state"].iloc[: self.evaluations.index.searchsorted(begin.day)]
@@ -173,8 +167,7 @@ class MonitorState(SavesFrames):
             f"even a fall of all responses by {100 * active.fall_to_detect:.2g} % would stay undetected": is_blind,
         }
         for row in range(len(known), len(raw)):
-            said = [reasons[row], *(remark for remark, rows in remarks.items() if rows[row])]
-            reasons[row] = "; ".join(filter(None, said))
+            reasons[row] = "; ".join(filter(None, [reasons[row], *(text for text, at in remarks.items() if at[row])]))
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
         points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
@@ -187,7 +180,7 @@ class MonitorState(SavesFrames):
             checkpoints=tuple(points),
             log=log,
             evaluations=evaluations.iloc[evaluations.index.searchsorted(kept_since) :],
-            days=self._with_days(active.corrections, days, states, _days_of(answers, seen.n_left_out)),
+            days=self._with_days(active.corrections, states, _days_of(answers, seen.n_left_out)),
         )
         return state, self._news(answers.iloc[len(known) :], fresh)
 
@@ -255,7 +248,7 @@ class MonitorState(SavesFrames):
             log, start = log.ended(end), active.corrections.start()
             points = tuple(replace(one, log=one.log.ended(end), corrections=start) for one in points)
         day = points[-1].day
-        estimates = (*self.estimates, (self.store.last, active.estimates[DAMAGE]))
+        estimates = (*self.estimates, (self.store.last, active.estimate))
         kept = self.evaluations[self.evaluations.index < day]
         state = replace(self, checkpoints=points, log=log, evaluations=kept, estimates=estimates)
         today = self.store.kept.index[self.store.kept.index >= day]
@@ -263,8 +256,8 @@ class MonitorState(SavesFrames):
 
     def _corrected_by_day(
         self, corrections: Corrections, begin: Checkpoint, raw: pd.DataFrame
-    ) -> tuple[list[pd.Timestamp], list[CorrectionState], Corrected]:
-        """Days from a checkpoint to the last record, states before each, and the records as the detector sees them."""
+    ) -> tuple[dict[pd.Timestamp, CorrectionState], Corrected]:
+        """States before each day from a checkpoint to the last record, and the records as the detector sees them."""
         days = list(pd.date_range(begin.day, raw.index[-1].normalize(), freq="D"))
         bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
         parts = [raw.iloc[start:stop] for start, stop in pairwise(bounds)]
@@ -274,7 +267,7 @@ class MonitorState(SavesFrames):
         seen = [
             corrections.corrected(*pair, self.acknowledged) for pair in zip(states, parts, strict=True) if len(pair[1])
         ]
-        return days, states, Corrected.joined(seen)
+        return dict(zip(days, states, strict=True)), Corrected.joined(seen)
 
     def _unexplained(self, log: EventLog, numbers: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Records in an event of responses set aside that nobody had acknowledged as harmless before them."""
@@ -283,7 +276,6 @@ class MonitorState(SavesFrames):
         return (numbers > 0) & ~np.any(said, axis=0) if said else numbers > 0
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
-        """The answers to new records, and those to others that have changed."""
         is_new = answers.index.isin(fresh)
         changed = np.zeros(len(answers), dtype=bool)
         if not is_new.all():
@@ -296,17 +288,36 @@ class MonitorState(SavesFrames):
     def _with_days(
         self,
         corrections: Corrections,
-        days: Sequence[pd.Timestamp],
-        states: Sequence[CorrectionState],
+        states: Mapping[pd.Timestamp, CorrectionState],
         new: pd.DataFrame,
     ) -> pd.DataFrame:
         """Daily summaries, those of some days anew."""
         if corrections.drift is not None:
-            by_day = dict(zip(days, states, strict=True))
-            shares = pd.DataFrame({day: corrections.drift.taken_out(by_day[day].drift) for day in new.index}).T
+            shares = pd.DataFrame({day: corrections.drift.taken_out(states[day].drift) for day in new.index}).T
             new = new.join(shares.add_prefix("drift "))
-        before = self.days.iloc[: self.days.index.searchsorted(days[0])]
+        before = self.days.iloc[: self.days.index.searchsorted(next(iter(states)))]
         return pd.concat([before, new]) if len(before) else new
+
+
+def _followed(
+    rules: dict[str, EventRule],
+    log: EventLog,
+    states: dict[pd.Timestamp, CorrectionState],
+    series: dict[str, Array],
+    modes: dict[str, Any],
+    stamps: pd.DatetimeIndex,
+) -> tuple[EventLog, dict[str, NDArray[np.int64]], list[Checkpoint]]:
+    """The log after some days, numbers of the events at their records by kind, and checkpoints before each day."""
+    bounds = [*stamps.searchsorted(pd.DatetimeIndex(list(states))), len(stamps)]
+    numbers, points = {kind: np.zeros(len(stamps), dtype=np.int64) for kind in series}, []
+    for (day, state), (start, stop) in zip(states.items(), pairwise(bounds), strict=True):
+        points.append(Checkpoint(day, state, log))
+        own = slice(start, stop)
+        parts = ({kind: one[own] for kind, one in whole.items()} for whole in (series, modes))
+        found, log = log.follow(rules, *parts, stamps.asi8[own])
+        for kind, number in found.items():
+            numbers[kind][own] = number
+    return log, numbers, points
 
 
 def _by_rivals(
@@ -355,7 +366,6 @@ def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Chec
 
 
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
-    """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
     modes, is_held = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=bool)
     return _answers(stamps, nothing, threshold, modes, list(reasons), {DAMAGE: number}, is_held)
@@ -370,7 +380,6 @@ def _answers(
     numbers: dict[str, NDArray[np.int64]],
     is_held: NDArray[np.bool_],
 ) -> pd.DataFrame:
-    """A row for each record."""
     has_index, number = ~np.isnan(index), numbers[DAMAGE]
     is_alarm = has_index & (number > 0)
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)

@@ -1,20 +1,21 @@
-"""The state of a monitored structure at a given time, as plain facts for machines and pages."""
+"""The state of a monitored structure at a given time, as plain facts for machines and pages, and in a few lines."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from datetime import timedelta
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import DAY, as_moment, check_duration
-from skthermo._tables.text import duration_text
+from skthermo._tables.frames import DAY, as_moment, check_duration, usual_step
+from skthermo._tables.text import counted, duration_text, plain, probability_text
+from skthermo.monitoring._events import WATCH
 
 LATE = 2 * DAY  # beyond the usual step, after which a record is missed
 AHEAD = DAY  # after now, beyond which the stamp of the newest record is wrong
+MOST_EVENTS = 5  # in a summary, the latest ones
 FAULT = ("column", "kind", "since", "detail")
 
 
@@ -157,7 +158,7 @@ class MonitorStatus:
         dict
             Texts, numbers, lists and dicts; None for what is not known.
         """
-        return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
+        return {one.name: plain(getattr(self, one.name)) for one in fields(self)}
 
 
 def facts_of(monitor: Any) -> MonitorStatus:
@@ -170,7 +171,7 @@ def facts_of(monitor: Any) -> MonitorStatus:
         baseline_end=baseline[-1],
         newest=monitor.last_ if len(monitor.days_) else None,
         evaluated=known.index[-1] if len(known) else None,
-        step=_usual_step(baseline.append(evaluations.index)),
+        step=usual_step(baseline.append(evaluations.index)) or DAY,
         index=float(known["index"].iloc[-1]) if len(known) else None,
         threshold=float(monitor.threshold_),
         clear_threshold=float(monitor.clear_threshold_),
@@ -218,21 +219,65 @@ def _lasting_faults(faults: pd.DataFrame) -> Iterator[dict[str, Any]]:
         yield {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
 
 
-def _usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
-    """Median time between records; a day for one record alone."""
-    return pd.Timedelta(np.median(np.diff(stamps.as_unit("ns").asi8)), "ns") if len(stamps) > 1 else DAY
+def summary_lines(monitor: Any) -> Iterator[str]:
+    """State, records, events, sensors and drift of a fitted monitor."""
+    counts, evaluations, events = monitor.counts_, monitor.evaluations_, monitor.events_
+    newest = [f"newest record {monitor.last_}", evaluations["reason"].iloc[-1]] if len(evaluations) else []
+    yield f"state: {monitor.state()} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})"
+    yield (
+        f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
+        f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too far "
+        f"ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out"
+    )
+    yield (
+        f"damage events: open when {monitor.persistence} of {2 * monitor.persistence - 1} damage indices exceed "
+        f"{monitor.threshold_:.4g}, close at or below {monitor.clear_threshold_:.4g}"
+    )
+    yield f"expected: {monitor.false_alarm_estimate_}"
+    is_watch = events["kind"] == WATCH
+    if monitor.watch_threshold_ is not None:
+        yield f"watch: {'; '.join(_of_watch(monitor, events[is_watch]))}"
+    yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
+    yield from _of_events(events[~is_watch])
+    faults = monitor.faults_
+    for _, fault in faults[faults["until"].isna()].iterrows():
+        yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
+    if monitor.drift_ is not None:
+        yield from _of_drift(monitor.drift_, monitor.status_.corrections.drift.n_left_out)
 
 
-def _plain(value: Any) -> Any:
-    """A value as JSON has it: times as text, durations in seconds, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(one) for name, one in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(one) for one in value]
-    if isinstance(value, pd.Timestamp):
-        return None if pd.isna(value) else value.isoformat()
-    if isinstance(value, pd.Timedelta):
-        return value.total_seconds()
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value
+def _of_watch(monitor: Any, events: pd.DataFrame) -> Iterator[str]:
+    yield f"opens above {monitor.watch_threshold_:.4g}"
+    yield f"{monitor.watch_per_year:g} false a year expected"
+    yield f"{len(events)} so far"
+    for number, event in events[events["end"].isna()].iterrows():
+        yield f"event {number} is open since {event['start']}"
+
+
+def _of_events(events: pd.DataFrame) -> Iterator[str]:
+    """A line for each of the latest events, and one for those that nobody has acknowledged."""
+    if not len(events):
+        yield "events: none"
+        return
+    n_earlier = max(len(events) - MOST_EVENTS, 0)
+    for number, event in events.iloc[n_earlier:].iterrows():
+        until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
+        said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
+        note = f" ({event['note']})" if event["note"] else ""
+        peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
+        yield f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}"
+    if n_earlier:
+        yield f"events: {n_earlier} earlier ones are in events_"
+    waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
+    if len(waiting):
+        yield f"ended, not acknowledged: event{'s' if len(waiting) > 1 else ''} {', '.join(map(str, waiting))}"
+
+
+def _of_drift(drift: pd.DataFrame, n_left_out: int) -> Iterator[str]:
+    found = "significant" if drift["significant"].any() else "not significant"
+    yield f"drift: {found} (p value {probability_text(drift['p_value'].iloc[0])})"
+    for group, one in drift[drift["significant"]].iterrows():
+        beyond = "; beyond the limit" if one["beyond_limit"] else ""
+        yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"
+    if n_left_out:
+        yield f"drift: {counted(n_left_out, 'day')} left out, on which responses changed abruptly"

@@ -15,7 +15,6 @@ from skthermo.plotting._structures import (
     Projection,
     add_members,
     check_structure,
-    corners,
     dofs_of,
     draw_supports,
     set_view,
@@ -176,17 +175,14 @@ class ModeShapesDisplay(Display):
         for one, mode, places, frequency in panels:
             drawn = []
             for lines, surfaces in parts:
-                if surfaces:
-                    add_members(one, "surfaces", corners(self.structure, surfaces, rest), facecolors=LIGHT, alpha=0.3)
-                    add_members(
-                        one, "surfaces", corners(self.structure, surfaces, places), facecolors=ORANGE, alpha=0.3
-                    )
+                for nodes, colour in ((rest, LIGHT), (places, ORANGE)) if surfaces else ():
+                    style = {"facecolors": colour, "alpha": 0.3}
+                    add_members(one, self.structure, nodes, "surfaces", surfaces, **style)
                 if lines:
-                    add_members(
-                        one, "lines", corners(self.structure, lines, rest), colors=LIGHT, linewidths=0.8, zorder=1
-                    )
+                    style = {"colors": LIGHT, "linewidths": 0.8, "zorder": 1}
+                    add_members(one, self.structure, rest, "lines", lines, **style)
                     style = {"colors": ORANGE, "linewidths": linewidth, "zorder": 2}
-                    drawn.append(add_members(one, "lines", corners(self.structure, lines, places), **style))
+                    drawn.append(add_members(one, self.structure, places, "lines", lines, **style))
             self.lines_.append(drawn)
             draw_supports(one, view, size=7)
             top = one.get_position(original=True).y1

@@ -158,7 +158,11 @@ class MonitorDisplay(Display):
         if by not in ("day", "record"):
             raise ValueError(f"by is {by!r}; expected 'day' or 'record'")
         days = _between(monitor.days_, start, end)
-        index = _by_day(days) if by == "day" else _by_record(_between(monitor.evaluations_, start, end))
+        if by == "day":
+            index = _by_day(days)
+        else:
+            evaluated = _between(monitor.evaluations_, start, end)
+            index = pd.DataFrame({"index": evaluated["index"], "is_alarm": evaluated["state"] == "alarm"})
         if not len(index):
             raise ValueError(f"there is no {by} between {start} and {end}; expected a time with records")
         faults = getattr(monitor, "faults_", None)
@@ -307,10 +311,6 @@ def _by_day(days: pd.DataFrame) -> pd.DataFrame:
         days = days.reindex(pd.date_range(days.index[0], days.index[-1], freq="D"))
     columns = {"index": days["index_max"], "median": days["index_median"], "is_alarm": days["n_alarms"].fillna(0) > 0}
     return pd.DataFrame(columns).astype({"index": float, "median": float})
-
-
-def _by_record(evaluated: pd.DataFrame) -> pd.DataFrame:
-    return pd.DataFrame({"index": evaluated["index"], "is_alarm": evaluated["state"] == "alarm"})
 
 
 def _thresholds(monitor: Monitor, times: pd.DatetimeIndex, length: pd.Timedelta) -> Array:

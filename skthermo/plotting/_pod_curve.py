@@ -185,7 +185,6 @@ class PODCurveDisplay(Display):
         return self
 
     def _draw_campaigns(self, drawn: Array, colour: str) -> PolyCollection | None:
-        """The band of a measured campaign; None for a curve without one."""
         if not getattr(self.curve, "replicates", ()):
             return None
         low, high = (100 * np.asarray(values) for values in self.curve.band(drawn))

@@ -16,9 +16,7 @@ from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_col
 from skthermo.plotting._structures import (
     Projection,
     add_members,
-    add_points,
     check_structure,
-    corners,
     draw_supports,
     set_view,
     sort_members,
@@ -188,15 +186,14 @@ class StructureDisplay(Display):
                 shown = np.ma.masked_invalid([of_member[name] for name in names])
                 widths = np.where(np.ma.getmaskarray(shown), THIN, width)
                 style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
-                places = corners(self.structure, names, nodes)
-                self.members_[kind] = add_members(self.ax_, kind, places, cmap=colours, **style)
-                self.members_[kind].set_array(shown)
-                self.members_[kind].set_clim(low, high)
+                drawn = add_members(self.ax_, self.structure, nodes, kind, names, cmap=colours, **style)
+                drawn.set_array(shown)
+                drawn.set_clim(low, high)
+                self.members_[kind] = drawn
         points = [name for name in points if np.isfinite(of_member[name])]
         if points:
-            style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high}
-            places = corners(self.structure, points, nodes)
-            self.members_["points"] = add_points(self.ax_, places, zorder=4, **style)
+            style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high, "zorder": 4}
+            self.members_["points"] = add_members(self.ax_, self.structure, nodes, "points", points, **style)
 
     def _draw_colorbar(self, is_beside: bool) -> Colorbar:
         """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
@@ -216,17 +213,15 @@ class StructureDisplay(Display):
         parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
         for name, (members, colour) in parts.items():
             points, lines, surfaces = sort_members(self.structure, members)
-            if points and name in coloured:
-                style = {"c": colour, "label": name, "zorder": 4}
-                self.members_[name] = add_points(self.ax_, corners(self.structure, points, nodes), **style)
-            if surfaces:
-                style = {"facecolors": colour, "alpha": 0.35, "label": name}
-                self.members_[name] = add_members(
-                    self.ax_, "surfaces", corners(self.structure, surfaces, nodes), **style
-                )
-            if lines:
-                style = {"colors": colour, "linewidths": widths.get(name, width), "label": name}
-                self.members_[name] = add_members(self.ax_, "lines", corners(self.structure, lines, nodes), **style)
+            drawn = {
+                "points": (points if name in coloured else [], {"c": colour, "zorder": 4}),
+                "surfaces": (surfaces, {"facecolors": colour, "alpha": 0.35}),
+                "lines": (lines, {"colors": colour, "linewidths": widths.get(name, width)}),
+            }
+            for kind, (some, style) in drawn.items():
+                if some:
+                    added = add_members(self.ax_, self.structure, nodes, kind, some, label=name, **style)
+                    self.members_[name] = added
 
     def _draw_legend(self, view: Projection, supports: Mapping[str, Artist], is_own_figure: bool) -> None:
         handles = [*(self.members_.values() if self.groups else ()), *supports.values()]

@@ -58,7 +58,6 @@ class Projection:
 
     @property
     def is_space(self) -> bool:
-        """Whether three directions are drawn."""
         return len(self.directions) == 3
 
     @property
@@ -162,7 +161,6 @@ def fill_place(ax: Axes, points: Array) -> None:
 
 
 def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[Hashable], ...]:
-    """Names of members that are points, lines and surfaces."""
     elements = structure.members
     points: list[Hashable] = []
     lines: list[Hashable] = []
@@ -173,19 +171,19 @@ def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[
     return points, lines, surfaces
 
 
-def corners(structure: Structure, names: Iterable[Hashable], places: Mapping[Hashable, Array]) -> list[Array]:
-    """Nodes of every member, (n_nodes, dimension) each."""
-    elements = structure.members
-    return [np.array([places[node] for node in elements[name].nodes]) for name in names]
-
-
-def add_points(ax: Axes, points: list[Array], **style: object) -> Collection:
-    """Add a diamond for every spring to the ground and every point mass, in two or three dimensions."""
-    return ax.scatter(*np.vstack(points).T, s=36, marker="D", edgecolors=BLACK, linewidths=0.5, clip_on=False, **style)
-
-
-def add_members(ax: Axes, kind: Literal["lines", "surfaces"], places: list[Array], **style: object) -> Collection:
-    """Add lines or polygons in two or three dimensions."""
+def add_members(
+    ax: Axes,
+    structure: Structure,
+    nodes: Mapping[Hashable, Array],
+    kind: Literal["points", "lines", "surfaces"],
+    names: Iterable[Hashable],
+    **style: object,
+) -> Collection:
+    """Add diamonds, lines or polygons for members with nodes at some places, in two or three dimensions."""
+    places = [np.array([nodes[node] for node in structure.members[name].nodes]) for name in names]
+    if kind == "points":
+        fixed = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "clip_on": False}
+        return ax.scatter(*np.vstack(places).T, **fixed, **style)
     name, fixed = (
         ("LineCollection", {"capstyle": "round"}) if kind == "lines" else ("PolyCollection", {"edgecolors": "none"})
     )

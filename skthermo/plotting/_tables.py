@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +32,6 @@ def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
 
 
 def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
-    """Raise an error if two tables differ in shape or index."""
     check_same_rows(first, other, names)
     if np.shape(as_columns(first)) != np.shape(as_columns(other)):
         raise ValueError(
@@ -65,17 +63,7 @@ def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def check_study(study: DetectabilityStudy) -> None:
-    """Raise an error for what is no study, or one without results."""
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
     if not hasattr(study, "results_"):
         raise NotFittedError("the study has no results yet; expected a call of run before")
-
-
-def names_from(chosen: Sequence[str] | None, known: Iterable[str], what: str) -> list[str]:
-    """Names that are chosen, or all that are known."""
-    names = list(known) if chosen is None else [chosen] if isinstance(chosen, str) else list(chosen)
-    unknown = [name for name in names if name not in set(known)]
-    if unknown or not names:
-        raise ValueError(f"{what} are {unknown or names}; expected some of {list(known)}, which have results")
-    return names

@@ -42,7 +42,6 @@ class Choice:
         return one
 
     def sentence(self) -> str:
-        """Which detector is recommended, and which one the report is on."""
         best, limit = quoted(self.best.name), percent(self.limit)
         text = f"Recommended is {best}, with a limit of {limit} false alarms."
         if not self.best["within_limit"]:
@@ -51,7 +50,6 @@ class Choice:
         return text if self.name == self.best.name else f"{text} {asked}"
 
     def section(self) -> Section:
-        """The recommended detector, and all others beside it."""
         results = self.study.results_
         damaged = results[(results["measure"] == "POD") & (results["source"] == SIMULATED)]
         n_states = counted(damaged["scenario"].nunique(), "damaged state")

@@ -78,14 +78,14 @@ def draw(
             plt.close(number)
 
 
-def fold_legend(figure: Figure, place: str, n_columns: int) -> None:
-    """Put the legends of a figure into fewer columns and one place, so that they fit a narrow drawing."""
+def fold_legend(figure: Figure, place: str) -> None:
+    """Put the legends of a figure into one place and at most two columns, so that they fit a narrow drawing."""
     for legend in [*figure.legends, *(ax.get_legend() for ax in figure.axes)]:
         if legend is None:
             continue
         labels = [text.get_text() for text in legend.get_texts()]
         legend.remove()
-        n_columns = n_columns if max(map(len, labels)) <= LONGEST_LABEL else 1
+        n_columns = 2 if max(map(len, labels)) <= LONGEST_LABEL else 1
         style = {"ncols": n_columns, "frameon": False, "fontsize": "medium" if n_columns == 2 else "small"}
         figure.legend(legend.legend_handles, labels, loc=place, **style)
 
@@ -145,7 +145,6 @@ def draw_modes(
 
 
 def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
-    """Probability of detection of one family of scenarios."""
     is_curve = bool(np.isfinite(fitted.slope))
     rates = ", ".join(
         f"{share_text(rate)} at {percent(abs(severity))}"
@@ -182,7 +181,7 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
 
     def make() -> DamageIndexDisplay:
         display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
-        fold_legend(display.figure_, "outside upper center", n_columns=2)
+        fold_legend(display.figure_, "outside upper center")
         return display
 
     table = pd.DataFrame(dict(shown)).assign(threshold=threshold)
@@ -191,22 +190,18 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
 
 
 def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
-    """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
 
     def make() -> StructureDisplay:
         display = StructureDisplay.from_structure(structure, groups=known)
-        fold_legend(
-            display.figure_, "lower center" if structure.dimension == 3 else "outside lower center", n_columns=2
-        )
+        fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
         return display
 
     return draw(make, alt, height=None, width=5.2)
 
 
 def draw_identified_damage(identified: IdentifiedDamage) -> Html:
-    """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
 

@@ -37,11 +37,9 @@ class Finding:
 
     @property
     def is_found(self) -> bool:
-        """Whether some tested severity is detected reliably."""
         return bool(np.isfinite(self.smallest))
 
     def sentence(self) -> str:
-        """The smallest severity that is detected reliably, in words."""
         kind = "a loss of stiffness" if self.severities[0] > 0 else "a gain of stiffness"
         least, largest = percent(abs(self.severities[0])), percent(abs(self.severities[-1]))
         if not self.is_found:

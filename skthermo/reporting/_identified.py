@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from skthermo._tables.text import SPACE, bounds_text, chance_text, share_text
+from skthermo._tables.text import SPACE, bounds_text, capital, chance_text, share_text
 from skthermo.reporting._figures import draw_identified_damage
 from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
 from skthermo.reporting._readable import Values, csv_link
@@ -55,10 +55,9 @@ def identified_damage(identified: IdentifiedDamage) -> Section:
 
 
 def _explanations(identified: IdentifiedDamage) -> Html:
-    """Explanations, the most probable first."""
     probable = identified.summary_table[identified.summary_table["probability"] >= LEAST]
     explanations = [
-        [_capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))]
+        [capital(row["text"]), bar(row["probability"], chance_text(row["probability"]))]
         for _, row in probable.iterrows()
     ]
     return table(
@@ -70,7 +69,6 @@ def _explanations(identified: IdentifiedDamage) -> Html:
 
 
 def _shifts(identified: IdentifiedDamage) -> Html:
-    """Shift of each mode, measured and explained."""
     shifts = [
         [
             mode,
@@ -88,7 +86,6 @@ def _shifts(identified: IdentifiedDamage) -> Html:
 
 
 def _row(cause: str, row: pd.Series, is_unobservable: bool) -> list[str]:
-    """Cells of one cause."""
     if is_unobservable:
         return [cause, "unobservable", UNITS[row["kind"]], "not known", "", ""]
     amounts = row[["severity", "ci_low", "ci_high", "highest_if_damaged"]].astype(float)
@@ -101,7 +98,3 @@ def _row(cause: str, row: pd.Series, is_unobservable: bool) -> list[str]:
         bounds_text(lowest, highest),
         share_text(abs(amounts["highest_if_damaged"])),
     ]
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -9,7 +9,7 @@ import pandas as pd
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import as_floats, spread_evenly
 from skthermo._tables.frames import column_names
-from skthermo._tables.text import SPACE, counted, duration_text, period_text, share_text, significant
+from skthermo._tables.text import SPACE, capital, counted, duration_text, period_text, share_text, significant
 from skthermo.fem import Structure
 from skthermo.reporting._figures import chosen_sensor, draw_groups, draw_modes
 from skthermo.reporting._findings import REFERENCE, SIMULATED
@@ -131,10 +131,9 @@ def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def _doubts(report: FitReport) -> list[str]:
-    """Records, modes and parameters that are doubtful, in sentences."""
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
     found = [*report.findings.warnings(), *report.warnings()]
-    doubts += [f"{text[0].upper()}{text[1:]}." for text in (warning.args[0] for warning in found)]
+    doubts += [f"{capital(warning.args[0])}." for warning in found]
     for name, deviation in report.deviations.items():
         if not deviation < LARGE_DEVIATION:
             doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from sklearn.exceptions import NotFittedError
@@ -56,17 +56,9 @@ def owner_report(
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
-    Of a study, it says which damage the monitoring would detect, the smallest one first, what was monitored, how good
-    the model is, which damage was identified, and with which settings and warnings all this was computed. Of several
-    detectors, it says which one is recommended and why, and the rest is on that one.
-
-    Of a monitor, it says whether the structure is healthy today, in alarm or not evaluated, since when and why; which
-    events there were; how the damage index, the stiffness and the sensors changed; what was not evaluated; and how many
-    false alarms are to be expected. A monitor without a record for two days more than usual is not called healthy.
-
-    Of a fleet, it says how many bridges are in which state, and how many of the alarms chance explains. A table has a
-    row for each bridge, the worst first, which opens that bridge's own page in a folder beside the file:
-    ``fleet_pages`` for ``fleet.html``. Pages of an earlier call are replaced.
+    Of a study, it says which damage the monitoring would detect; of a monitor, how the structure is today; of a fleet,
+    which bridges are in alarm, with a page for each in a folder beside the file (``fleet_pages`` for ``fleet.html``),
+    whose earlier pages are replaced. :doc:`/guide/report` describes the pages.
 
     Parameters
     ----------
@@ -131,32 +123,10 @@ def owner_report(
     ...     "<h1>Truss bridge</h1>" in file.read_text(encoding="utf-8")
     True
     """
-    kind = next((kind for kind, names in KINDS.items() if all(hasattr(subject, name) for name in names)), None)
-    if kind is None:
-        raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
-    if kind == "Monitor" and not hasattr(subject, "events_"):
-        raise NotFittedError("the monitor is not fitted yet; expected a call of fit before")
-    if kind == "DetectabilityStudy" and not hasattr(subject, "results_"):
-        raise NotFittedError("the study has no results yet; expected a call of run before")
-    types = {"title": str, "structure": Structure}
-    if identified is not None:
-        from skthermo.reporting._identified import IdentifiedDamage, identified_damage
-
-        types["identified"] = IdentifiedDamage
+    kind = _kind_of(subject)
     given = {"identified": identified, "title": title, "structure": structure, "detector": detector, "now": now}
-    for name, expected in types.items():
-        if given[name] is not None and not isinstance(given[name], expected):
-            raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
-    for name, kinds in ONLY_FOR.items():
-        if given[name] is not None and kind not in kinds:
-            raise ValueError(f"{name} given for a {type(subject).__name__}; expected only for a {' or a '.join(kinds)}")
-    file = check_path(path)
-    if not file.parent.is_dir():
-        raise ValueError(
-            f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
-        )
-    if file.is_dir():
-        raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
+    _check_arguments(kind, given)
+    file = _checked_file(path)
     if kind != "DetectabilityStudy":
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
     heading = HEADINGS[kind] if title is None else title
@@ -167,7 +137,10 @@ def owner_report(
         introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)
     elif kind == "Monitor":
         introduction, sections = monitor_page(Standing.of(subject, now, limit))
-        sections[-1:-1] = [] if identified is None else [identified_damage(identified)]
+        if identified is not None:
+            from skthermo.reporting._identified import identified_damage
+
+            sections.insert(-1, identified_damage(identified))
     else:
         from skthermo.reporting._study import study_page
 
@@ -175,4 +148,42 @@ def owner_report(
     written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
     ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
     write_when_complete(file, page(heading, introduction, sections, ending))
+    return file
+
+
+def _kind_of(subject: object) -> str:
+    """Whether it is a study, a monitor or a fleet; an error for what is none, or has nothing to report yet."""
+    kind = next((kind for kind, names in KINDS.items() if all(hasattr(subject, name) for name in names)), None)
+    if kind is None:
+        raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
+    if kind == "Monitor" and not hasattr(subject, "events_"):
+        raise NotFittedError("the monitor is not fitted yet; expected a call of fit before")
+    if kind == "DetectabilityStudy" and not hasattr(subject, "results_"):
+        raise NotFittedError("the study has no results yet; expected a call of run before")
+    return kind
+
+
+def _check_arguments(kind: str, given: dict[str, Any]) -> None:
+    """Raise an error for arguments of another type, or that are not for this subject."""
+    types = {"title": str, "structure": Structure}
+    if given["identified"] is not None:
+        from skthermo.studies import IdentifiedDamage
+
+        types["identified"] = IdentifiedDamage
+    for name, expected in types.items():
+        if given[name] is not None and not isinstance(given[name], expected):
+            raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
+    for name, kinds in ONLY_FOR.items():
+        if given[name] is not None and kind not in kinds:
+            raise ValueError(f"{name} given for a {kind}; expected only for a {' or a '.join(kinds)}")
+
+
+def _checked_file(path: str | os.PathLike[str]) -> Path:
+    file = check_path(path)
+    if not file.parent.is_dir():
+        raise ValueError(
+            f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
+        )
+    if file.is_dir():
+        raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
     return file

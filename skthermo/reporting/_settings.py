@@ -16,10 +16,13 @@ def settings(
     introduction: str, caption: str, rows: Iterable[Sequence[object]], warned: Sequence[str] | None = None
 ) -> Section:
     """Settings by name, versions and, where warnings are known, these."""
+    names = {"sklearn": "scikit-learn"}
+    versions = [[names.get(name, name), str(import_module(name).__version__)] for name in PACKAGES]
+    versions = [["Python", platform.python_version()], *versions]
     parts = [
         paragraphs(introduction),
         table(caption, ["Setting", "Value"], rows),
-        table("Versions of the programs.", ["Program", "Version"], versions()),
+        table("Versions of the programs.", ["Program", "Version"], versions),
     ]
     if warned is not None:
         parts += [element("h3", "Warnings"), bullets(warned) or paragraphs("There was no warning.")]
@@ -37,10 +40,3 @@ def parameters(estimators: Mapping[str, object], but: Sequence[str] = ()) -> lis
             label = f"{part}: {name}"
             rows += [] if label in but else [[label, element("code", text)]]
     return rows
-
-
-def versions() -> list[list[str]]:
-    """Programs and their versions."""
-    names = {"sklearn": "scikit-learn"}
-    found = [[names.get(name, name), str(import_module(name).__version__)] for name in PACKAGES]
-    return [["Python", platform.python_version()], *found]

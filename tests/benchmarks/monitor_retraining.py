@@ -65,7 +65,7 @@ def in_service(detector, baseline, kept, targets):
     fitted = clone(detector).fit(baseline)
     active = ByRecords.of(fitted, baseline)
     return SimpleNamespace(
-        _active=active,
+        active_=active,
         detector=detector,
         detector_=fitted,
         trained_=baseline,

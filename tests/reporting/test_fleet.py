@@ -161,7 +161,7 @@ def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
 
 
 def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
-    with pytest.raises(ValueError, match="detector given for a FakeFleet; expected only for a DetectabilityStudy"):
+    with pytest.raises(ValueError, match="detector given for a Fleet"):
         owner_report(fleet, tmp_path / "a.html", detector="x")
     with pytest.raises(ValueError, match="fdr is 2; expected a share"):
         owner_report(fleet, tmp_path / "a.html", fdr=2)

@@ -61,7 +61,6 @@ class FleetBasis:
 
     @property
     def n_functions(self) -> int:
-        """Number of functions."""
         return len(self.scale)
 
     def steady(self, temperatures: Array) -> Array:
@@ -70,7 +69,6 @@ class FleetBasis:
 
     @property
     def n_inputs(self) -> int:
-        """Number of inputs."""
         return len(self.middle)
 
     def __call__(self, inputs: Array) -> Array:

@@ -129,7 +129,6 @@ class Information:
 
     @property
     def n_outputs(self) -> int:
-        """Number of parameters or modes."""
         return len(self.level)
 
     @classmethod

@@ -64,32 +64,7 @@ class FleetPrior(Estimator):
 
     Notes
     -----
-    The logarithm of parameter (or mode) i of bridge b is
-
-        ln y_i(t) = l_bi + beta_bi' (u(T_t) - u_b) + e_i(t),
-
-    with one basis u for the fleet: principal components of the standardised inputs, lags included, and hinges of the
-    largest of them. Levels l belong to the bridge alone, so that a unit of y changes nothing else. Residuals are
-    N(0, S / w), their precision divided by their correlation time. Records far from what is usual count less. With the
-    linear link, y over a scale of its family stands in place of ln y.
-
-    In family g, beta ~ N(M'z, Sigma) for covariates z: a constant, standardised numbers and indicators of categories,
-    whose effects have a ridge. Expectation maximisation finds M and Sigma from the bridges' likelihoods; Sigma is drawn
-    to a multiple of the identity by three bridges' worth, and for another bridge it is widened by what a Student
-    distribution of so few bridges has. On its own, beta ~ N(0, tau^2 D), with the most likely tau, and a diagonal D
-    of how large each function is in any bridge.
-
-    Each bridge is left out (of more than 50, one of 50 groups at a time), and compared by the evidence of its records:
-    on its own, and by a mixture of following the others and being on its own. A family is pooled where three bridges
-    have it and the sum of the gains is beyond the 95 % quantile of Student's distribution for their scatter. Bridges
-    train a family by their probability of following it, so that atypical ones do not widen it.
-
-    What no function of the basis follows, such as the heat of the ground, is estimated from autocovariances of the
-    residuals two and three days apart (two and three rows, without stamps): the median over the bridges of a family.
-    Noise that remembers for so long counts as such, and makes bands wide.
-
-    ``tests/benchmarks/fleet_prior.py`` measures errors and bands beside the fleet's mean, a ridge towards it, bridges
-    on their own and bridges with a year of records.
+    Empirical Bayes: :ref:`how-a-fleet-prior-learns` has the law of the logarithms, and how families are pooled.
 
     Examples
     --------

@@ -111,7 +111,6 @@ class BridgeRecords:
 
     @property
     def n_outputs(self) -> int:
-        """Number of quantities, q."""
         return self.linear.shape[1]
 
 
@@ -121,7 +120,6 @@ def days_of(table: ArrayLike) -> Array | None:
 
 
 def usable_rows(inputs: Array, values: Array, weights: Array | None) -> Array:
-    """Rows with all inputs, at least one value and a weight."""
     usable = ~(np.isnan(inputs).any(axis=1) | np.isnan(values).all(axis=1))
     return usable if weights is None else usable & (weights > 0)
 
@@ -156,7 +154,6 @@ def errors_of(name: Hashable) -> Iterator[None]:
 
 
 def bridges_of(bridges: Any) -> dict[Hashable, Any]:
-    """Bridges by name."""
     bridges = getattr(bridges, "chains", bridges)
     if isinstance(bridges, Mapping):
         found = dict(bridges)
@@ -191,7 +188,6 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
 
 
 def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
-    """Two tables, checked."""
     options = {"dtype": np.float64}
     T = T.to_frame() if isinstance(T, pd.Series) else T
     inputs = check_array(T, ensure_2d=False, **options)

@@ -60,7 +60,6 @@ class DailyMeans:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Which modes were measured on which days."""
         return ~np.isnan(self.values)
 
     @property
@@ -73,7 +72,6 @@ class DailyMeans:
         return DailyMeans(self.values[days], self.counts[days], self.basis[days])
 
     def followed_by(self, later: DailyMeans) -> DailyMeans:
-        """These days, and later ones behind them."""
         parts = ((getattr(one, name) for one in (self, later)) for name in ("values", "counts", "basis"))
         return DailyMeans(*(np.concatenate(list(part)) for part in parts))
 

@@ -40,12 +40,10 @@ class ModeTrends:
 
     @property
     def n_groups(self) -> int:
-        """Number of groups."""
         return self.slopes.shape[1]
 
     @property
     def n_shapes(self) -> int:
-        """Number of shapes of time."""
         return len(self.mean) // len(self.slopes)
 
     @property
@@ -85,7 +83,6 @@ class ModeTrends:
         return covariance @ (weighted.T @ self.mean), covariance
 
     def widened(self, factor: float) -> ModeTrends:
-        """The same trends with a larger covariance."""
         return ModeTrends(self.mean, factor * self.covariance, self.slopes, self.years)
 
     def information(self) -> Array:
@@ -140,7 +137,6 @@ class Explanations:
 
     @property
     def probabilities(self) -> Array:
-        """Probability of each set, if any drifts."""
         weights = np.exp(self.evidence - self.evidence.max())
         return weights / weights.sum()
 

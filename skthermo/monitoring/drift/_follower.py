@@ -14,7 +14,7 @@ from scipy import stats
 from skthermo._effects import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR
+from skthermo._tables.frames import DAY, YEAR, as_index
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
@@ -66,7 +66,6 @@ class FollowerState(SavesFrames):
 
     @property
     def day(self) -> pd.Timestamp:
-        """Beginning of the last day."""
         return self.learned + len(self.sudden) * ONE_DAY
 
 
@@ -134,7 +133,6 @@ class DriftFollower:
         return replace(found, start_=replace(start, known=known))
 
     def start(self) -> FollowerState:
-        """What is known at the end of the baseline."""
         return self.start_
 
     def advance(self, state: FollowerState, T: pd.DataFrame, F: pd.DataFrame) -> FollowerState:
@@ -254,16 +252,13 @@ class DriftFollower:
 
     @property
     def modes(self) -> list[str]:
-        """Names of the frequencies that are followed."""
         return list(self.records.fem.mode_names_)
 
     @property
     def temperatures(self) -> list[str]:
-        """Names of the temperatures that tell the weather."""
         return list(self.records.fem.feature_names_in_)
 
     def _no_records(self) -> DailyMeans:
-        """A day without any."""
         n_modes, size = len(self.modes), self.records.basis.size + 1
         none = np.zeros((1, n_modes))
         return DailyMeans(none + np.nan, none, np.zeros((1, n_modes, size)))
@@ -328,8 +323,4 @@ def _latest(memory: Memory, T: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
 
 
 def _history(state: FollowerState, zone: Any, names: list[str]) -> pd.DataFrame:
-    """The latest temperatures that a state holds."""
-    stamps = pd.DatetimeIndex(state.times.astype("datetime64[ns]"))
-    return pd.DataFrame(
-        state.temperatures, stamps if zone is None else stamps.tz_localize("UTC").tz_convert(zone), names
-    )
+    return pd.DataFrame(state.temperatures, as_index(state.times, zone), names)

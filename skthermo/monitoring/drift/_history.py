@@ -14,7 +14,7 @@ from skthermo._effects import ALL_GROUPS
 from skthermo._estimators.warnings import warn_each
 from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
-from skthermo._tables.text import SPACE, counted, listed, percent, probability_text, significant
+from skthermo._tables.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
 from skthermo.monitoring._records import OF_TRAINING
 from skthermo.preprocessing import gross_errors
 
@@ -46,7 +46,7 @@ class GroupTrajectory(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ParameterHistory:
+class ParameterHistory(Sentences):
     """Stiffness of groups over years, with bands.
 
     It is returned by `track_parameters`.
@@ -232,36 +232,6 @@ class ParameterHistory:
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
         return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
 
-    def answer(self) -> list[str]:
-        """Whether there is a drift, where, how much a year, and how surely.
-
-        Returns
-        -------
-        list of str
-            Sentences. The first says whether there is a drift, and with which probability it would be chance.
-        """
-        return list(self._answer())
-
-    def limits(self) -> list[str]:
-        """What is not known.
-
-        Returns
-        -------
-        list of str
-            Sentences.
-        """
-        return list(self._limits())
-
-    def summary(self) -> str:
-        """What was found, and what is not known.
-
-        Returns
-        -------
-        str
-            One sentence a line.
-        """
-        return "\n".join([*self.answer(), *self.limits()]).replace(SPACE, " ")
-
     def __repr__(self) -> str:
         rates = self.rates
         found = ", ".join(
@@ -310,7 +280,8 @@ class ParameterHistory:
         for group, others in self.alternatives.items():
             rate = rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
-            yield (f"{group} {verb} {_yearly(rate)} of its stiffness a year, {percent(rate['change'], '+.2g')} in all.")
+            yearly = f"{_share(rate['per_year'])} (±{SPACE}{_share(2 * rate['standard_error'])})"
+            yield f"{group} {verb} {yearly} of its stiffness a year, {percent(rate['change'], '+.2g')} in all."
             others = [other for other in others if other != group]
             if others:
                 each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
@@ -348,7 +319,3 @@ class ParameterHistory:
 
 def _share(value: float) -> str:
     return f"{significant(100 * abs(float(value)))}{SPACE}%"
-
-
-def _yearly(rate: Any) -> str:
-    return f"{_share(rate['per_year'])} (±{SPACE}{_share(2 * rate['standard_error'])})"

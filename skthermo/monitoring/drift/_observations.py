@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
@@ -94,7 +93,8 @@ class DailyRecords:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
         predicted = (self.surface(parameters(self.fem, T)) + self.fem.discrepancy_(T))[-len(F) :]
         ratios = np.log(as_floats(F)) - predicted
-        lacking = without_past(self.fem, T)[-len(F) :]
+        lacking = np.any([np.zeros(len(T), dtype=bool), *(step.lacks_past(T) for step in means_of(self.fem))], axis=0)
+        lacking = lacking[-len(F) :]
         ratios[lacking & ~lacking.all()] = np.nan  # their predictions would pass for drift
         return DailyMeans.of(ratios, weather(self.fem, T)[-len(F) :], F.index, self.basis, days, before)
 
@@ -105,11 +105,6 @@ def weather(fem: Any, T: Any) -> Array:
     with without_warnings():  # the chain tells of records without a past
         means = [as_floats(step.transform(filled))[:, filled.shape[1] :] for step in means_of(fem)]
     return np.hstack([as_floats(filled), *means])
-
-
-def without_past(fem: Any, T: Any) -> NDArray[np.bool_]:
-    """Which records lack the weather before them that the mapper is given means of."""
-    return np.any([np.zeros(len(T), dtype=bool), *(step.lacks_past(T) for step in means_of(fem))], axis=0)
 
 
 def means_of(fem: Any) -> list[ExponentialMeans]:
@@ -144,11 +139,9 @@ class GroupEffects:
 
     @property
     def names(self) -> list[str]:
-        """Names of the groups."""
         return list(self.members)
 
     def without_even(self) -> GroupEffects:
-        """The groups alone."""
         kept = [place for place in range(len(self.members)) if place not in self.even]
         members = {name: joined for name, joined in self.members.items() if name != ALL_GROUPS}
         return replace(self, slopes=self.slopes[:, kept], members=members, incidence=self.incidence[:, kept])

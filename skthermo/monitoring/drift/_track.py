@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, as_random_state, is_real
+from skthermo._tables.arrays import Array, as_random_state, check_probability
 from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
@@ -86,23 +86,8 @@ def track_parameters(
 
     Notes
     -----
-    Daily means of ln(measured / predicted frequency) are the sum of four parts. The drift is the product of the
-    Jacobian d ln f / d ln stiffness, averaged over the weather, and the change of ln stiffness of the groups: a steady
-    rate and a random walk, both 0 on the first day. What the chain has mislearned depends on the weather: a constant,
-    principal coordinates of the temperatures, their squares, hinges in cold and heat, and the day before, with unknown
-    coefficients for each mode, so that one year's weather is not taken for ageing and a chain that was trained on
-    drifting records does not hide the drift. A disturbance of each mode fades from day to day, and the rest is new with
-    each record. The variances are those of greatest restricted likelihood; modes are correlated.
-
     Bands allow for an error of 1 % of the FE model's effects; if it is less accurate than that, they are too narrow.
-
-    Each mode's trend is estimated first. Sets of one or two groups, and an even change of all groups, then explain
-    these trends, weighed by their evidence: most structures age in few places or everywhere alike, and different
-    changes in all groups at once are hardly ever determined. If no set explains the trends within their errors, all
-    errors are widened by Birge's ratio. The ``p_value`` of the drift compares the evidence of the best group with
-    that in draws of trends without drift. The stiffness of the best set by day is a steady rate and slow waves,
-    with the effects of changes as large as theirs. Each other group is given as one that changes beside it, and a
-    group that explains the trends about as well as one of the set in the place of that: the two are named as a set.
+    :ref:`how-drift-is-estimated` has the parts of the daily means, and how sets of groups explain the trends.
 
     Examples
     --------
@@ -117,8 +102,7 @@ def track_parameters(
     (True, 'bottom')
     """
     check_records(fem, T, F)
-    if not is_real(significance) or not 0 < significance < 1:
-        raise ValueError(f"significance is {significance!r}; expected a probability between 0 and 1, such as 0.01")
+    check_probability(significance, "significance")
     random = as_random_state(random_state)
     length_of(freq)
     order = np.argsort(F.index, kind="stable")
@@ -137,7 +121,6 @@ def track_parameters(
 
 
 def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
-    """Daily means without modes that were measured on too few days."""
     needed = FEWEST * (daily.basis.shape[2] + N_SHAPES)
     n_days = daily.known.sum(axis=0)
     if (n_days < needed).all():
@@ -173,7 +156,6 @@ class Followed:
     n_days: int
 
     def best(self) -> dict[int, GroupTrajectory]:
-        """The groups of the best set."""
         groups, walk = self.found.sets[0], float(self.found.walk[0])
         return {group: self.beside([group], [one for one in groups if one != group], walk) for group in groups}
 
@@ -230,32 +212,28 @@ def history_of(
     significance: float,
     random: np.random.RandomState,
 ) -> ParameterHistory:
-    """What was found, by the names of groups and modes."""
     found, names = followed.found, effects.names
-    best, has_drift = found.sets[0], found.p_value <= significance
-    alternatives = {group: found.instead(group) for group in best} if has_drift else {}
-    trajectories = followed.best() if has_drift else {}
-    for group in range(len(names)):
-        if group not in trajectories:
-            replaced = {member for member, others in alternatives.items() if group in others}
-            others = [member for member in best if member not in replaced] if has_drift else []
-            trajectories[group] = followed.beside([group], others, float(found.walk[0]) if has_drift else 0.0)
+    has_drift, trends = found.p_value <= significance, followed.trends
+    best, walk = (found.sets[0], float(found.walk[0])) if has_drift else ((), 0.0)
+    alternatives = {group: found.instead(group) for group in best}
+    trajectories = [
+        followed.beside([group], [one for one in best if group not in alternatives[one]], walk)
+        for group in range(len(names))
+    ]
     sets = indistinguishable_sets(found, alternatives, effects.even)
-    named = {names[group]: trajectories[group] for group in range(len(names))}
-    for one in sets:
-        others = [member for member in best if member not in one] if has_drift else []
-        label = " and ".join(names[group] for group in one)
-        named[label] = followed.beside(one, others, float(found.walk[0]) if has_drift else 0.0)
-    named = {name: trajectory.with_error_of_effects(EFFECT_ERROR) for name, trajectory in named.items()}
-    information = np.diag(followed.trends.information())
+    named = dict(zip(names, trajectories, strict=True))
+    for alike in sets:
+        label = " and ".join(names[group] for group in alike)
+        named[label] = followed.beside(alike, [one for one in best if one not in alike], walk)
     with np.errstate(divide="ignore"):
-        alone = 1 / np.sqrt(information) / followed.trends.years
-    shifts = sum((np.outer(trajectories[group].mean, followed.trends.slopes[:, group]) for group in best), start=0.0)
-    trends = followed.trends
-    misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(best)
+        alone = 1 / np.sqrt(np.diag(trends.information())) / trends.years
+    shifts = np.zeros((len(days), len(trends.slopes)))
+    for group in best:
+        shifts += np.outer(trajectories[group].mean, trends.slopes[:, group])
+    misfit, freedom = replace(trends, covariance=trends.covariance / found.widening).misfit(found.sets[0])
     return ParameterHistory(
         days=days,
-        trajectories=named,
+        trajectories={name: one.with_error_of_effects(EFFECT_ERROR) for name, one in named.items()},
         years=trends.years,
         p_value=found.p_value,
         significance=significance,
@@ -271,11 +249,9 @@ def history_of(
         confounded={names[one]: [names[other] for other in others] for one, others in found.confounded.items()},
         unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
         detectable_rates=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
-        modes=mode_table(
-            fem.mode_names_, followed, shifts[-1] if has_drift else np.zeros(len(trends.slopes)), is_measured
-        ),
+        modes=mode_table(fem.mode_names_, followed, shifts[-1], is_measured),
         misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
         widening=found.widening,
-        shifts=pd.DataFrame(shifts if has_drift else 0.0 * shifts, days, fem.mode_names_),
+        shifts=pd.DataFrame(shifts, days, fem.mode_names_),
         seed=int(random.randint(2**31 - 1)),
     )

@@ -13,8 +13,8 @@ from sklearn.utils import check_random_state
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time
-from skthermo._tables.text import counted
+from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
+from skthermo._tables.text import capital, counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._memory import Memory
@@ -121,7 +121,7 @@ class Retraining:
             lines.append(
                 f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
             )
-        lines += [f"{note[:1].upper()}{note[1:]}." for note in self.notes]
+        lines += [f"{capital(note)}." for note in self.notes]
         return "\n".join(lines)
 
 
@@ -129,7 +129,8 @@ def retrained(
     monitor: Any, records: pd.DataFrame | None, activated: Activated, *, until: Any = None, force: bool = False
 ) -> Retraining:
     """A detector that has learned from the baseline and what came since, compared with the one in charge."""
-    harvest = _harvest(monitor, records, until)
+    kept, margin = _until(_kept(monitor, records), until), margin_of(monitor.lookback_, monitor.trained_)
+    harvest = Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
@@ -213,13 +214,6 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
     return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
 
 
-def _harvest(monitor: Any, records: pd.DataFrame | None, until: Any) -> Harvest:
-    """Records since the baseline that may train."""
-    kept = _until(_kept(monitor, records), until)
-    margin = margin_of(monitor.lookback_, monitor.trained_)
-    return Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
-
-
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
@@ -249,7 +243,6 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
 
 
 def _candidate(monitor: Any, baseline: pd.DataFrame, activated: Activated) -> ActiveDetector:
-    """A clone of the detector, fitted, with its monitor's threshold."""
     with without_warnings():
         return activated(clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)]), baseline)
 
@@ -264,7 +257,6 @@ def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.
 
 
 def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
-    """Kept records of each event that was not acknowledged as harmless."""
     records, events, found = monitor.corrected_, monitor.events_, {}
     margin = margin_of(monitor.lookback_, monitor.trained_)  # which windows reach back into
     for number, event in zip(events.index, events.itertuples(), strict=True):
@@ -319,7 +311,6 @@ class Harvest:
 
 
 def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
-    """Start, end and reason of each time that may not train."""
     for number, event in zip(events.index, events.itertuples(), strict=True):
         if event.harmless or event.kind == WATCH:
             continue
@@ -331,7 +322,7 @@ def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, An
 
 def margin_of(memory: Memory, records: pd.DataFrame) -> pd.Timedelta:
     """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
-    return max(MARGIN, memory.duration(pd.Series(records.index).diff().median()))
+    return max(MARGIN, memory.duration(usual_step(records.index)))
 
 
 @dataclass(frozen=True)
@@ -350,8 +341,7 @@ class NewLevel:
     def of(cls, old: WeatherFree, new: pd.DataFrame) -> NewLevel:
         """From new records, by what the old regression leaves of them."""
         left = old.of_new(new)
-        step = pd.Series(new.index).diff().median()
-        span = new.index[-1] - new.index[0] + (step if pd.notna(step) else pd.Timedelta(0))
+        span = new.index[-1] - new.index[0] + usual_step(new.index)
         counts = left.notna().sum()
         deviations = old.residuals.std()
         times = pd.Series([correlation_time(column) for column in old.residuals.to_numpy().T], left.columns)

@@ -158,7 +158,6 @@ class LevelShift:
         return cls(what, *of_mode, free.is_relative, size, _p_value(change, covariance, n_independent))
 
     def sentence(self) -> str:
-        """The change in words."""
         worst = (self.change / self.standard_error).abs().idxmax()
         factor, unit = (100, " %") if self.is_relative[worst] else (1, " (its unit)")
         return (

@@ -54,11 +54,9 @@ class Departures(NamedTuple):
     beyond: Array
 
     def rows(self, rows: Any) -> Departures:
-        """Some of the days."""
         return Departures(*(part[rows] for part in self))
 
     def known(self) -> Departures:
-        """The days with a value."""
         return self.rows(~np.isnan(self.values))
 
 
@@ -76,7 +74,6 @@ class ThermometerNoise:
 
     @classmethod
     def of(cls, departures: Departures, per_year: float) -> ThermometerNoise:
-        """Learn from a healthy series."""
         limit = float(norm.isf(per_year / 365.25 / TESTS_A_DAY / 2))
         days, y = departures.known()[:2]
         if len(y) < 2 * LEAST_DAYS:

@@ -6,10 +6,9 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import DAY_NS
+from skthermo._tables.frames import DAY_NS, as_index
 
 SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
 COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
@@ -35,7 +34,6 @@ class Fault:
     until: int | None = None
 
     def detail(self, other: Hashable, unit: str) -> str:
-        """What was seen, and what is done about it."""
         value = f"{self.size:.6g} {unit}".rstrip()
         return {
             "dead": "has had no value for longer than gaps of the baseline",
@@ -57,7 +55,6 @@ class SensorFaults:
     faults: tuple[Fault, ...] = ()
 
     def lasting(self, *kinds: str) -> list[Fault]:
-        """Faults that last, of these kinds."""
         return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
 
     def left_out(self) -> dict[int, Fault]:
@@ -74,7 +71,6 @@ class SensorFaults:
         return SensorFaults((*self.faults, fault))
 
     def changed(self, fault: Fault, **values: Any) -> SensorFaults:
-        """With other values of one fault."""
         return SensorFaults(tuple(replace(one, **values) if one is fault else one for one in self.faults))
 
     def notes(self, names: Sequence[Hashable], zone: str) -> list[str]:
@@ -82,7 +78,7 @@ class SensorFaults:
         return [
             f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
             if fault.kind == "swapped"
-            else f"{names[fault.column]} is left out ({fault.kind} since {_stamps([fault.since], zone)[0]:%Y-%m-%d})"
+            else f"{names[fault.column]} is left out ({fault.kind} since {as_index([fault.since], zone)[0]:%Y-%m-%d})"
             for fault in self.lasting(*LEFT_OUT, "swapped")
         ]
 
@@ -95,12 +91,4 @@ class SensorFaults:
         ]
         columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
         table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
-        return pd.DataFrame(table | {name: _stamps(columns[name], zone) for name in ("since", "detected", "until")})
-
-
-def _stamps(times: Sequence[int | None], zone: str) -> pd.DatetimeIndex:
-    """Nanoseconds as stamps in a time zone; none for None."""
-    missing = np.iinfo(np.int64).min
-    numbers = np.array([missing if time is None else time for time in times], dtype=np.int64)
-    stamps = pd.DatetimeIndex(numbers.view("M8[ns]"))
-    return stamps.tz_localize("UTC").tz_convert(zone) if zone else stamps
+        return pd.DataFrame(table | {name: as_index(columns[name], zone) for name in ("since", "detected", "until")})

@@ -47,7 +47,6 @@ class Responses:
 
     @classmethod
     def of(cls, temperatures: Array, values: Array, stamps: pd.DatetimeIndex, units: Sequence[str]) -> Responses:
-        """Learn from the baseline."""
         centre, scatter = median(values), robust_deviation(values)
         least = np.where(scatter > 0, LEAST * scatter, np.where(centre != 0, LEAST * np.abs(centre), LEAST))
         scatter = np.maximum(np.nan_to_num(scatter), np.nan_to_num(least, nan=LEAST))
@@ -114,5 +113,4 @@ class Responses:
 
 
 def _known(values: Array) -> list[Array]:
-    """The values of each column that are there."""
     return [column[~np.isnan(column)] for column in values.T]

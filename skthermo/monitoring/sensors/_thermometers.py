@@ -55,7 +55,6 @@ class UsualWeather:
         return np.column_stack([np.ones(len(at)), *(part for wave in waves for part in (np.sin(wave), np.cos(wave)))])
 
     def anomalies(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
-        """Temperatures minus the usual ones."""
         return temperatures - self.inputs(stamps) @ self.coefficients
 
 

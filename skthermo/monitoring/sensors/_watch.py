@@ -45,7 +45,6 @@ class Runs:
 
     @classmethod
     def none(cls, last: Array) -> Runs:
-        """No run yet, after these last values."""
         return cls(last, np.zeros((3, len(last)), dtype=np.int64), np.zeros((3, len(last)), dtype=np.int64))
 
     def after(self, stamps: Counts, values: Array, implausible: NDArray[np.bool_]) -> Runs:
@@ -56,7 +55,6 @@ class Runs:
         return runs
 
     def _next(self, stamp: np.int64, row: Array, implausible: NDArray[np.bool_]) -> Runs:
-        """Runs after one more record."""
         seen = ~np.isnan(row)
         if not seen.any():
             return self
@@ -202,7 +200,6 @@ class SensorWatch:
         )
 
     def start(self) -> WatchState:
-        """The state before the first day."""
         n_sensors, n_pairs = len(self.sensors), len(self.expected.pairs)
         return WatchState(
             Runs.none(self.run_limits.last),
@@ -257,7 +254,6 @@ class SensorWatch:
         moments: Counts,
         acknowledged: Sequence[int],
     ) -> NDArray[np.bool_]:
-        """Responses set aside that the structure may have moved."""
         n_sensors, faults = len(self.sensors), state.faults
         of_mode = {
             column - n_sensors: fault
@@ -341,7 +337,6 @@ class SensorWatch:
         return self._with_departures(self._without_ended(state, midnight), midnight)
 
     def _midnight(self, day: int) -> np.int64:
-        """Beginning of a day, in nanoseconds."""
         stamp = pd.Timestamp(day * DAY_NS)
         return np.int64(
             (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
@@ -380,7 +375,6 @@ class SensorWatch:
         return replace(state, exchanged=evidence, exchanged_since=since, faults=faults)
 
     def _with_runs(self, state: WatchState, midnight: int) -> WatchState:
-        """Columns that are dead, stuck or implausible, or no longer."""
         faults, runs = state.faults, state.runs
         is_run = runs.counts >= self.run_limits.limits
         out = faults.left_out()
@@ -414,11 +408,9 @@ class SensorWatch:
         return replace(state, departures=self.thermometers.departures(state.means, self._trusted(state.faults)))
 
     def _trusted(self, faults: SensorFaults) -> NDArray[np.bool_]:
-        """Thermometers that are not left out."""
         return ~self._left_out(faults)[: len(self.sensors)]
 
     def _left_out(self, faults: SensorFaults) -> NDArray[np.bool_]:
-        """Thermometers and modes that are left out."""
         return np.isin(np.arange(len(self.sensors) + len(self.modes)), list(faults.left_out()))
 
     def _change(self, state: WatchState, sensor: int) -> Change | None:
@@ -427,7 +419,6 @@ class SensorWatch:
         return self.thermometers.noises[sensor].change(departures)
 
     def _is_fault(self, sensor: int, change: Change | None) -> bool:
-        """Whether noise does not explain a change, and it matters."""
         if change is None or change.n_days < LEAST_DAYS:
             return False
         return change.z > self.thermometers.noises[sensor].limit and abs(change.size) > A_DEGREE
@@ -454,7 +445,6 @@ class SensorWatch:
         return state
 
     def _described(self, change: Change) -> dict[str, Any]:
-        """A change in the words of `Fault`."""
         kind = "drift" if change.rate else "offset"
         return {"kind": kind, "since": int(self._midnight(change.first)), "size": change.size, "rate": change.rate}
 

@@ -10,28 +10,28 @@ import pandas as pd
 from skthermo._tables.text import counted
 from skthermo.reporting._html import Html, Section, element, paragraphs, section, table
 from skthermo.reporting.fleet._bridge import FAILED, FAILURES, UNEXPLAINED, UNKNOWN_STATES, UNWATCHED, Bridge
-from skthermo.reporting.service import ALARM, ATTENTION, HEALTHY, NOT_EVALUATED, WATCH, banner, first_section
+from skthermo.reporting.service import banner, first_section
 
 MOST_NAMED = 5  # largest number of bridges in a sentence
 
 COUNTED = {
-    ALARM: "in alarm",
-    WATCH: "to be watched, with a raised damage index but no alarm",
-    ATTENTION: "without an alarm, but with much stiffness lost slowly",
-    NOT_EVALUATED: "not evaluated by the monitor",
+    "alarm": "in alarm",
+    "watch": "to be watched, with a raised damage index but no alarm",
+    "attention": "without an alarm, but with much stiffness lost slowly",
+    "not evaluated": "not evaluated by the monitor",
     FAILED: "that could not be fitted",
     UNWATCHED: "without a monitor",
-    HEALTHY: "healthy",
+    "healthy": "healthy",
 }
 """States in words, the worst first."""
 
 STEPS = {
-    ALARM: "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, "
+    "alarm": "Inspect the bridges in alarm, from the top of the table down; of those that are not significant, "
     "the records first.",
-    WATCH: "Look at the records of the bridges that are to be watched.",
+    "watch": "Look at the records of the bridges that are to be watched.",
     UNEXPLAINED: "Find out what the events were that have ended, and acknowledge them.",
-    ATTENTION: "Ask an engineer whether the bridges that lost stiffness slowly can bear it.",
-    NOT_EVALUATED: "Check loggers and sensors of the bridges that are not evaluated.",
+    "attention": "Ask an engineer whether the bridges that lost stiffness slowly can bear it.",
+    "not evaluated": "Check loggers and sensors of the bridges that are not evaluated.",
     FAILED: "Ask an engineer to look at the records and the models of the bridges that could not be fitted.",
     UNWATCHED: "Have monitors fitted for the bridges without one.",
 }
@@ -44,12 +44,12 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any,
     counts = [f"{numbers[state]:,} {text}" for state, text in COUNTED.items() if numbers.get(state, 0)]
     unknown = int(sum(numbers.get(state, 0) for state in UNKNOWN_STATES))
     unexplained = [bridge for bridge in bridges if bridge.place == UNEXPLAINED]
-    state = ALARM if ALARM in numbers else ATTENTION if unexplained or ATTENTION in numbers else HEALTHY
-    state = WATCH if WATCH in numbers and state == HEALTHY else state
-    state = NOT_EVALUATED if unknown and state == HEALTHY else state
+    state = "alarm" if "alarm" in numbers else "attention" if unexplained or "attention" in numbers else "healthy"
+    state = "watch" if "watch" in numbers and state == "healthy" else state
+    state = "not evaluated" if unknown and state == "healthy" else state
     headline = _headline(numbers, len(bridges), unknown, len(unexplained))
     standing = banner(state, written, headline, f"Of {counted(len(bridges), 'bridge')}: {'; '.join(counts)}.")
-    alarms = [bridge for bridge in bridges if bridge.state == ALARM]
+    alarms = [bridge for bridge in bridges if bridge.state == "alarm"]
     known = [
         _named(alarms, links, "In alarm"),
         _named(unexplained, links, "An event that would be significant has ended, and is not yet explained"),
@@ -70,14 +70,14 @@ def answer(bridges: Sequence[Bridge], links: Mapping[Hashable, str], found: Any,
 
 def _headline(numbers: pd.Series, total: int, unknown: int, unexplained: int) -> str:
     all_of = f"{total:,}"
-    if ALARM in numbers:
-        return f"{numbers[ALARM]:,} of {all_of} bridges {_is(numbers[ALARM])} in alarm"
+    if "alarm" in numbers:
+        return f"{numbers['alarm']:,} of {all_of} bridges {_is(numbers['alarm'])} in alarm"
     if unexplained:
         return f"No alarm now, but {unexplained:,} of {all_of} bridges had one that nobody has explained"
-    if ATTENTION in numbers:
-        return f"No alarm, but {numbers[ATTENTION]:,} of {all_of} bridges lost much stiffness slowly"
-    if WATCH in numbers:
-        return f"No alarm, but {numbers[WATCH]:,} of {all_of} bridges {_is(numbers[WATCH])} to be watched"
+    if "attention" in numbers:
+        return f"No alarm, but {numbers['attention']:,} of {all_of} bridges lost much stiffness slowly"
+    if "watch" in numbers:
+        return f"No alarm, but {numbers['watch']:,} of {all_of} bridges {_is(numbers['watch'])} to be watched"
     if unknown:
         return f"No alarm, but nothing is known of {unknown:,} of {all_of} bridges"
     return f"No alarm: {'the bridge is' if total == 1 else f'all {all_of} bridges are'} healthy"
@@ -91,17 +91,14 @@ def _named(bridges: Sequence[Bridge], links: Mapping[Hashable, str], text: str) 
     """A sentence that names bridges, the worst first, with how long they are in alarm and their small print."""
     if not bridges:
         return Html()
+    notes = {one.name: [element("small", f" ({one.note})")] for one in bridges if one.note}
     shown = [
-        element("span", element("a", one.name, href=links[one.name]), one.duration, _small(one.note))
+        element("span", element("a", one.name, href=links[one.name]), one.duration, *notes.get(one.name, ()))
         for one in bridges[:MOST_NAMED]
     ]
     rest = f" and {len(bridges) - MOST_NAMED:,} more, in the table" if len(bridges) > MOST_NAMED else ""
     listed = [part for one in shown for part in (", ", one)][1:]
     return element("span", element("strong", f"{text}: "), *listed, f"{rest}.")
-
-
-def _small(note: str) -> Html:
-    return element("small", f" ({note})") if note else Html()
 
 
 def _steps(bridges: Sequence[Bridge]) -> list[str]:

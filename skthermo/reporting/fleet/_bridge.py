@@ -11,10 +11,10 @@ import pandas as pd
 from skthermo._tables.text import counted, duration_text, listed, percent
 from skthermo.reporting._chart import line
 from skthermo.reporting._html import Html
-from skthermo.reporting.service import ALARM, ATTENTION, NOT_EVALUATED, WATCH, Standing, moment
+from skthermo.reporting.service import Standing, moment
 
 FAILED, UNWATCHED = "not fitted", "no monitor"
-UNKNOWN_STATES = (NOT_EVALUATED, FAILED, UNWATCHED)
+UNKNOWN_STATES = ("not evaluated", FAILED, UNWATCHED)
 NOT_SIGNIFICANT = "not significant after correction for many bridges; inspect"
 FAILURES = {
     "records": "Its records could not be read",
@@ -74,17 +74,17 @@ class Bridge:
         highest = float(opened["peak"].max()) / threshold if len(opened) else np.nan
         change, drift = _drift(standing)
         place, size, duration, note = WELL, change, "", ""
-        if standing.state == ALARM:
+        if standing.state == "alarm":
             place, size = (SIGNIFICANT if is_significant else OPEN), highest
-            duration = f" for {duration_text(max(standing.now - opened['start'].min(), standing.step))}"
+            duration = f" for {duration_text(max(standing.now - opened['start'].min(), standing.status.step))}"
             note = "" if is_significant else NOT_SIGNIFICANT
         elif unexplained:
             place, size = UNEXPLAINED, float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
-        elif standing.state == WATCH:
-            place, size = RAISED, float(standing.opened(WATCH)["peak"].max()) / threshold
-        elif standing.state == ATTENTION:
+        elif standing.state == "watch":
+            place, size = RAISED, float(standing.opened("watch")["peak"].max()) / threshold
+        elif standing.state == "attention":
             place = WORN
-        elif standing.state == NOT_EVALUATED:
+        elif standing.state == "not evaluated":
             place, size = SILENT, (standing.now - standing.doubt.since) / pd.Timedelta("1D")
         elif change > 0:
             place = DRIFTING
@@ -112,9 +112,9 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
     """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
     if len(opened):
         return opened["start"].min()
-    if standing.state == WATCH:
-        return standing.opened(WATCH)["start"].min()
-    if standing.state == NOT_EVALUATED:
+    if standing.state == "watch":
+        return standing.opened("watch")["start"].min()
+    if standing.state == "not evaluated":
         return standing.doubt.since
     ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
     return ends.max() if len(ends) else standing.monitor.days_.index[0]
@@ -123,29 +123,26 @@ def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
 def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -> str:
     """What an owner should know beside the state."""
     texts = []
-    if standing.state == ALARM:
+    if standing.state == "alarm":
         modes = listed(sorted({mode for text in opened["modes"] if text for mode in str(text).split(", ")}))
         texts.append(f"Modes that drive it: {modes}." if modes else "")
-        if standing.is_silent:
+        if standing.status.is_late:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
-    elif standing.state == WATCH:
+    elif standing.state == "watch":
         texts.append("The damage index is raised, below the level of an alarm.")
-    elif standing.state == NOT_EVALUATED:
+    elif standing.state == "not evaluated":
         texts.append(f"{standing.doubt.explanation}.")
-    elif standing.state == ATTENTION:
+    elif standing.state == "attention":
         texts.append(f"{listed(standing.worn)} lost {percent(standing.limit)} or more of the stiffness slowly.")
-    if standing.error and standing.state == ALARM:
+    if standing.error and standing.state == "alarm":
         texts.append(f"{standing.error}.")
     if unexplained:
         number = f"Event{'' if len(unexplained) == 1 else 's'} {listed(list(unexplained))}"
         texts.append(f"{number} would be significant, but ended before it was explained.")
     if len(standing.failed):
-        texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{_more(standing.failed)}.")
+        more = f" and {len(standing.failed) - 3} more" if len(standing.failed) > 3 else ""
+        texts.append(f"Failed sensors: {listed(list(standing.failed['column'])[:3])}{more}.")
     return " ".join(text for text in texts if text)
-
-
-def _more(failed: pd.DataFrame) -> str:
-    return f" and {len(failed) - 3} more" if len(failed) > 3 else ""
 
 
 def _drift(standing: Standing) -> tuple[float, str]:

@@ -31,9 +31,6 @@ from skthermo.reporting.fleet._bridge import (
 )
 from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.service import (
-    ATTENTION,
-    HEALTHY,
-    NOT_EVALUATED,
     Standing,
     Time,
     banner,
@@ -57,7 +54,7 @@ HEADLINES = {
         "Not evaluated: it could not be fitted",
         "An engineer should look at the records and at the model of this bridge; the others are not affected.",
     ),
-    NOT_EVALUATED: (
+    "not evaluated": (
         "Not evaluated: its monitor cannot be used",
         "An engineer should look at the monitor of this bridge; the others are not affected.",
     ),
@@ -103,14 +100,21 @@ class PageWriter:
     @cached_property
     def errors(self) -> dict[Hashable, pd.DataFrame]:
         """Errors by bridge: stage, error and what failed in an owner's words."""
-        return dict(iter(in_words(self.fleet.errors).groupby("bridge")))
+        found = in_words(self.fleet.errors)
+        by_bridge = dict(iter(found.groupby("bridge")))
+        return {name: by_bridge.get(name, found[:0]) for name in self.files}
+
+    @cached_property
+    def messages(self) -> dict[Hashable, list[str]]:
+        """Texts of the warnings by bridge, each once."""
+        warned = self.fleet.warnings
+        return {name: texts.unique().tolist() for name, texts in warned.groupby("bridge")["message"]}
 
     def write(self, name: Hashable) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
-        warned = self.fleet.warnings
-        messages = warned.loc[warned["bridge"] == name, "message"].unique().tolist()
+        messages = self.messages.get(name, [])
         monitor, unread = _opened(self.fleet.monitors, name)
-        failed = self.errors.get(name, in_words(self.fleet.errors)[:0])
+        failed = self.errors[name]
         error = "; ".join(dict.fromkeys(failed["what"]))
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         texts = bullets(messages) or paragraphs("There was no warning.")
@@ -141,7 +145,7 @@ class PageWriter:
         chain, without_chain = _opened(self.fleet.chains, name)
         if unread:
             why = "The file of its monitor cannot be read."
-            return Bridge(name, NOT_EVALUATED, SILENT, np.inf, why=why, n_warnings=n_warnings), chain
+            return Bridge(name, "not evaluated", SILENT, np.inf, why=why, n_warnings=n_warnings), chain
         if chain is None:
             why = "The file of its model cannot be read" if without_chain else error or "No reason is given"
             return Bridge(name, FAILED, BROKEN, why=f"{why}.", n_warnings=n_warnings), None
@@ -153,7 +157,7 @@ def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, wri
     """Sections on a bridge without a monitor: what its model has learned, or why it could not."""
     unknown = "Whether the bridge is healthy is not known, because no record of it is evaluated."
     headline, advice = HEADLINES.get(bridge.state, HEADLINES[UNWATCHED])
-    state = banner(NOT_EVALUATED, written, headline, bridge.why, unknown)
+    state = banner("not evaluated", written, headline, bridge.why, unknown)
     sections = [section("today", "Today", state, paragraphs(advice))]
     report = getattr(chain, "report_", None)
     if hasattr(report, "offsets"):
@@ -183,7 +187,6 @@ def _opened(mapping: Mapping[Hashable, Any], name: Hashable) -> tuple[Any, str]:
 
 
 def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Section:
-    """The table, the worst first."""
     rows = [
         [
             element("a", bridge.name, href=links[bridge.name]),
@@ -211,10 +214,10 @@ def _all_bridges(bridges: Sequence[Bridge], links: Mapping[Hashable, str]) -> Se
 
 def _state(bridge: Bridge) -> Html:
     """Symbol and word of a state, and what else an owner should know."""
-    drawn = symbol(NOT_EVALUATED if bridge.state in UNKNOWN_STATES else bridge.state)
-    word = "stiffness lost" if bridge.state == ATTENTION else bridge.state
-    word = "healthy again" if bridge.state == HEALTHY and bridge.place == UNEXPLAINED else word
-    name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else NOT_EVALUATED
+    drawn = symbol("not evaluated" if bridge.state in UNKNOWN_STATES else bridge.state)
+    word = "stiffness lost" if bridge.state == "attention" else bridge.state
+    word = "healthy again" if bridge.state == "healthy" and bridge.place == UNEXPLAINED else word
+    name = bridge.state if bridge.state not in (FAILED, UNWATCHED) else "not evaluated"
     badge = element("span", drawn, word, class_=f"badge {name.replace(' ', '-')}")
     note = element("small", f"{bridge.duration.strip()} ({bridge.note})" if bridge.note else bridge.duration.strip())
     return element("span", badge, note, element("span", bridge.why, class_="text soft") if bridge.why else Html())

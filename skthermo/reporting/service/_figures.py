@@ -10,7 +10,7 @@ from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
 from skthermo.reporting._readable import Values
-from skthermo.reporting.service._standing import MONTH, NOT_EVALUATED, YEAR, Standing
+from skthermo.reporting.service._standing import MONTH, YEAR, Standing
 
 LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
 
@@ -19,7 +19,7 @@ def draw_month(standing: Standing) -> Html:
     """Damage index of each record in the month before the newest one."""
     start = standing.last - MONTH
     evaluated = standing.evaluations[standing.evaluations.index >= start]
-    alarms, unknown = ((evaluated["state"] == state).sum() for state in ("alarm", NOT_EVALUATED))
+    alarms, unknown = ((evaluated["state"] == state).sum() for state in ("alarm", "not evaluated"))
     alt = (
         f"Damage index of {counted(len(evaluated), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
         f"evaluated. {_highest(evaluated['index'])}"
@@ -93,7 +93,7 @@ def _drawn(
 
     def make() -> MonitorDisplay:
         display = MonitorDisplay.from_estimator(standing.monitor, **options)
-        fold_legend(display.figure_, "outside lower center", n_columns=2)
+        fold_legend(display.figure_, "outside lower center")
         return display
 
     return draw(make, alt, title, height=height, values=values)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from skthermo._tables.text import (
     SPACE,
+    capital,
     counted,
     counted_number,
     duration_text,
@@ -23,12 +24,7 @@ from skthermo.reporting._html import Html, Section, bullets, element, figure, jo
 from skthermo.reporting._settings import parameters, settings
 from skthermo.reporting.service._figures import chart_year, draw_days, draw_drift, draw_month
 from skthermo.reporting.service._standing import (
-    ALARM,
-    ATTENTION,
-    HEALTHY,
-    NOT_EVALUATED,
     ONE_DAY,
-    WATCH,
     YEAR,
     Standing,
     moment,
@@ -41,11 +37,11 @@ N_ERRORS = 2  # standard errors on either side of an estimate
 FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
 EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
 SYMBOLS = {
-    HEALTHY: "M6 12.5l4 4 8-9",
-    WATCH: "M6 14l6-6 6 6",
-    ALARM: EXCLAMATION,
-    ATTENTION: EXCLAMATION,
-    NOT_EVALUATED: "M6 12h12",
+    "healthy": "M6 12.5l4 4 8-9",
+    "watch": "M6 14l6-6 6 6",
+    "alarm": EXCLAMATION,
+    "attention": EXCLAMATION,
+    "not evaluated": "M6 12h12",
 }
 """Lines within a circle: a tick, an angle that points upwards, an exclamation mark, a dash."""
 FAULTS = {
@@ -58,7 +54,7 @@ FAULTS = {
     "swapped": "is swapped with another",
 }
 KINDS = {
-    WATCH: "in which the damage index was raised, below an alarm",
+    "watch": "in which the damage index was raised, below an alarm",
     "stiffening": "in which the structure was stiffer, which is reported but no damage",
     "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
 }
@@ -97,7 +93,8 @@ def introduction(monitor: Monitor) -> list[str]:
 def today(standing: Standing) -> Section:
     """State, and what an owner should know, in a few sentences."""
     sentences = [*_newest(standing), *_open_events(standing), *sensor_sentences(standing), *drift_sentences(standing)]
-    sentences.append(_smallest_change(standing))
+    smallest = capital(f"{standing.monitor.smallest_changes_}")
+    sentences.append(f"{smallest}, in weather like that of the baseline. Smaller changes count as healthy.")
     words = (
         "A record is one measurement of temperatures and responses, such as natural frequencies. Its damage index says "
         "how far the responses are from those of the healthy structure in the same weather. An event begins when the "
@@ -142,12 +139,6 @@ def _newest(standing: Standing) -> list[str]:
     return [text, standing.recent()]
 
 
-def _smallest_change(standing: Standing) -> str:
-    """Which changes the monitor would still see, and which not."""
-    seen = f"{standing.monitor.smallest_changes_}"
-    return f"{seen[:1].upper()}{seen[1:]}, in weather like that of the baseline. Smaller changes count as healthy."
-
-
 def _open_events(standing: Standing) -> list[str]:
     sentences = [] if len(standing.opened("damage")) else ["No damage event is open."]
     for number, event in standing.events[standing.events["end"].isna()].iterrows():
@@ -165,17 +156,17 @@ def _open_events(standing: Standing) -> list[str]:
 
 def _waiting(standing: Standing) -> list[int]:
     """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch."""
-    events = standing.events[standing.events["kind"] != WATCH]
+    events = standing.events[standing.events["kind"] != "watch"]
     return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
 
 
 def _what_to_do(standing: Standing) -> list[str]:
     steps = []
-    if standing.state == WATCH:
+    if standing.state == "watch":
         steps.append("Look at the raw records and at the weather, and wait for the next days.")
-    if standing.state == ATTENTION:
+    if standing.state == "attention":
         steps.append("Ask an engineer to look at the parts that have lost stiffness.")
-    if standing.state == ALARM:
+    if standing.state == "alarm":
         steps.append(
             "Ask an engineer to look at the structure, beginning with what the modes named above depend on, and at the "
             "raw records: works on the structure, unusual loads or ice may be the cause too."
@@ -185,19 +176,18 @@ def _what_to_do(standing: Standing) -> list[str]:
             "Find out whether the sensors or the structure have changed where a response was set aside. If it is the "
             "sensors, acknowledge the event as harmless: the other responses are evaluated from then on."
         )
-    if standing.is_silent or standing.is_ahead or standing.error or not standing.has_records:
+    if standing.status.is_late or standing.status.is_ahead or standing.error or not standing.has_records:
         steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")
-    elif standing.state == NOT_EVALUATED:
+    elif standing.state == "not evaluated":
         steps.append("Check the sensors and modes that the reason names: without them, nothing is watched.")
     if len(standing.failed):
         steps.append("Have the failed sensors repaired; the section on sensors lists them.")
-    if _waiting(standing) or (standing.events["end"].isna() & (standing.events["kind"] != WATCH)).any():
+    if _waiting(standing) or (standing.events["end"].isna() & (standing.events["kind"] != "watch")).any():
         steps.append("When it is known what an event was, acknowledge it, so that the monitor can learn from it.")
     return steps
 
 
 def events(standing: Standing) -> Section:
-    """All events, the newest first."""
     known = standing.events
     if not len(known):
         text = "There has been no event." if standing.has_records else "No record has come yet, and so no event."
@@ -350,7 +340,6 @@ def _signed(value: float, error: float) -> str:
 
 
 def sensor_sentences(standing: Standing) -> list[str]:
-    """What does not work at present."""
     if not standing.monitor.sensors:
         return ["Sensors are not watched."]
     if not len(standing.failed):
@@ -365,7 +354,6 @@ def sensor_sentences(standing: Standing) -> list[str]:
 
 
 def sensors(standing: Standing) -> Section:
-    """Faults that last, and those that are over."""
     known = standing.monitor.faults_
     parts = [bullets(sensor_sentences(standing))]
     if standing.monitor.sensors:
@@ -395,7 +383,6 @@ def sensors(standing: Standing) -> Section:
 
 
 def not_evaluated(standing: Standing) -> Section:
-    """How many records were not evaluated, and why."""
     counts, evaluated, days = standing.monitor.counts_, standing.evaluations, standing.monitor.days_
     title = "What was not evaluated"
     if not standing.has_records:
@@ -410,7 +397,7 @@ def not_evaluated(standing: Standing) -> Section:
         )
     silent = n_days - len(days)
     without = f"There was no record on {silent:,} of {counted(n_days, 'day')}." if silent else "Records came every day."
-    is_unknown = evaluated["state"] == NOT_EVALUATED
+    is_unknown = evaluated["state"] == "not evaluated"
     since = f"since {moment(evaluated.index[0])}" if len(evaluated) else ""
     forgotten = unknown - int(is_unknown.sum()) - sum(int(counts.get(name, 0)) for name in ("n_too_late", "n_ahead"))
     older = f"Why {forgotten:,} older ones of them were not evaluated is no longer kept." if forgotten > 0 else ""
@@ -499,7 +486,6 @@ def _smallest_changes(standing: Standing) -> Html:
 
 
 def _settings(monitor: Monitor) -> Section:
-    """Parameters of the monitor, of its detector and of the model."""
     detector = monitor.detector_
     parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
     rows = parameters({"monitor": monitor, **parts, "model": monitor.fem}, but=("monitor: detector", "monitor: fem"))

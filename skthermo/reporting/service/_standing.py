@@ -15,7 +15,6 @@ from skthermo.monitoring import Monitor, MonitorStatus
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
-ALARM, WATCH, ATTENTION, HEALTHY, NOT_EVALUATED = "alarm", "watch", "attention", "healthy", "not evaluated"
 
 
 class Doubt(NamedTuple):
@@ -45,12 +44,10 @@ class Standing:
 
     @cached_property
     def events(self) -> pd.DataFrame:
-        """All events."""
         return self.monitor.events_
 
     @cached_property
     def evaluations(self) -> pd.DataFrame:
-        """Evaluations of the records that are kept."""
         return self.monitor.evaluations_
 
     @cached_property
@@ -59,37 +56,20 @@ class Standing:
         return self.monitor.status(self.now)
 
     @property
-    def step(self) -> pd.Timedelta:
-        """Usual time between records."""
-        return self.status.step
-
-    @property
     def has_records(self) -> bool:
-        """Whether any record has come since the baseline."""
         return self.status.newest is not None
 
     @property
     def last(self) -> pd.Timestamp:
-        """Stamp of the newest record."""
         return self.monitor.last_
-
-    @property
-    def is_silent(self) -> bool:
-        """Whether a new record has been missed for days."""
-        return self.status.is_late
-
-    @property
-    def is_ahead(self) -> bool:
-        """Whether the newest record is of a time to come."""
-        return self.status.is_ahead
 
     @property
     def state(self) -> str:
         """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
         said = self.status.state
-        if said in (HEALTHY, WATCH) and self.error:
-            return NOT_EVALUATED
-        return ATTENTION if said == HEALTHY and self.worn else said
+        if said in ("healthy", "watch") and self.error:
+            return "not evaluated"
+        return "attention" if said == "healthy" and self.worn else said
 
     @property
     def worn(self) -> list[str]:
@@ -100,41 +80,40 @@ class Standing:
         return [str(name) for name in drift.index[drift["significant"].astype(bool) & (drift["change"] <= -self.limit)]]
 
     def headline(self) -> str:
-        """The state in one line."""
-        if self.state == ALARM:
+        if self.state == "alarm":
             opened = self.opened("damage")
             since = opened["start"].min() if len(opened) else self.last
             return f"Alarm since {moment(since)}"
-        if self.state == WATCH:
-            return f"Watch since {moment(self.opened(WATCH)['start'].min())}: no alarm, but a raised damage index"
-        if self.state == HEALTHY:
+        if self.state == "watch":
+            return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
+        if self.state == "healthy":
             return "Healthy: no alarm"
-        if self.state == ATTENTION:
+        if self.state == "attention":
             return "No alarm, but much stiffness has been lost slowly"
         return self.doubt.headline
 
     def explanation(self) -> str:
         """What the headline means, and why."""
-        if self.state == ALARM:
+        if self.state == "alarm":
             text = (
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
             )
-            if self.is_silent:
+            if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
             return f"{text} {self.error}." if self.error else text
-        if self.state == ATTENTION:
+        if self.state == "attention":
             return (
                 f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
                 "the stiffness since the baseline. The monitor takes slow drift out before it evaluates, so that this "
                 "raises no alarm. An engineer should evaluate whether the structure can bear it."
             )
-        if self.state == WATCH:
+        if self.state == "watch":
             return (
                 "The damage index is above the level from which on the structure is to be watched, and below that of "
                 f"an alarm. A healthy structure has {counted_number(self.monitor.watch_per_year, 'such event')} a year."
             )
-        if self.state == HEALTHY:
+        if self.state == "healthy":
             return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
         return f"{self.doubt.explanation}. Whether the structure is healthy now is not known."
 
@@ -147,10 +126,10 @@ class Standing:
         if not self.has_records:
             text = f"No record has come since the baseline, which ends on {last}"
             return Doubt(self.last, "Not evaluated: no record since the baseline", text)
-        if self.is_ahead:
+        if self.status.is_ahead:
             text = f"The newest record is of {last}, a time after {moment(self.now)}, when this page was written"
             return Doubt(self.last, "Not evaluated: the dates of the records are wrong", text)
-        if self.is_silent:
+        if self.status.is_late:
             text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
             return Doubt(self.last, f"Not evaluated: no record since {last}", text)
         reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
@@ -160,13 +139,13 @@ class Standing:
     @property
     def step_text(self) -> str:
         """Usual time between records, as in "every day"."""
-        return duration_text(self.step).removeprefix("1 ")
+        return duration_text(self.status.step).removeprefix("1 ")
 
     @property
     def not_evaluated_since(self) -> pd.Timestamp:
         """First record after the last one that was evaluated."""
         days, evaluated = self.monitor.days_, self.evaluations
-        known = evaluated.index[evaluated["state"] != NOT_EVALUATED]
+        known = evaluated.index[evaluated["state"] != "not evaluated"]
         if len(known):
             return evaluated.index[evaluated.index > known[-1]][0]
         some = days.index[days["n_evaluated"] > 0]
@@ -179,13 +158,11 @@ class Standing:
 
     @cached_property
     def failed(self) -> pd.DataFrame:
-        """Faults of sensors that last."""
         faults = self.monitor.faults_
         return faults[faults["until"].isna()]
 
     @property
     def years(self) -> float:
-        """Years in service, up to the newest record."""
         return (self.last - self.monitor.days_.index[0]) / YEAR if self.has_records else 0.0
 
     def days_until(self, end: pd.Timestamp) -> pd.DataFrame:

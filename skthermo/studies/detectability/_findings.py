@@ -11,9 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, check_flag
+from skthermo._tables.arrays import Array, check_flag, check_probability
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
-from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
@@ -359,40 +358,8 @@ class StudyFindings:
 
         Notes
         -----
-        The default order is by detectors as they will be used: detectors that overfit the records from which simulated
-        noise is drawn need too low a threshold in the simulation, so that the order at equal false alarms agrees less
-        with the truth on the truss.
-
-        Differences are paired, as all detectors evaluate the same records in every repeat. Their bounds are t intervals
-        of jackknife pseudo-values over the repeats, with the error of the moved threshold and Bonferroni's correction
-        for all comparisons with the first row. They include noise alone: neither another baseline nor an error of the
-        model. A threshold learned from n independent records at 2 % has itself a true rate with a standard deviation
-        of sqrt(0.02 * 0.98 / n), 0.7 points for a year of days.
-
-        Examples
-        --------
-        >>> from sklearn.ensemble import IsolationForest
-        >>> from skthermo.datasets import make_truss, make_truss_campaign
-        >>> from skthermo.detection import MahalanobisDetector, OutlierDetector
-        >>> from skthermo.studies import DetectabilityStudy
-        >>> from skthermo.surrogate import DataInformedFEM
-        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
-        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-        >>> detectors = {"forest": OutlierDetector(IsolationForest()), "Mahalanobis": MahalanobisDetector()}
-        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
-        >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
-        >>> results = study.run(weather)
-        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
-                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
-        detector
-        Mahalanobis          0.02  0.22              0.21                False
-        forest               0.02  0.18              0.17                False
-        >>> print(study.summary())
-        'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.6%.
-        Not significantly worse at 95% confidence: 'forest' (17.8% at 1.6%).
-        These comparisons include noise only: another year, baseline or FE model may change the order.
-        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 10 within 7 days, 37 within 30 days.
-        'bottom 10 %' is detected within 13 days in 95 of 100 cases; false alarms in that time: 18 of 100.
+        Differences are paired, as all detectors evaluate the same records. Their bounds include noise alone
+        (:ref:`how-detectors-are-ranked`). An example, and limits of a ranking: :doc:`/guide/rank_detectors`.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")

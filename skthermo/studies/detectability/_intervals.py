@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, t
 
-from skthermo._tables.arrays import Array, is_real
+from skthermo._tables.arrays import Array
 from skthermo._tables.frames import correlation_times
 
 BLOCK = 10  # length of a block, in correlation times
@@ -117,10 +117,3 @@ def _scatter(decisions: Array) -> Array:
     """Decisions less their mean: over the repeats, or over the records of a single one."""
     counts = np.maximum((~np.isnan(decisions)).sum(axis=0 if len(decisions) > 1 else 1, keepdims=True), 1)
     return decisions - np.nansum(decisions, axis=0 if len(decisions) > 1 else 1, keepdims=True) / counts
-
-
-def check_probability(value: object, what: str) -> float:
-    """A probability strictly between 0 and 1, or an error."""
-    if not is_real(value) or not 0 < float(value) < 1:
-        raise ValueError(f"{what} is {value!r}; expected a probability between 0 and 1, such as 0.9")
-    return float(value)

@@ -14,10 +14,10 @@ from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, check_flag, real_array
+from skthermo._tables.arrays import Array, check_flag, check_probability, real_array
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._intervals import check_probability, clopper_pearson
+from skthermo.studies.detectability._intervals import clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
 MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 from time import process_time
 from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
+from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
@@ -17,13 +18,12 @@ from sklearn.exceptions import NotFittedError
 from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
-from skthermo._tables.arrays import as_random_state, check_jobs, is_auto, positive_integer
-from skthermo._validation import Stages, last_step, seeded
+from skthermo._tables.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
+from skthermo._validation import Stages, held, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
-from skthermo.studies.detectability._candidates import Candidate, LearnedHeads
+from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._intervals import check_probability
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
@@ -42,19 +42,12 @@ Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 P, Answer = ParamSpec("P"), TypeVar("Answer")
 
 
-def _found_attribute(name: str) -> Any:
-    """A property of a study: what its last run found, under this name."""
-    return property(
-        lambda study: getattr(study._found(), name), doc=f"``findings_.{name}``, as the class describes it."
-    )
-
-
 def _of_findings(method: Callable[Concatenate[StudyFindings, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
     """A method of a study that its last run's findings answer, with their docstring and signature."""
 
     @wraps(method)
     def answer(study: Any, *args: P.args, **options: P.kwargs) -> Answer:
-        return method(study._found(), *args, **options)
+        return method(study._found, *args, **options)
 
     return answer
 
@@ -113,6 +106,9 @@ class DetectabilityStudy(BaseEstimator):
         Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None
         Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
+    memory : str or joblib.Memory, optional
+        Folder that keeps what detectors have learned, so that other studies in which they learn the same baseline do
+        not fit them again.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages, and after the second repeat how long the others
         and the replicates will take; from 2, joblib prints how many of them are done.
@@ -226,6 +222,7 @@ class DetectabilityStudy(BaseEstimator):
         n_replicates: int = 10,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        memory: str | Memory | None = None,
         verbose: bool | int = 0,
     ):
         self.fem = fem
@@ -241,22 +238,23 @@ class DetectabilityStudy(BaseEstimator):
         self.n_replicates = n_replicates
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.memory = memory
         self.verbose = verbose
 
-    results_ = _found_attribute("table")
-    detectors_ = _found_attribute("detectors")
-    thresholds_ = _found_attribute("thresholds")
-    indices_ = _found_attribute("indices")
-    decisions_ = _found_attribute("decisions")
-    transitions_ = _found_attribute("transitions")
-    calibration_ = _found_attribute("calibration")
-    arrangements_ = _found_attribute("arrangements")
-    uncertainty_ = _found_attribute("uncertainty")
-    replicates_ = _found_attribute("replicates")
-    scenarios_ = _found_attribute("scenarios")
-    errors_ = _found_attribute("errors")
-    confidence_ = _found_attribute("confidence")
-    warnings_ = _found_attribute("warnings")
+    results_ = held("_found.table")
+    detectors_ = held("_found.detectors")
+    thresholds_ = held("_found.thresholds")
+    indices_ = held("_found.indices")
+    decisions_ = held("_found.decisions")
+    transitions_ = held("_found.transitions")
+    calibration_ = held("_found.calibration")
+    arrangements_ = held("_found.arrangements")
+    uncertainty_ = held("_found.uncertainty")
+    replicates_ = held("_found.replicates")
+    scenarios_ = held("_found.scenarios")
+    errors_ = held("_found.errors")
+    confidence_ = held("_found.confidence")
+    warnings_ = held("_found.warnings")
 
     pod_curve = _of_findings(StudyFindings.pod_curve)
     minimum_detectable_damage = _of_findings(StudyFindings.minimum_detectable_damage)
@@ -268,6 +266,7 @@ class DetectabilityStudy(BaseEstimator):
     uncertainty_summary = _of_findings(StudyFindings.uncertainty_summary)
     detector_name = _of_findings(StudyFindings.detector_name)
 
+    @answers_kept()
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -345,11 +344,9 @@ class DetectabilityStudy(BaseEstimator):
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
         stages = Stages(self, 5 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once(), answers_kept():
-            parts, heads = seeded(self.random_state), LearnedHeads()
-            candidates, errors = ask_each(
-                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts, heads), {}
-            )
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
+            learned = partial(Candidate.learned, self.fem, baseline, seeded(self.random_state), self.memory)
+            candidates, errors = ask_each(detectors, lambda name: learned(name, detectors[name]), {})
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
@@ -391,6 +388,7 @@ class DetectabilityStudy(BaseEstimator):
             return MOST_REPEATS
         return positive_integer(self.n_repeats, "n_repeats")
 
+    @property
     def _found(self) -> StudyFindings:
         if not hasattr(self, "findings_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")

@@ -21,6 +21,7 @@ from skthermo._tables.arrays import (
     as_floats,
     as_random_state,
     check_names,
+    check_probability,
     check_size,
     positive_integer,
 )
@@ -29,7 +30,7 @@ from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import gross_errors
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
-from skthermo.studies.detectability._intervals import Rate, check_probability, rate_of
+from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
 from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
@@ -422,26 +423,9 @@ def detection_task(
 
     Notes
     -----
-    Give the search ``refit=False``: otherwise it ends by fitting the best detector to all of ``X``, damaged records
-    among them. ``task.refit(search)`` fits it to the baseline.
-
-    The score is the probability of detection at a limit of false alarms: the share of a scenario's records in alarm,
-    from the onset of its damage on, averaged over the scenarios. An alarm is a record beyond the detector's own
-    threshold or, where more healthy records of the split than the limit lie beyond it, beyond the threshold raised
-    until no more do. A damaged record that is not evaluated is not found. Where false alarms by the own threshold
-    exceed the limit by more than chance, the score is multiplied by the limit over their lower 95 % bound. All
-    scenarios have the same weather, and a repeat the same noise in all of them (common random numbers).
-
-    Each state (a scenario in one repeat) is evaluated by a call of its own: no lag and no window reaches from one state
-    into another. In ``X``, each state also has stamps of its own, those of T moved by whole years (by whole days, where
-    so many years do not fit), so that lags and windows of time stay apart in a single call, too; windows of a number of
-    records, and lags of rows without stamps, do so only in ``scoring``.
-
-    A compensator of the kind that the chain is looks better in its simulations than it is: choose the kind of
-    regression by measured records.
-
-    The best of many settings is partly the luckiest: its score is too good. ``confirm`` evaluates it in weather and
-    with noise that took no part.
+    The score is the probability of detection at a limit of false alarms. Give the search ``refit=False``, and fit its
+    best detector to the baseline by ``task.refit``. :ref:`how-a-task-is-scored` says how states are kept apart, and
+    :ref:`tune-by-simulated-damage` how to read the score of the best of many settings.
 
     Examples
     --------

@@ -196,15 +196,8 @@ def compare_extensions(
 
     Notes
     -----
-    Every repeat simulates a baseline in the weather that the chain was fitted on, and new records in the weather T, at
-    13 severities around the present a90 of each family, as far as a family is the damage of one group. The detector is
-    fitted anew without and with each candidate, to the same noise (common random numbers). The bounds hold the scatter
-    of the noise in the repeats, but no error of the model: a gain in a mode that the model gets wrong is wrong, too. On
-    the truss they hold 85 to 88 % of the gains in true records, without the mode of which a warning says that it is
-    doubtful, and 94 % of the one that is recommended (``noise="fitted"``).
-
-    A sensor is compared in the training weather, in which alone its values are known, and the chain that was fitted
-    with it is taken for the truth. It matters to detectors that see temperatures.
+    Detectors are fitted anew with each candidate, to the same noise. The bounds hold the scatter of the noise in the
+    repeats, but no error of the model (:ref:`how-extensions-are-compared`).
 
     Examples
     --------

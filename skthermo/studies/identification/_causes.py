@@ -119,7 +119,8 @@ def read_causes(
     """Causes that are asked for, an even loss in all groups if wanted, and what they do to the model's parameters."""
     members = read_groups(model, groups)
     stiffer = _read_stiffening(model, members, stiffening)
-    moved = _read_parameters(model, parameters)
+    asked = [parameters] if isinstance(parameters, str) else parameters or []
+    moved = check_names(asked, "parameters", model.parameter_names)
     masses = _read_masses(model, added_mass)
     causes = [Cause(name, of=tuple(of)) for name, of in members.items()]
     causes += [Cause(f"{name} stiffer", "stiffening", -MOST_STIFFER, 0.0, of=tuple(of)) for name, of in stiffer.items()]
@@ -167,22 +168,8 @@ def _read_stiffening(
     if stiffening is None or isinstance(stiffening, bool | np.bool_):
         return members if stiffening else {}
     known = {name: [name] for name in model.groups} | dict(members)
-    names = check_names([stiffening] if isinstance(stiffening, str) else stiffening, "stiffening")
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"stiffening names the groups {unknown}; expected some of {sorted(known)}, or True for all")
+    names = check_names([stiffening] if isinstance(stiffening, str) else stiffening, "stiffening", sorted(known))
     return {name: known[name] for name in names}
-
-
-def _read_parameters(model: Any, parameters: Sequence[str] | None) -> list[str]:
-    """Parameters of the model that may have changed."""
-    if parameters is None:
-        return []
-    names = check_names([parameters] if isinstance(parameters, str) else parameters, "parameters")
-    unknown = [name for name in names if name not in model.parameter_names]
-    if unknown:
-        raise ValueError(f"parameters names {unknown}; expected some of {list(model.parameter_names)}")
-    return names
 
 
 def _read_masses(model: Any, added_mass: Mapping[str, MatrixLike] | None) -> dict[str, tuple[Any, float]]:

@@ -44,7 +44,6 @@ class ShiftComparison:
     parts: list[Part]
 
     def observed(self, model_error: float = 0.0) -> Observed:
-        """What was measured."""
         return Observed.of(
             [(p.measured[p.known], p.covariance[np.ix_(p.known, p.known)], p.freedom) for p in self.parts],
             model_error,

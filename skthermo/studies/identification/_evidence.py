@@ -117,24 +117,13 @@ def most_probable(slopes: Array, target: Array, variances: Array, law: Amounts) 
     return found
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """Log evidence of sets of causes, (n_sets, n_errors, n_scales), with the normal laws of their amounts.
-
-    ``means`` and ``covariances`` have one or two axes more, for the causes of a set; the laws end at the bounds.
-    """
-
-    log_evidence: Array
-    means: Array
-    covariances: Array
-
-
 def weighed(
     observed: Observed, slopes: Array, target: Array, variances: Array, law: Amounts, log_prior: Array
-) -> Weighed:
-    """Evidence of linear effects, for each scale of Student's law.
+) -> tuple[Array, Array, Array]:
+    """Log evidence of linear effects, (n_sets, n_errors, n_scales), and means and covariances of amounts, normal laws.
 
-    ``log_prior``, (n_sets, n_errors), counts in what may be neglected, and not in the evidence.
+    These have one or two axes more, for the causes of a set, and end at the bounds. ``log_prior``, (n_sets, n_errors),
+    counts in what may be neglected, and not in the evidence.
     """
     size = slopes.shape[-1]
     own = np.where(observed.is_scaled, 1 - observed.of_model, 0.0)  # without the model's error
@@ -160,4 +149,4 @@ def weighed(
     inside = log_probability(means[where], covariances[where], lowest[kept], highest[kept])
     log_evidence = np.full(logs.shape, -np.inf)
     log_evidence[where] = logs[where] + inside
-    return Weighed(log_evidence, means, covariances)
+    return log_evidence, means, covariances

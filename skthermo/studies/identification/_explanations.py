@@ -134,9 +134,7 @@ class Scale:
         found = weighed(self.observed, slopes, target, variances, law, log_prior[:, np.newaxis] + self.log_errors)
         return [
             Weight(tuple(causes.tolist()), *parts)
-            for causes, *parts in zip(
-                sets, found.log_evidence, found.means, found.covariances, amounts, change, variances, strict=True
-            )
+            for causes, *parts in zip(sets, *found, amounts, change, variances, strict=True)
         ]
 
     def exact(self, weights: Sequence[Weight]) -> list[Correction]:
@@ -246,12 +244,8 @@ def all_sets(scale: Scale) -> tuple[list[Weight], list[float]]:
             best = sorted(zip(found, priors, strict=True), key=lambda one: -total(scale, one[0]) - one[1])
             parents = [one.causes for one, _ in best if len(one.causes) == size - 1][:N_PARENTS]
             sets = list(dict.fromkeys(tuple(sorted({*p, c})) for p in parents for c in range(n_combined) if c not in p))
-        sets = [one for one in sets if is_possible(one, scale.causes)]
+        causes = scale.causes
+        sets = [one for one in sets if not any(causes[a].excludes(causes[b]) for a, b in combinations(one, 2))]
         priors += [float(np.log(probability / every))] * len(sets)
         found += screen(scale, sets, priors[-len(sets) :])
     return found, priors
-
-
-def is_possible(causes: Set, all_causes: Sequence[Cause]) -> bool:
-    """Whether no cause excludes another."""
-    return not any(all_causes[a].excludes(all_causes[b]) for a, b in combinations(causes, 2))

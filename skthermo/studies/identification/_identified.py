@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
-from skthermo._tables.text import SPACE, chance_text, listed, percent, probability_text
+from skthermo._tables.text import SPACE, Sentences, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
 from skthermo.studies.identification._observe import ComparedRecords
@@ -39,11 +39,6 @@ PILED_UP = 1.05  # standard errors between the mean of an exponential law and it
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
 
 
-def either(names: Sequence[str]) -> str:
-    """One of these names, in a sentence."""
-    return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-
-
 @dataclass(frozen=True)
 class Amount:
     """How much of one cause there is, and its 90 % band."""
@@ -67,7 +62,6 @@ class Amount:
 
     @property
     def saying(self) -> str:
-        """Which of ``PHRASES`` names it."""
         return self.kind if self.kind != "parameter" else "lower" if self.value < 0 else "higher"
 
     @property
@@ -101,7 +95,6 @@ class Statement:
 
     @property
     def is_healthy(self) -> bool:
-        """Whether nothing has changed."""
         return not self.changes and not self.has_else
 
     @property
@@ -112,7 +105,7 @@ class Statement:
     @property
     def label(self) -> str:
         """Causes with their amounts, for a table or a drawing."""
-        parts = [f"{either([one.cause for one in amounts])} {amounts[0].size}" for amounts in self.changes]
+        parts = [f"{listed([one.cause for one in amounts], 'or')} {amounts[0].size}" for amounts in self.changes]
         return ", ".join(parts + [SOMETHING_ELSE] * self.has_else) or NO_DAMAGE
 
     def beside(self, first: Statement) -> str:
@@ -144,7 +137,7 @@ def _phrase(amounts: Sequence[Amount], is_further: bool, in_full: bool) -> str:
     shared = [one for one in amounts if first.agrees(one)]
     for one in [first, *(one for one in amounts if one not in shared)]:
         saying = PHRASES[one.saying][is_further or (one is not first and one.saying == first.saying)]
-        names = either([other.subject for other in (shared if one is first else [one])])
+        names = listed([other.subject for other in (shared if one is first else [one])], "or")
         text = saying.format_map({"size": one.size, "name": names, "of stiffness": " of stiffness" * in_full})
         texts.append(text + (f" ({one.band})" if in_full else ""))
     return " or ".join(texts) + (", which these modes cannot distinguish," if len(amounts) > 1 else "")
@@ -190,14 +183,12 @@ def _joined(
 
 
 def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
-    """The causes of an explanation by its name."""
     amounts = found.estimates.index
     named = [str(cause) for explanation, cause in amounts if explanation == name]
     return (*named, SOMETHING_ELSE) if name.endswith(SOMETHING_ELSE) else tuple(named)
 
 
 def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
-    """How much of a cause there is within an explanation."""
     row = found.estimates.loc[(" + ".join(causes), cause)]
     values = [float(row[name]) for name in ("severity", "ci_low", "ci_high")]
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
@@ -216,7 +207,6 @@ def alike_sets(indistinguishable: Sequence[Sequence[str]], similarity: pd.DataFr
 
 
 def answer(found: IdentifiedDamage) -> Iterator[str]:
-    """What is most probable, how probable, what else could be."""
     explanations = statements(found)
     first, *others = explanations
     shown = " observable in these modes" if found.unobservable else ""
@@ -246,7 +236,7 @@ def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
     probable = [one for one in others if not one.is_healthy and one.probability >= NAMED]
     more = {more: one for one in probable if (more := one.beside(first))}
     named = [f"{extra} ({chance_text(one.probability)})" for extra, one in more.items()][:MOST_NAMED]
-    texts = [f"about the same and {either(named)}"] if named else []
+    texts = [f"about the same and {listed(named, 'or')}"] if named else []
     different = [one for one in probable if one not in more.values()][:MOST_NAMED]
     texts += [f"{one.phrase()} ({chance_text(one.probability)})" for one in different]
     if texts:
@@ -270,7 +260,6 @@ def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
 
 
 def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
-    """What could be damaged all the same."""
     table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unobservable)]
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
@@ -278,12 +267,11 @@ def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
 
 
 def limits(found: IdentifiedDamage) -> Iterator[str]:
-    """What is not known of the place or the cause."""
     best = statements(found)[0]
     for causes in found.indistinguishable:
         yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
     if found.unobservable:
-        yield f"Damage in {either(found.unobservable)} is unobservable in these modes."
+        yield f"Damage in {listed(found.unobservable, 'or')} is unobservable in these modes."
     if best.is_healthy and found.p_value < RARE:
         yield f"However, such shifts are rare in a healthy structure (p value {probability_text(found.p_value)})."
     if np.isnan(found.misfit_p_value):
@@ -298,7 +286,6 @@ def limits(found: IdentifiedDamage) -> Iterator[str]:
 
 
 def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
-    """What is doubtful."""
     yield from found.records.warnings()
     best = statements(found)[0]
     if found.indistinguishable:
@@ -344,7 +331,6 @@ def _is_at_bound(found: IdentifiedDamage, cause: str) -> bool:
 
 
 def _departure(found: IdentifiedDamage) -> str:
-    """The mode that damage explains least, in standard errors."""
     shifts = found.shifts
     worst = int(np.nanargmax(np.abs(found.unexplained)))
     measured, explained = (float(shifts[name].iloc[worst]) for name in ("measured", "explained"))
@@ -389,7 +375,7 @@ def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class IdentifiedDamage:
+class IdentifiedDamage(Sentences):
     """Explanations of a shift of frequencies with their probabilities, and what follows for each possible cause.
 
     An explanation is a set of up to three causes, or none; causes are damage of a group, and what else was asked for.
@@ -548,36 +534,14 @@ class IdentifiedDamage:
         """
         return UncertainDamage(name, self.draws)
 
-    def answer(self) -> list[str]:
-        """What is most probable, how probable, and what else could be.
+    def _answer(self) -> Iterator[str]:
+        return answer(self)
 
-        Returns
-        -------
-        list of str
-            Sentences. The first names the most probable explanation; those that these modes cannot distinguish are one.
-        """
-        return list(answer(self))
+    def _limits(self) -> Iterator[str]:
+        return limits(self)
 
-    def limits(self) -> list[str]:
-        """What is not known: causes that look alike or cannot be seen, and what no explanation explains.
-
-        Returns
-        -------
-        list of str
-            Sentences; none if the most probable explanation explains all shifts, and all causes can be seen and
-            distinguished.
-        """
-        return list(limits(self))
-
-    def summary(self) -> str:
-        """What is most probable and what else could be, what is not known, and which records were left out.
-
-        Returns
-        -------
-        str
-            One sentence a line.
-        """
-        return "\n".join([*self.answer(), *self.limits(), *self.records.sentences()]).replace(SPACE, " ")
+    def _remarks(self) -> Iterator[str]:
+        return self.records.sentences()
 
     def warnings(self) -> Iterator[SkthermoWarning]:
         """What is doubtful.

@@ -129,36 +129,8 @@ def identify_damage(
 
     Notes
     -----
-    The shift of a mode is the mean of ln(measured / predicted), less the mean residual of training records in similar
-    weather. It is a difference of two means, and its covariance counts that of both: of the new records, and of the
-    healthy prediction, which errs alike for a season as least squares on the weather would. Records are correlated with
-    those before, so that a mean of n of them scatters more than that of n independent ones. Correlations are learned
-    from the residuals of the training records, as those of an independent part and of one that fades exponentially with
-    time; 30 new records would hardly show them. Where the frame has a ``DatetimeIndex``, as in training, time between
-    records counts, else their number. Modes that scatter clearly more than in training count as scattering so. The
-    covariance is known from few independent records, so that errors follow Student's law of several dimensions. Records
-    that are more than six standard deviations from the median of the others in a mode are left out and counted.
-
-    An explanation is a set of at most three causes, each with one unknown amount, or the loss of one share of stiffness
-    in all groups, as where a whole structure ages. Its probability is proportional to
-    its prior probability (`DamagePrior`) and to its evidence, which is the likelihood of the shift averaged over the
-    prior law of the amounts. An amount that hardly improves the fit thereby lowers the probability: few causes
-    are preferred without a test. Effects are those of the FE model in the weather of the records, as a mean over a
-    few typical states. The law of amounts is taken as normal about the most probable ones, found by Gauss-Newton steps
-    with exact derivatives, and ends at the bounds, which is integrated exactly in one to three dimensions; Student's
-    law is a mixture of normal laws. All sets are first weighed by tabulated effects of single causes, which are added,
-    and those that hold the probability again by the exact effects of all their causes together. Of more than 5,000
-    sets of as many causes, only those are weighed that extend one of the 50 best smaller sets.
-
-    No FE model is exact: the error of its effect on each mode is a share of what was measured, and as this share is not
-    known well, a third, one and three times ``prior.model_error`` count as equally probable; the modes' misfit
-    decides between them. An error by the same factor in all modes cannot be seen and widens the bands. "Something
-    else" shifts every mode independently, by an unknown size between .05 and 13 %.
-
-    Averages over explanations count causes outside an explanation as 0, so that a band which begins at 0 says that the
-    cause may not be there at all. Causes that these modes do not show keep about their prior probability. What causes
-    have in common is also assessed at the model's nominal state, because a chain may have drifted out of the symmetry
-    of its structure.
+    Sets of at most three causes, each with one unknown amount, and an even loss in all groups are weighed by their
+    evidence. :ref:`how-explanations-are-weighed` has the errors of the shifts, the prior and what is assumed.
 
     Examples
     --------
@@ -181,19 +153,19 @@ def identify_damage(
     check_jobs(n_jobs)
     causes, changes = read_causes(fem.model, groups, stiffening, parameters, added_mass, even=True)
     seen = observe(fem, T, F, noise)
-    effects = FrequencyEffects.of(fem, seen.theta, seen.frequencies, changes)
-    every = compared(effects, seen.shift, shapes, dofs, shape_noise)
-    nominal = ShiftComparison([replace(every.parts[0], effects=effects.nominal()), *every.parts[1:]])
-    scale = Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+
+    def beside(chain: Any, theta: Array) -> ShiftComparison:
+        effects = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
+        return compared(effects, seen.shift, shapes, dofs, shape_noise)
+
+    def scale_of(every: ShiftComparison) -> Scale:
+        return Scale.of(every.observed(prior.model_error), every.effects, causes, prior)
+
+    every = beside(fem, seen.theta)
+    nominal = ShiftComparison([replace(every.parts[0], effects=every.parts[0].effects.nominal()), *every.parts[1:]])
+    scale = scale_of(every)
     whitened = every.observed().rotation @ scale.curves.first
-    alone = errors_alone(whitened)
-    asked = [place for place, cause in enumerate(causes) if not cause.is_even]
-    if alone[asked].min() > VISIBLE:
-        errors = ", ".join(f"{causes[place].name} {alone[place]:.2g}" for place in asked)
-        raise ValueError(
-            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
-            f"{errors}. More records or other modes would lower them"
-        )
+    check_visible(whitened, causes)
     random = as_random_state(random_state)
     if models is None:
         posterior = Posterior.of(scale, *explanations(scale), random)
@@ -202,10 +174,7 @@ def identify_damage(
         def with_model(model: Any, seed: int) -> Posterior:
             with without_warnings():  # the chain itself has given them
                 chain = fem.refitted(model=model)
-                theta = as_floats(chain.predict_parameters(seen.temperatures))
-                of_chain = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
-                other = compared(of_chain, seen.shift, shapes, dofs, shape_noise)
-                scale = Scale.of(other.observed(prior.model_error), other.effects, causes, prior)
+                scale = scale_of(beside(chain, as_floats(chain.predict_parameters(seen.temperatures))))
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 
         models = checked_models(fem, models)
@@ -215,6 +184,17 @@ def identify_damage(
     found = findings(posterior, whitened, nominal, seen.shift, seen.records, causes, changes, prior, random)
     warn_each(found.warnings())
     return found
+
+
+def check_visible(slopes: Array, causes: Sequence[Cause]) -> None:
+    alone = errors_alone(slopes)
+    asked = [place for place, cause in enumerate(causes) if not cause.is_even]
+    if alone[asked].min() > VISIBLE:
+        errors = ", ".join(f"{causes[place].name} {alone[place]:.2g}" for place in asked)
+        raise ValueError(
+            f"no group can be seen; expected a standard error of {VISIBLE} or less for one of them, but they are "
+            f"{errors}. More records or other modes would lower them"
+        )
 
 
 def compared(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._estimators.warnings import warn_user, warnings_once
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import has_stamps, row_times
-from skthermo._tables.text import counted, listed, significant
+from skthermo._tables.text import capital, counted, listed, significant
 from skthermo._validation import check_array
 from skthermo.exceptions import (
     FewRecordsWarning,
@@ -88,8 +88,7 @@ class ComparedRecords:
         if self.left_out:
             yield f"{self._left_out()}."
         if self.n_latest >= IN_A_ROW:
-            latest = self._latest()
-            yield f"{latest[0].upper()}{latest[1:]}."
+            yield f"{capital(self._latest())}."
         for mode, factor in self.wider.items():
             yield (
                 f"Mode {mode} scatters {significant(factor)} times as widely as in the training records; its standard "

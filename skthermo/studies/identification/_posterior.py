@@ -42,7 +42,6 @@ class Explanation:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Its causes without something else."""
         return tuple(cause for cause in self.causes if cause != SOMETHING_ELSE)
 
 
@@ -81,12 +80,10 @@ class Posterior:
         )
 
     def probability_of(self, cause: str) -> float:
-        """Probability that a cause is in the explanation."""
         return sum(one.probability for one in self.explanations if cause in one.causes)
 
     @property
     def no_damage(self) -> float:
-        """Probability that nothing changed."""
         return sum(one.probability for one in self.explanations if not one.causes)
 
     def table(self, causes: Sequence[Cause]) -> pd.DataFrame:
@@ -193,7 +190,6 @@ def _drawn(
 
 
 def _joined(some: Sequence[Explanation], number: int) -> Explanation:
-    """The same explanation by several models."""
     probable = np.array([one.probability for one in some])
     share = min(len(one.draws) / one.probability for one in some)
     kept = [one.draws[: max(int(share * one.probability), 1)] for one in some]

@@ -1,6 +1,5 @@
 """Shift of measured frequencies from the healthy structure's in the same weather, and its error."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,14 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from skthermo._effects import healthy_frequencies
-from skthermo._tables.arrays import Array, check_noise
+from skthermo._tables.arrays import Array, check_noise, means_of_known, median, robust_deviation
 from skthermo._tables.frames import has_stamps, row_times
 from skthermo.residuals.scatter import PSEUDO_RECORDS, Scatter
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
 FAR = 6.0  # standard deviations beyond which a record is far from the others
-MAD_TO_DEVIATION = 1.4826
 WIDER = 0.01  # p value below which new records count as scattering more widely than the training records
 
 
@@ -55,11 +53,9 @@ def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:
     """
     if len(shifts) < FEWEST_TO_COMPARE or np.isnan(shifts).all():
         return np.zeros(len(shifts), dtype=bool)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of modes that were not measured
-        usual = np.nanmedian(shifts, axis=0)
-        away = np.abs(shifts - usual)
-        scale = np.fmax(MAD_TO_DEVIATION * np.nanmedian(away, axis=0), np.hypot(deviations, OF_WEATHER * usual))
+    usual = median(shifts)
+    away = np.abs(shifts - usual)
+    scale = np.fmax(robust_deviation(shifts), np.hypot(deviations, OF_WEATHER * usual))
     rows = (np.nan_to_num(away) > FAR * scale).any(axis=1)
     return rows if rows.sum() < len(rows) / 2 else np.zeros(len(rows), dtype=bool)
 
@@ -69,11 +65,11 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     scatter = scatter_of(fem, noise)
     shifts = np.where(scatter.variances > 0, shifts, np.nan)
     order, places = _places(fem.training_records_[0], T)
-    n_records, mean = (~np.isnan(shifts)).sum(axis=0), _mean(shifts)
+    n_records, mean = (~np.isnan(shifts)).sum(axis=0), means_of_known(shifts)
     new = scatter.of_sums(~np.isnan(shifts[order]) / np.maximum(n_records, 1), places)
     n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
-    spread = np.sqrt(_mean((shifts - mean) ** 2) / within)
+    spread = np.sqrt(means_of_known((shifts - mean) ** 2) / within)
     inputs = fem.weather(T).inputs[(~np.isnan(shifts)).any(axis=1)]
     trained, measured, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
@@ -112,9 +108,3 @@ def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:
     times, step = row_times(T), np.median(np.diff(np.unique(row_times(trained))))
     order = np.argsort(times, kind="stable")
     return order, times[order] / step
-
-
-def _mean(values: Array) -> Array:
-    known = ~np.isnan(values)
-    sums = np.where(known, values, 0.0).sum(axis=0)
-    return np.divide(sums, known.sum(axis=0), out=np.full(len(sums), np.nan), where=known.any(axis=0))

@@ -96,16 +96,13 @@ class Division:
 
     @property
     def pieces(self) -> list[Piece]:
-        """All pieces in order."""
         return [piece for line in self.lines for piece in line]
 
     @property
     def members(self) -> list[Hashable]:
-        """All members in order."""
         return [member for piece in self.pieces for member in piece]
 
     def finer(self, chosen: Sequence[bool]) -> Division:
-        """The division with the chosen pieces cut into halves."""
         flags = iter(chosen)
         lines = [
             [half for piece in line for half in (_cut(piece, 2) if next(flags) else [piece])] for line in self.lines

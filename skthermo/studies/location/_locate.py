@@ -17,7 +17,7 @@ from skthermo.fem import Structure
 from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage, observe
 from skthermo.studies.location._division import Division, lines_of
 from skthermo.studies.location._located import LIKELY, LocatedDamage, Places, fewest, located_damage
-from skthermo.studies.location._question import PLAUSIBLE, Explained, MeasuredShift, members_of
+from skthermo.studies.location._question import PLAUSIBLE, Answer, Explained, MeasuredShift, members_of
 from skthermo.studies.scenarios import check_chain
 
 MOST_PIECES, MOST_SLOW_PIECES = 16, 8
@@ -97,14 +97,8 @@ def locate_damage(
 
     Notes
     -----
-    The members of a group follow each other along lines, by their common nodes, or by their places where they have
-    none. A line is divided into pieces of some neighbouring members, and each stretch of neighbouring pieces may be
-    damaged, by one severity; so may the whole group, with a prior probability of a quarter. Shorter stretches are more
-    probable than longer ones, and their severities may be larger. Stretches of all groups that damage of whole groups
-    makes probable, alone and with one or two other groups, are weighed by the evidence of `identify_damage`; if damage
-    of whole groups does not explain the shifts, stretches of all groups are. Pieces that are probable are divided
-    further, until they consist of single members, or until the probability is spread over most of the group, because
-    the records do not carry more. Effects are those at the mean parameters of the records.
+    Each stretch of neighbouring members may be damaged, by one severity, and the whole group:
+    :ref:`how-explanations-are-weighed`.
 
     Examples
     --------
@@ -138,8 +132,25 @@ def locate_damage(
     )
     lines = {group: lines_of(structure, members_of(fem.model, own)) for group, own in contents.items()}
     places = {group: Places(structure, of_group) for group, of_group in lines.items()}
-    most = MOST_SLOW_PIECES if getattr(fem.model, "prefer", "processes") == "processes" else MOST_PIECES
-    divisions = {group: Division.of(group, lines[group], most) for group in asked(found, places)}
+    answer, pieces, levels = divided(question, lines, asked(found, places), random)
+    located = located_damage(answer, found, places, pieces, levels)
+    if located.probability_other >= MOSTLY_ELSE:
+        warn_user(
+            "no damage of neighbouring members explains the shifts (something else has a probability of "
+            f"{located.probability_other:.0%}). Damage may be in several places, or something else has changed. See "
+            "the likely causes of identify_damage",
+            ResultWarning,
+            "unexplained-shifts",
+        )
+    return located
+
+
+def divided(
+    question: MeasuredShift, lines: Mapping[str, Any], groups: Sequence[str], random: np.random.RandomState
+) -> tuple[Answer, dict[str, int], pd.DataFrame]:
+    """The answer to the finest division of some groups, into how many pieces each was divided, and a row a level."""
+    most = MOST_SLOW_PIECES if getattr(question.fem.model, "prefer", "processes") == "processes" else MOST_PIECES
+    divisions = {group: Division.of(group, lines[group], most) for group in groups}
     levels: list[dict[str, Any]] = []
     pieces: dict[str, int] = {}
     for level in range(1, MOST_LEVELS + 1):
@@ -150,19 +161,10 @@ def locate_damage(
             if row["probability"] >= WORTH_ASKING:
                 finer[group] = division.finer(chosen)
         pieces |= {group: len(division.pieces) for group, division in divisions.items()}
-        if level == MOST_LEVELS or not any(len(finer[group].pieces) > pieces[group] for group in finer):
+        if not any(len(division.pieces) > pieces[group] for group, division in finer.items()):
             break
         divisions = finer  # groups that have become improbable stay whole
-    located = located_damage(answer, found, places, pieces, pd.DataFrame(levels, columns=COLUMNS))
-    if located.probability_other >= MOSTLY_ELSE:
-        warn_user(
-            "no damage of neighbouring members explains the shifts (something else has a probability of "
-            f"{located.probability_other:.0%}). Damage may be in several places, or something else has changed. See "
-            "the likely causes of identify_damage",
-            ResultWarning,
-            "unexplained-shifts",
-        )
-    return located
+    return answer, pieces, pd.DataFrame(levels, columns=COLUMNS)
 
 
 def plausible_together(found: IdentifiedDamage) -> list[tuple[str, ...]]:

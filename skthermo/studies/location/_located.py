@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import is_real
-from skthermo._tables.text import SPACE, counted, listed, percent, share_text
+from skthermo._tables.arrays import check_probability
+from skthermo._tables.text import Sentences, counted, listed, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification import IdentifiedDamage
 from skthermo.studies.location._question import Answer, Explained
@@ -33,7 +33,6 @@ class Places:
 
     @property
     def members(self) -> list[Hashable]:
-        """All members."""
         return [member for line in self.lines for member in line]
 
     def text(self, chosen: Collection[Hashable], *, alternatives: bool = False) -> str:
@@ -42,8 +41,7 @@ class Places:
         if chosen >= set(self.members):
             return f"all {counted(len(self.members), 'element')}"
         ranges = [self._range(line, first, last) for line in self.lines for first, last in _runs(line, chosen)]
-        joined = " or " if alternatives else " and "
-        return joined.join([", ".join(ranges[:-1]), ranges[-1]] if len(ranges) > 1 else ranges)
+        return listed(ranges, "or" if alternatives else "and")
 
     def _range(self, line: Sequence[Hashable], first: int, last: int) -> str:
         which = f"element {first + 1}" if first == last else f"elements {first + 1} to {last + 1}"
@@ -52,14 +50,12 @@ class Places:
 
     def _extent(self, line: Sequence[Hashable], members: Sequence[Hashable]) -> str:
         """Coordinates between which members lie, along the axis on which their line extends most."""
-        corners = [self._corners(some) for some in (line, members)]
-        axis = int(np.ptp(corners[0], axis=0).argmax())
-        low, high = corners[1][:, axis].min(), corners[1][:, axis].max()
+        nodes, ends = self.structure.nodes, self.structure.members
+        whole, part = (np.array([nodes[node] for m in some for node in ends[m].nodes]) for some in (line, members))
+        axis = int(np.ptp(whole, axis=0).argmax())
+        low, high = part[:, axis].min(), part[:, axis].max()
         along = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
         return f" ({'xyz'[axis]} = {along} m)"
-
-    def _corners(self, members: Sequence[Hashable]) -> np.ndarray:
-        return np.array([self.structure.nodes[node] for m in members for node in self.structure.members[m].nodes])
 
 
 def _runs(line: Sequence[Hashable], chosen: Collection[Hashable]) -> Iterator[tuple[int, int]]:
@@ -75,7 +71,7 @@ def _runs(line: Sequence[Hashable], chosen: Collection[Hashable]) -> Iterator[tu
 
 
 @dataclass(frozen=True, eq=False)
-class LocatedDamage:
+class LocatedDamage(Sentences):
     """Where in its groups a structure is damaged, member by member, as far as records tell.
 
     Parameters
@@ -162,32 +158,9 @@ class LocatedDamage:
         """
         if group is not None and group not in self.places:
             raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.places)}")
-        if not is_real(probability) or not 0 < probability < 1:
-            raise ValueError(f"probability is {probability!r}; expected a number between 0 and 1, such as 0.9")
-        return fewest(self._sets(group), probability)[0]
-
-    def answer(self) -> list[str]:
-        """Where the structure is damaged, and how surely.
-
-        Returns
-        -------
-        list of str
-            Sentences.
-        """
-        return list(self._answer())
-
-    def summary(self) -> str:
-        """What was found, where in each group, and what cannot be distinguished.
-
-        Returns
-        -------
-        str
-            One sentence a line.
-        """
-        return "\n".join(self.answer()).replace(SPACE, " ")
+        return fewest(self._sets(group), check_probability(probability, "probability"))[0]
 
     def _sets(self, group: str | None) -> list[tuple[frozenset[Hashable], float]]:
-        """Sets of damaged members and their probabilities."""
         if group is not None:
             return [(e.members[group], e.probability) for e in self.explained if group in e.members]
         return visible_sets(self.explained, self.found.unobservable)
@@ -197,10 +170,14 @@ class LocatedDamage:
         probable = self.groups[is_named]
         if probable.empty:
             yield f"No group is damaged with a probability above {percent(WORTH_NAMING)}: no place is given."
-        if len(probable) > 1 and self._share_of_several(probable.index) < WORTH_NAMING:
+        named = set(probable.index)
+        of_several = sum(one.probability for one in self.explained if len(named.intersection(one.members)) > 1)
+        if len(probable) > 1 and of_several < WORTH_NAMING:
             yield f"Most probably only one of {listed(list(probable.index))} is damaged."
         for group, row in probable.sort_values("probability", ascending=False, kind="stable").iterrows():
             yield from self._of_group(str(group), row)
+
+    def _limits(self) -> Iterator[str]:
         if self.alike:
             yield f"These modes do not distinguish {' from '.join(self.alike)}."
         if self.probability_other >= WORTH_NAMING:
@@ -231,10 +208,6 @@ class LocatedDamage:
             yield f"It lies in {where} ({_share(in_wide)}). Damage in the rest of {group} is unlikely."
         else:
             yield f"Damage in the rest of {group} is unlikely."
-
-    def _share_of_several(self, groups: Collection[str]) -> float:
-        """Probability that more than one of some groups is damaged."""
-        return sum(one.probability for one in self.explained if len(one.members.keys() & set(groups)) > 1)
 
     def _share_of_whole(self, group: str) -> float:
         """Probability that all of a group is damaged alike, given that it is damaged."""

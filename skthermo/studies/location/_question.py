@@ -128,11 +128,6 @@ def members_of(model: Any, names: Sequence[str]) -> list[Hashable]:
     return list(dict.fromkeys(member for position in positions for member, _ in model.contents[position]))
 
 
-def on_pieces(fem: Any, structure: Structure, parts: Mapping[str, Mapping[str, Sequence[Hashable]]]) -> Any:
-    """The fitted chain with its model exchanged for one of the same frequencies, whose groups are divided."""
-    return fem.with_model(structure.divide(fem.model, parts))
-
-
 @dataclass(frozen=True)
 class Explained:
     """One explanation: the damaged members and the severity of each group in it, and its probability."""
@@ -196,7 +191,7 @@ class MeasuredShift:
 
     def _curves(self, question: Question) -> tuple[Observed, Curves]:
         """What was measured, and the effects of all stretches on it."""
-        twin = on_pieces(self.fem, self.structure, question.parts)
+        twin = self.fem.with_model(self.structure.divide(self.fem.model, question.parts))
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
