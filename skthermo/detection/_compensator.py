@@ -364,7 +364,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
         predict = partial(self._predicted, temperatures)
-        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        weather, predicted, errors, unknown = answer_once(self, (temperatures,), 2 * np.size(X), predict)
         return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
 
     def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
@@ -389,8 +389,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Temperatures and frequencies of new records, with a warning of values that are none."""
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
-        names = _check_feature_names_in(self, None)
-        warn_of_markers(pd.DataFrame(values, columns=names, copy=False)[names[self.targets_]])
+        is_named = isinstance(X, pd.DataFrame)
+        warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
         known = Plausible.beside(self.training_range_.lowest, self.training_range_.highest)
         far = known.implausible(as_floats(temperatures))
         if far.any():  # only a warning, as another column may be something else than a temperature

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -237,11 +238,9 @@ def _rates(
     n_years = YEARS if chain.model is simulation.fem.model else 1
     clean = clean_frequencies(chain, simulation.scenarios, simulation.T, len(seeds), first, n_years)
     changed = replace(simulation, clean=clean)
-    repeats: list[Evaluation] = []
-    for number, (pair, measured) in enumerate(zip(seeds, drawn, strict=True)):
-        records = changed.records(simulation.scenarios, number, pair, measured)
-        repeats.append(changed.evaluate(records, repeats[-1].errors if repeats else {}))
-    found = _counted(repeats[0].with_repeats(repeats[1:]), simulation.scenarios, simulation.T)
+    draws = enumerate(zip(seeds, drawn, strict=True))
+    records = (changed.records(simulation.scenarios, number, *pair) for number, pair in draws)
+    found = _counted(changed.evaluate(itertools.chain.from_iterable(records), {}), simulation.scenarios, simulation.T)
     return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
 
 

@@ -18,6 +18,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import (
     Array,
@@ -67,7 +68,7 @@ from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, g
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._regression import TemperatureMapper, remembered
+from skthermo.surrogate._regression import TemperatureMapper
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
