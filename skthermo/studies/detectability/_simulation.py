@@ -355,7 +355,9 @@ class Simulation:
         """Frequencies of the healthy structure before noise."""
         names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
         with without_warnings():
-            return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
+            if names:
+                return self.clean[names[0]][0]
+            return self.fem.thermal_.in_weather(self._weather, YEARS * len(self.T)).simulated()
 
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
