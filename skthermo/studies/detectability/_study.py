@@ -88,7 +88,8 @@ class DetectabilityStudy(BaseEstimator):
 
         - "noise": another draw of the noise;
         - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
-          that the structure is another one than the chain; the detectors stay as they are, as they would in service;
+          that the structure is another one than the chain, and have had other gaps and outliers; the detectors stay as
+          they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;
         - "model": another FE model of ``models`` in the chain;
         - "auto": "noise", "baseline" and "weather", and "model" if ``models`` are given;
