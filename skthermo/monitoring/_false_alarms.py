@@ -201,9 +201,8 @@ class FalseAlarmEstimate:
 
     ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
     ``highest`` of them with a probability of 90 %, by chance and because one baseline leaves the rate uncertain.
-    ``n_years`` is the time that the baseline's evaluated records cover, ``n_peaks`` the number of its highest
-    excursions that the threshold comes from, ``missing_season`` the seasons without baseline records, for which there
-    is no estimate ("" if there is none), ``method`` how the threshold was found, in words.
+    ``n_years`` is the time that the baseline's evaluated records cover, ``missing_season`` the seasons without baseline
+    records, for which there is no estimate ("" if there is none), ``method`` how the threshold was found, in words.
     """
 
     rule: EventRule
@@ -211,7 +210,6 @@ class FalseAlarmEstimate:
     lowest: int
     highest: int
     n_years: float
-    n_peaks: int
     missing_season: str
     method: str
     tail: Tail
@@ -316,7 +314,7 @@ def estimate_false_alarms(
     )
     seen = None if smallest_at is None else smallest_at(rule.threshold)
     _warn_of_baseline(excursions, tail, rule, asked, per_year, years, missing_season, seen)
-    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, missing_season, method, tail)
+    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, missing_season, method, tail)
 
 
 def _warn_of_baseline(
