@@ -374,8 +374,8 @@ class Excursions:
             warn_user(
                 f"the highest excursion of the baseline, {self.table['peak_time'].iloc[0]}, has a damage index of "
                 f"{highest:.3g}, the next {second:.3g}: chance explains that in fewer than {DOUBTFUL:.0%} of "
-                f"baselines. It raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. Put NaN "
-                "there if it is a fault or another state",
+                f"baselines. It raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. "
+                "Put NaN there if it is a fault or another state",
                 RecordsWarning,
                 "baseline-excursion",
             )
