@@ -320,7 +320,8 @@ class DetectabilityStudy(BaseEstimator):
         """
         check_chain(self.fem)
         detectors = self._checked_detectors()
-        most_repeats, tol = self._most_repeats(), check_probability(self.tol, "tol")
+        most_repeats = MOST_REPEATS if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
+        tol = check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         scenarios = self._checked_scenarios(reference)
@@ -381,9 +382,6 @@ class DetectabilityStudy(BaseEstimator):
                 more = range(n_repeats, max(wanted, n_repeats))
                 evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
         return evaluation
-
-    def _most_repeats(self) -> int:
-        return MOST_REPEATS if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
 
     @property
     def _found(self) -> StudyFindings:
