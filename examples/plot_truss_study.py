@@ -134,12 +134,22 @@ display.figure_.set_size_inches(7, 4.6)
 # and of true records reach 90 % at severities that differ by two percentage points at most.
 
 finer = study_of(np.arange(0.02, 0.31, 0.02))
-fig, axes = plt.subplots(1, 3, figsize=(13, 4.4), layout="constrained", sharey=True)
-for ax, group in zip(axes, GROUPS, strict=True):
-    for label, source in sources.items():
-        PODCurveDisplay.from_predictions(finer.pod_curve(group, source), label=label, ax=ax)
-    ax.set_title(group)
-    ax.label_outer()
+
+
+def draw_curves(axes, n_columns):
+    """Curves of each group, with their severities of 90 % in the title, and one legend of all."""
+    for ax, group in zip(axes, GROUPS, strict=True):
+        curves = {label: finer.pod_curve(group, source) for label, source in sources.items()}
+        for label, curve in curves.items():
+            PODCurveDisplay.from_predictions(curve, label=label, ax=ax, marks=False)
+        ax.get_legend().remove()
+        ax.set_title(f"{group}: 90 % at {' and '.join(f'{100 * curve.a90:.1f} %' for curve in curves.values())}")
+        ax.label_outer()
+    handles, names = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, names, loc="outside upper center", ncols=n_columns, frameon=False)
+
+
+draw_curves(plt.subplots(1, 3, figsize=(11, 4), layout="constrained", sharey=True)[1], n_columns=4)
 
 # %%
 # Which detector?

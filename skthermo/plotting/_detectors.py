@@ -74,8 +74,8 @@ class DetectorsDisplay(Display):
 
     Of results with measured records, there is a panel for each scenario. A bar is the prediction interval of the rate
     of one measured campaign, the line in it the simulated mean, a dot the measured rate, open outside the interval. A
-    reference of several repeats is a mean and not compared with the interval. Detectors are in the order of their
-    simulated POD.
+    title counts the rates within their interval, unless a reference of several repeats is a mean. Detectors are in the
+    order of their simulated POD.
 
     Failures, and shares of records that are not evaluated, are written beside the rates. The axis of false alarms has a
     square-root scale.
@@ -239,7 +239,7 @@ class DetectorsDisplay(Display):
         DetectorsDisplay
             Itself.
         """
-        n_columns = min(3 if "pod_deficit" in self.panels else 2, len(self.panels))
+        n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
         size = 3.6 + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
         self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
@@ -343,7 +343,7 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
         is_healthy, inside = measures[name] == "PFA", rates["inside"].dropna()
         title = f"{'false alarms' if is_healthy else 'POD'}: {shortened(name)}"
         title += f"\n{inside.sum():.0f} of {len(inside)} within the prediction interval" if len(inside) else ""
-        rates = rates.assign(is_open=rates["inside"] == 0)
+        rates = rates.assign(is_open=(rates["mark"] < rates["low"]) | (rates["mark"] > rates["high"]))
         rates[RATES] *= 100
         label = f"records in alarm (%{', square-root scale' if is_healthy else ''})"
         panels[name] = RatesPanel(title, label, rates, notes, "small" if is_healthy else "shares")

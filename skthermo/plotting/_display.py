@@ -290,7 +290,7 @@ def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> No
             nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
             texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
     if texts:
-        _write(ax, "; ".join(texts), x=0.01, y=0.05, ha="left", va="bottom", gid="not evaluated")
+        _write(ax, "; ".join(texts), x=0.01, y=0.95, ha="left", va="top", gid="not evaluated")
 
 
 def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:

@@ -23,6 +23,7 @@ LINE = 120  # number of letters of a line of the heading
 LABEL = 46  # number of letters of a line above a bar
 MOST_BARS = 5  # largest number of explanations that have a bar of their own
 SHORT_NAME = 8  # number of letters up to which names of modes fit beside each other
+ROOM = 0.18  # share of the axis of shifts that is left free for the legend
 
 
 @dataclass(eq=False, repr=False)
@@ -206,4 +207,6 @@ class IdentifiedDamageDisplay(Display):
         ax.set(
             title="shift of frequencies", ylabel="shift from the healthy prediction (%)", xlim=(-0.5, len(shifts) - 0.5)
         )
-        ax.legend(frameon=False, fontsize="small")
+        low, high = ax.get_ylim()
+        ax.set_ylim(low - ROOM * (high - low), high)
+        ax.legend(loc="lower center", ncols=2, frameon=False, fontsize="small")

@@ -67,17 +67,17 @@ def test_measured_rates_stand_beside_bands_and_are_counted():
 
 
 @pytest.mark.parametrize(
-    ("changed", "n_bands"),
+    ("changed", "n_counted", "n_open"),
     [
-        ({"pi_low": np.nan, "pi_high": np.nan}, 0),
-        ({"n_repeats": [20 if source == "reference" else 40 for source in HEALTHY["source"]]}, 0),  # a mean
-        ({"n_repeats": [1 if source == "reference" else 40 for source in HEALTHY["source"]]}, 4),
+        ({"pi_low": np.nan, "pi_high": np.nan}, 0, 0),
+        ({"n_repeats": [20 if source == "reference" else 40 for source in HEALTHY["source"]]}, 0, 1),  # a mean
+        ({"n_repeats": [1 if source == "reference" else 40 for source in HEALTHY["source"]]}, 4, 1),
     ],
 )
-def test_only_single_campaigns_are_compared_with_bands(changed, n_bands):
+def test_marks_outside_their_band_are_open_and_titles_count_single_campaigns(changed, n_counted, n_open):
     display = DetectorsDisplay.from_predictions(HEALTHY.assign(**changed))
-    assert (f"of {n_bands}" in display.axes_[0].get_title()) == (n_bands > 0)
-    assert len(display.marks_["healthy"][1].get_offsets()) == (n_bands > 0)
+    assert (f"of {n_counted}" in display.axes_[0].get_title()) == (n_counted > 0)
+    assert len(display.marks_["healthy"][1].get_offsets()) == n_open
 
 
 def test_groups_are_headings():

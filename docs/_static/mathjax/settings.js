@@ -7,4 +7,13 @@ window.MathJax = {
     menuOptions: { settings: { speech: false, braille: false, enrich: false, assistiveMml: true } },
   },
   output: { font: "mathjax-newcm", fontPath: "[mathjax]/%%FONT%%" },
+  // An equation that is wider than the screen can be scrolled by keys.
+  startup: {
+    pageReady: async () => {
+      await MathJax.startup.defaultPageReady();
+      for (const equation of document.querySelectorAll("mjx-container[display]")) {
+        if (equation.scrollWidth > equation.clientWidth) equation.tabIndex = 0;
+      }
+    },
+  },
 };

@@ -199,7 +199,7 @@ class FitReport(SavesFrames):
     fleet : DataFrame or None
         With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
         records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
-    follows : mapping or None
+    pooling_probability : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
@@ -235,7 +235,7 @@ class FitReport(SavesFrames):
     variation: pd.DataFrame | None = None
     findings: RecordFindings | None = None
     fleet: pd.DataFrame | None = None
-    follows: Mapping[Any, float] | None = None
+    pooling_probability: Mapping[Any, float] | None = None
     solved: str = ""
 
     def __repr__(self) -> str:
@@ -277,8 +277,8 @@ class FitReport(SavesFrames):
             lines.append(
                 f"Outside the weather of these records, predictions are based on the fleet: {self._listed_weather()}."
             )
-        if self.follows is not None:
-            listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.follows.items())
+        if self.pooling_probability is not None:
+            listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.pooling_probability.items())
             lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
         if self.findings is not None and getattr(self.findings.memory, "features", None) is not None:
             lines.append(self.findings.memory.summary())
@@ -479,7 +479,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
         ),
         findings=findings,
         fleet=weather_of_fleet(chain),
-        follows=getattr(last_step(chain.mapper_), "pooling_probability_", None),
+        pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         solved=chain.simulator_.described,
     )
 
