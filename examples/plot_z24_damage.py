@@ -179,9 +179,9 @@ IdentifiedDamageDisplay.from_predictions(found)
 # measured baseline and evaluate them. Rates of alarms in percent, measured, and the mean and the prediction interval
 # (95 %) of 40 simulated campaigns:
 
-memory = tempfile.TemporaryDirectory()  # what compensators learn is kept there from one study to the next
-candidates = detectors(memory.name)
-results = compare(bridge, fem, found.scenario(DAMAGED), candidates)
+memory = tempfile.TemporaryDirectory()  # what detectors learn is kept there from one study to the next
+candidates = detectors()
+results = compare(bridge, fem, found.scenario(DAMAGED), candidates, memory=memory.name)
 print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results)).round(3).to_string(), sep="\n\n")
 
 # %%
@@ -240,7 +240,8 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 # assumed of a pier that is to be lowered, a loss of 18 % in the soil below it. The weather is still that of the test
 # and of the last month. Since the severity is fixed, only noise is in the band.
 
-results = compare_before_damage(bridge, candidates=candidates)
+results = compare_before_damage(bridge, candidates=candidates, memory=memory.name)
+memory.cleanup()
 print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results)).round(3).to_string(), sep="\n\n")
 
 # %%
@@ -295,7 +296,6 @@ print(side_by_side(results).round(1).to_string(), agreement(side_by_side(results
 study = choose(bridge, candidates)
 ranking = study.ranking(max_false_alarms=0.02)
 print(ranking[["false_alarms", "within_limit", "pod", "pod_deficit", "pod_at_equal_pfa"]].round(3).to_string())
-memory.cleanup()
 
 # %%
 # .. code-block:: none

@@ -2,7 +2,6 @@
 
 import pandas as pd
 from detector_recipes import field_detectors
-from sklearn.pipeline import Pipeline
 from z24_recipes import FREQUENCIES, Records, bridge_model, chain
 
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
@@ -13,16 +12,9 @@ STATES = {"PFA": "false alarms", "POD": "damage found"}
 FIRST = 12  # damaged records that another publication counts as healthy
 
 
-def detectors(memory=None):
-    """The field's detectors by name; the chain is among those that compensate temperature.
-
-    A folder as the memory keeps what their compensators have learned, so that one study after the other need not.
-    """
-    found = field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
-    for detector in found.values():
-        if isinstance(detector, Pipeline):
-            detector.set_params(memory=memory)
-    return found
+def detectors():
+    """The field's detectors by name; the chain is among those that compensate temperature."""
+    return field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
 
 
 def columns_of(name):
@@ -59,8 +51,11 @@ def short_baselines(records, candidates, shares=(0.4, 0.5, 0.6, 0.8)):
     return pd.DataFrame(rows).sort_index(axis=1, ascending=[False, True])
 
 
-def compare(bridge, fem, damage, candidates=None, n_repeats=40):
-    """Rates of alarms that a chain simulates beside the measured ones: later healthy records, and the damaged month."""
+def compare(bridge, fem, damage, candidates=None, n_repeats=40, memory=None):
+    """Rates of alarms that a chain simulates beside the measured ones: later healthy records, and the damaged month.
+
+    A folder as the memory keeps what the detectors have learned, so that one study after the other need not.
+    """
     records, later = Records.of(bridge), bridge.split()[2]
     results = []
     for weather, scenario, measured in (
@@ -68,7 +63,13 @@ def compare(bridge, fem, damage, candidates=None, n_repeats=40):
         (bridge.T_damaged, damage, records.damaged),
     ):
         study = DetectabilityStudy(
-            fem, candidates or detectors(), [scenario], n_repeats=n_repeats, random_state=0, uncertainty="noise"
+            fem,
+            candidates or detectors(),
+            [scenario],
+            n_repeats=n_repeats,
+            uncertainty="noise",
+            random_state=0,
+            memory=memory,
         )
         results.append(study.run(weather, records.baseline, reference={scenario.name: measured}))
     return pd.concat(results, ignore_index=True)

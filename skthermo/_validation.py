@@ -39,6 +39,7 @@ from skthermo._io import bars_of, without_bars
 from skthermo._tables.arrays import (
     Array,
     as_columns,
+    is_frame_of_floats,
     is_model,
     refuse_huge,
     refuse_infinite,
@@ -165,7 +166,14 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
     With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
     """
-    return _as_numbers(partial(sklearn.utils.validation.validate_data, estimator), X, "X", options)
+    check = _validate_floats if is_frame_of_floats(X) else sklearn.utils.validation.validate_data
+    return _as_numbers(partial(check, estimator), X, "X", options)
+
+
+def _validate_floats(estimator: BaseEstimator, X: pd.DataFrame, *, reset: bool = True, **options: Any) -> Any:
+    """scikit-learn's `validate_data` of a frame of floats, whose values it checks sooner as an array."""
+    sklearn.utils.validation.validate_data(estimator, X, reset=reset, skip_check_array=True)
+    return sklearn.utils.check_array(X.to_numpy(), input_name="X", estimator=estimator, **options)
 
 
 def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
@@ -198,6 +206,8 @@ def with_nan(X: Any) -> Any:
 
     Times, text, booleans and bytes are errors.
     """
+    if is_frame_of_floats(X):
+        return X
     refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
         return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from hashlib import sha256
 from pickle import PicklingError
 from typing import Any, TypeVar
 
@@ -14,15 +15,24 @@ Answer = TypeVar("Answer")
 MOST_KEPT = 12_500_000  # numbers, of 8 bytes, in the answers that are kept
 
 
-def content_of(inputs: Any) -> str:
-    """Hash of one input or a tuple; of tables, values and labels count, and not what pandas caches of an index."""
-    return joblib.hash([_content(one) for one in (inputs if isinstance(inputs, tuple) else (inputs,))])
+def content_of(*parts: Any) -> str:
+    """A text that is the same in every process for equal contents of all parts, whether or not they share objects.
+
+    Values and labels of tables count, and not what pandas caches of an index.
+    """
+    return sha256(b"".join(_digest(part) for part in parts)).hexdigest()
 
 
-def _content(one: Any) -> Any:
-    if not hasattr(one, "columns"):
-        return one
-    return np.asarray(one), list(one.columns), getattr(one.index, "asi8", one.index), str(one.index.dtype)
+def _digest(part: Any) -> bytes:
+    """Hash of one part; arrays, which are the most of what is asked, are hashed as their bytes row by row."""
+    if hasattr(part, "columns") and hasattr(part, "index"):
+        index = getattr(part.index, "asi8", part.index)
+        labels = f"{list(part.columns)!r} {part.index.dtype}".encode()
+        return sha256(_digest(np.asarray(part)) + _digest(np.asarray(index)) + labels).digest()
+    if isinstance(part, np.ndarray) and not part.dtype.hasobject:
+        kind = f"{part.dtype.str} {part.shape}".encode()
+        return sha256(kind + np.ascontiguousarray(part).tobytes()).digest()
+    return str(joblib.hash(part, coerce_mmap=True)).encode()
 
 
 class KeptAnswers:
@@ -32,10 +42,10 @@ class KeptAnswers:
         self._answers: dict[tuple[int, str], tuple[Any, int, Any]] = {}  # with the estimator, whose id nobody else gets
         self._size = 0
 
-    def of(self, asked: Any, inputs: Any, size: int, answer: Callable[[], Answer]) -> Answer:
+    def of(self, asked: Any, inputs: tuple[Any, ...], size: int, answer: Callable[[], Answer]) -> Answer:
         """The answer, of so many numbers, given now or before."""
         try:
-            key = id(asked), content_of(inputs)
+            key = id(asked), content_of(*inputs)
         except PicklingError:  # of a part that somebody wrote in a notebook, say
             return answer()
         if key in self._answers:
@@ -61,7 +71,7 @@ def answers_kept() -> Iterator[None]:
         _kept.reset(token)
 
 
-def answer_once(asked: Any, inputs: Any, size: int, answer: Callable[[], Answer]) -> Answer:
+def answer_once(asked: Any, inputs: tuple[Any, ...], size: int, answer: Callable[[], Answer]) -> Answer:
     """What ``answer`` gives, about so many numbers, or has given in this context for equal inputs of an estimator."""
     kept = _kept.get()
     return answer() if kept is None else kept.of(asked, inputs, size, answer)

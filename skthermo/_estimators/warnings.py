@@ -130,7 +130,7 @@ def findings_of(check: Callable[..., Any], *tables: Any, mended: Collection[str]
     if found is None:
         found, content = {}, ALL
     else:
-        content = ALL if ALL in found else content_of(tables)
+        content = ALL if ALL in found else content_of(*tables)
     if content not in found:
         found[content] = check(*tables)
         warn_each(warning for warning in found[content].warnings() if warning.kind not in mended)

@@ -77,10 +77,12 @@ def bars_of(stage: str) -> Iterator[None]:
         _stage.reset(before)
 
 
-def run_jobs(jobs: Iterable[Any], total: int, *, unit: str, **options: Any) -> list[Any]:
+def run_jobs(
+    jobs: Iterable[Any], total: int, *, unit: str, count: Callable[[Any], int] = lambda _: 1, **options: Any
+) -> list[Any]:
     """Results of joblib's jobs, in their order; a bar counts them as they come."""
     results = as_they_come(**options)(jobs)
-    with closing(with_progress(results, total, None, count=lambda _: 1, unit=unit)) as shown:
+    with closing(with_progress(results, total, None, count=count, unit=unit)) as shown:
         return list(shown)
 
 

@@ -47,7 +47,6 @@ from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records, gross_errors
-from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -60,6 +59,7 @@ from skthermo.residuals.weather import (
     TrainingRange,
     filled_text,
     unpredicted_text,
+    warn_of_implausible,
     warn_of_unseen_weather,
 )
 
@@ -364,7 +364,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         temperatures, frequencies = self._split(X)
         predict = partial(self._predicted, temperatures)
-        weather, predicted, errors, unknown = answer_once(self, temperatures, 2 * np.size(X), predict)
+        weather, predicted, errors, unknown = answer_once(self, (temperatures,), 2 * np.size(X), predict)
         return frequencies, weather, as_floats(frequencies) - predicted, errors, unknown
 
     def _predicted(self, temperatures: Any) -> tuple[Array, Array, PredictionError, NDArray[np.bool_]]:
@@ -389,20 +389,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Temperatures and frequencies of new records, with a warning of values that are none."""
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
-        names = _check_feature_names_in(self, None)
-        warn_of_markers(pd.DataFrame(values, columns=names, copy=False)[names[self.targets_]])
-        known = Plausible.beside(self.training_range_.lowest, self.training_range_.highest)
-        far = known.implausible(as_floats(temperatures))
-        if far.any():  # only a warning, as another column may be something else than a temperature
-            column = int(far.sum(axis=0).argmax())
-            value = as_floats(temperatures)[far[:, column].argmax(), column]
-            warn_user(
-                f"temperatures are implausible: {self.training_range_.names[column]!r} is {value:g} in "
-                f"{far[:, column].sum()} of {len(far)} rows, {far.sum()} values in all. Their predictions are wrong. "
-                "Give degrees Celsius, and NaN where a value is missing",
-                RecordsWarning,
-                "implausible-temperatures",
-            )
+        is_named = isinstance(X, pd.DataFrame)
+        warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
+        warn_of_implausible(self.training_range_, temperatures)
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 import skthermo
+from skthermo._estimators.answers import content_of
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import counted_warnings
 from skthermo._io import without_bars
@@ -133,7 +134,7 @@ class BridgeFit:
                 stage = "maker"
                 estimator = clone(call(self.maker))
                 seed_parts(estimator, np.random.RandomState(self.seed))
-                content = content_of(estimator, (T, F), self.monitor)
+                content = identity_of(estimator, T, F, self.monitor)
                 if self.known is not None and self.known.content == content:
                     return Result(self.known, is_as_before=True)
                 outcome, stage = replace(outcome, content=content), "fit"
@@ -343,23 +344,23 @@ def seed_of(base: int, name: Hashable) -> int:
     return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
 
 
-def content_of(
-    estimator: BaseEstimator, records: tuple[Table, Table], monitor: Callable[[BaseEstimator], Monitor] | None
-) -> str:
-    """A text that is another one for other records, another estimator or monitor, or other versions."""
-    versions = (skthermo.__version__, sklearn.__version__, joblib.__version__)
-    return joblib.hash((versions, *(_content(part) for part in (estimator, records, monitor))))
+def identity_of(*parts: Any) -> str:
+    """A text that is another one for other records, another estimator or monitor, or other versions.
+
+    Functions of scripts and notebooks count with their code.
+    """
+    return content_of(skthermo.__version__, sklearn.__version__, joblib.__version__, *map(_content, parts))
 
 
 def _content(part: Any) -> str:
-    """Content of one part; functions of scripts and notebooks count with their code."""
+    """Content of one part, or of its code."""
     code = by_value(part)
     if b"__main__" not in code:
         try:
-            return joblib.hash(part)
+            return content_of(part)
         except pickle.PicklingError:  # a function within a function
             pass
-    return joblib.hash(code)
+    return content_of(code)
 
 
 def _place(error: BaseException) -> str:

@@ -180,9 +180,10 @@ class Spread:
         """Some rows after others, with their whitenings: memory is bounded."""
         errors = errors or PredictionError.none()
         for rows in parts(len(weather), 2 * self.overall.covariance.size):
-            some = weather[rows], present[rows], errors.of_part(rows)
+            some, here = (weather[rows], present[rows]), errors.of_part(rows)
             size = self.overall.covariance.size * len(some[0])
-            yield rows, answer_once(self, some, size, partial(self._whitenings, *some))
+            asked = *some, here.rows, here.covariances
+            yield rows, answer_once(self, asked, size, partial(self._whitenings, *some, here))
 
     def _whitenings(self, weather: Array, present: NDArray[np.bool_], errors: PredictionError) -> Whitenings:
         if self.by_weather is None and self.extrapolation is None and not len(errors.rows):

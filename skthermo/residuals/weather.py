@@ -17,7 +17,8 @@ from sklearn.preprocessing import StandardScaler
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, range_sums
 from skthermo._tables.frames import column_names, frame_like, has_stamps, row_times
-from skthermo.exceptions import WeatherWarning
+from skthermo.exceptions import RecordsWarning, WeatherWarning
+from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
@@ -82,6 +83,23 @@ class TrainingRange:
             f"{FAR_OUTSIDE:.0%} of it: {self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} "
             f"to {highest:.4g}. Predictions there are extrapolated. Give degrees Celsius{kelvin}, or train on such "
             "weather"
+        )
+
+
+def warn_of_implausible(known: TrainingRange, temperatures: Any) -> None:
+    """Warn of temperatures that no weather gives, beside a known range; an input may be something else, so it is no
+    error."""
+    values = as_floats(temperatures)
+    far = Plausible.beside(known.lowest, known.highest).implausible(values)
+    if far.any():
+        column = int(far.sum(axis=0).argmax())
+        value = values[far[:, column].argmax(), column]
+        warn_user(
+            f"temperatures are implausible: {known.names[column]!r} is {value:g} in {far[:, column].sum()} of "
+            f"{len(far)} rows, {far.sum()} values in all. Their predictions are wrong. Give degrees Celsius, and NaN "
+            "where a value is missing",
+            RecordsWarning,
+            "implausible-temperatures",
         )
 
 

@@ -1,19 +1,14 @@
-"""Regressors that predict multipliers, and results that are kept in a folder, so that no search computes them again."""
+"""Regressors that predict multipliers."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from pickle import PicklingError
-from typing import Any, Literal, TypeVar, overload
-from warnings import WarningMessage
+from typing import Any, Literal, overload
 
-import joblib
 import numpy as np
 import pandas as pd
-import sklearn
 from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -21,12 +16,9 @@ from sklearn.linear_model import RidgeCV
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils.validation import check_memory
 
-import skthermo
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import give_again, recorded
-from skthermo._io import lock
 from skthermo._tables.arrays import Array, as_columns, check_flag, columns_by_name
 from skthermo._tables.frames import (
     Table,
@@ -51,68 +43,6 @@ from skthermo._validation import (
 )
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, gross_errors
-
-Result = TypeVar("Result")
-
-
-def content_of(*parts: Any) -> str:
-    """A text that is the same for equal contents in every process, and another one for other contents or versions.
-
-    Each part counts by itself, whether or not others hold the same objects.
-    """
-    try:
-        hashes = [joblib.hash(_in_order(part), coerce_mmap=True) for part in parts]
-    except PicklingError as error:
-        raise ValueError(
-            f"memory cannot recognise {parts[0]!r:.200}; expected an object that can be pickled, or memory=None. Its "
-            "functions and classes have to come from a module, not from a script, notebook, function or lambda"
-        ) from error
-    return joblib.hash((skthermo.__version__, sklearn.__version__, *hashes))
-
-
-def _in_order(part: Any) -> Any:
-    """An array with its values row by row, as it is when read from a file."""
-    return np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part
-
-
-def folder_of(memory: str | Memory | None) -> Path | None:
-    """Where results are kept; None where they are not."""
-    location = getattr(memory, "location", memory)
-    return None if location is None else Path(location)
-
-
-def remembered(
-    memory: str | Memory | None, kind: str, make: Callable[[], Result], content: Callable[[], tuple[Any, ...]]
-) -> Result:
-    """What ``make`` returns, which depends on the content alone: read from the memory if it is there.
-
-    Warnings come again with it. If several processes need the same, one makes it and the others wait.
-    """
-    try:
-        memory = check_memory(memory)
-    except OSError as error:
-        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
-    folder = folder_of(memory)
-    if folder is None:
-        return make()
-    identity = content_of(*content())
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / f"{kind}-{identity}.lock", "w") as file:
-        lock(file)
-        known = memory.cache(made, ignore=["make"])
-        if not known.check_call_in_cache(kind, identity, make):
-            known(kind, identity, make)
-        result, caught = known(kind, identity, make)  # what is read has the same layout, and bits, each time
-    give_again(caught)
-    return result
-
-
-def made(kind: str, identity: str, make: Callable[[], Any]) -> tuple[Any, list[WarningMessage]]:
-    """A result, and the warnings that came with it."""
-    with recorded() as caught:
-        result = make()
-    return result, caught
-
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},

@@ -87,17 +87,17 @@ def main():
     warnings.filterwarnings("ignore")  # of weather outside the baseline's, of short baselines; the pages explain them
     bridge, began = z24.Bridge(z24.find(options.data and Path(options.data))), time.perf_counter()
     with tempfile.TemporaryDirectory() as memory:
-        candidates = comparison.detectors(memory)
+        candidates, kept = comparison.detectors(), {"n_repeats": options.repeats, "memory": memory}
         print("(a) chain of all healthy records, identified damage\n")
         fem, found = z24_damage.identify(bridge)
-        results = comparison.compare(bridge, fem, found.scenario(comparison.DAMAGED), candidates, options.repeats)
+        results = comparison.compare(bridge, fem, found.scenario(comparison.DAMAGED), candidates, **kept)
         missed, measured = print_agreement("a", results)
         print("(b) chain of the first four fifths, soil -18 %\n")
-        results = comparison.compare_before_damage(bridge, candidates=candidates, n_repeats=options.repeats)
+        results = comparison.compare_before_damage(bridge, candidates=candidates, **kept)
         missed += print_agreement("b", results)[0]
         print("The assumed damage by the chain of all healthy records, which knows the warm weather\n")
         scenario = comparison.Scenario(comparison.DAMAGED, comparison.ASSUMED)
-        results = comparison.compare(bridge, fem, scenario, candidates, options.repeats)
+        results = comparison.compare(bridge, fem, scenario, candidates, **kept)
         print(comparison.agreement(comparison.side_by_side(results)).round(3).to_string(), end="\n\n", flush=True)
         print("Choice, in the last quarter of the baseline's weather, of detectors that have learned the others\n")
         missed += print_choice(comparison.choose(bridge, candidates), measured)

@@ -6,7 +6,7 @@ import pytest
 from sklearn.linear_model import LinearRegression
 
 from skthermo._estimators import answers
-from skthermo._estimators.answers import answer_once, answers_kept
+from skthermo._estimators.answers import answer_once, answers_kept, content_of
 from skthermo._estimators.warnings import without_warnings
 from skthermo.detection import TemperatureCompensator
 from tests.detection.compensated import MODES, X
@@ -52,10 +52,33 @@ def test_the_oldest_answers_are_forgotten_when_they_have_too_many_numbers(monkey
     asked = []
 
     def question(who, number):
-        return answer_once(who, number, 10, lambda: asked.append((who, number)) or number)
+        return answer_once(who, (number,), 10, lambda: asked.append((who, number)) or number)
 
     with answers_kept():
         assert [question("a", n) for n in (1, 2, 1, 3, 3, 2, 1)] == [1, 2, 1, 3, 3, 2, 1]
     assert asked == [("a", 1), ("a", 2), ("a", 3), ("a", 1)]
     question("a", 1)
     assert len(asked) == 5  # outside, nothing is kept
+
+
+def test_values_labels_and_types_are_the_content_and_not_what_pandas_caches_nor_the_layout():
+    frame = X[MODES].copy()
+    content = content_of(frame, "a")
+    frame.index.resolution, frame.index.is_unique, frame.index.hour  # noqa: B018 -- which pandas keeps in the index
+    values = frame.to_numpy()
+    assert content_of(frame, "a") == content_of(frame.copy(), "a") == content
+    assert content_of(np.asfortranarray(values)) == content_of(np.ascontiguousarray(values))
+    shared = [values, values]
+    assert content_of(*shared) == content_of(values, values.copy())
+    others = [
+        frame * (1 + 1e-15),
+        frame[:-1],
+        frame.rename(columns={MODES[0]: "other"}),
+        frame.set_index(frame.index + pd.Timedelta(1, "ns")),
+        frame.tz_localize("Europe/Zurich"),
+        frame.reset_index(drop=True),
+        frame.astype(np.float32),
+        values,
+    ]
+    assert len({content, *(content_of(other, "a") for other in others)}) == 1 + len(others)
+    assert content_of(values.T) != content_of(values) != content_of(values.ravel())

@@ -127,9 +127,9 @@ class Counted(LinearRegression):
         return super().fit(X, y, sample_weight)
 
 
-def n_fits_of(fem, **detectors):
+def n_fits_of(fem, study_memory=None, **detectors):
     before = Counted.n_fits
-    study_of(fem, detectors, SCENARIOS[:1]).run(WEATHER)
+    study_of(fem, detectors, SCENARIOS[:1], memory=study_memory).run(WEATHER)
     return Counted.n_fits - before
 
 
@@ -144,6 +144,35 @@ def test_regressions_that_detectors_share_are_fitted_once_and_a_memory_remembers
     memory = str(tmp_path)
     assert n_fits_of(fem, one=whitened(None, memory)) == once
     assert n_fits_of(fem, one=whitened(None, memory)) == 0
+
+
+class CountedForest(IsolationForest):
+    """Counts its fits."""
+
+    n_fits = 0
+
+    def fit(self, X, y=None, sample_weight=None):
+        type(self).n_fits += 1
+        return super().fit(X, y, sample_weight)
+
+
+def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
+    forest = OutlierDetector(CountedForest(n_estimators=10))
+    several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
+    without = study_of(fem, several, SCENARIOS)
+    without.run(WEATHER, SIDE_BY_SIDE)
+    once = CountedForest.n_fits
+    for baseline in (SIDE_BY_SIDE, SIDE_BY_SIDE.copy()):
+        study = study_of(fem, several, SCENARIOS, memory=str(tmp_path))
+        pd.testing.assert_frame_equal(study.run(WEATHER, baseline), without.results_, check_exact=True)
+        for key, decisions in without.decisions_.items():
+            np.testing.assert_array_equal(study.decisions_[key], decisions)
+        assert study.detectors_["residuals"][0] is study.detectors_["distance"][0]
+        baseline.index.resolution  # noqa: B018 -- which pandas keeps in the index
+    assert CountedForest.n_fits == 2 * once
+    study.set_params(random_state=1).run(WEATHER, SIDE_BY_SIDE)
+    study.run(WEATHER, SIDE_BY_SIDE[:-1])
+    assert CountedForest.n_fits == 4 * once
 
 
 def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):

@@ -106,14 +106,21 @@ class PageWriter:
     @cached_property
     def errors(self) -> dict[Hashable, pd.DataFrame]:
         """Errors by bridge: stage, error and what failed in an owner's words."""
-        return dict(iter(in_words(self.fleet.errors).groupby("bridge")))
+        found = in_words(self.fleet.errors)
+        by_bridge = dict(iter(found.groupby("bridge")))
+        return {name: by_bridge.get(name, found[:0]) for name in self.files}
+
+    @cached_property
+    def messages(self) -> dict[Hashable, list[str]]:
+        """Texts of the warnings by bridge, each once."""
+        warned = self.fleet.warnings
+        return {name: texts.unique().tolist() for name, texts in warned.groupby("bridge")["message"]}
 
     def write(self, name: Hashable) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
-        warned = self.fleet.warnings
-        messages = warned.loc[warned["bridge"] == name, "message"].unique().tolist()
+        messages = self.messages.get(name, [])
         monitor, unread = _opened(self.fleet.monitors, name)
-        failed = self.errors.get(name, in_words(self.fleet.errors)[:0])
+        failed = self.errors[name]
         error = "; ".join(dict.fromkeys(failed["what"]))
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         texts = bullets(messages) or paragraphs("There was no warning.")

@@ -3,15 +3,16 @@
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from pickle import PicklingError
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from joblib import Memory
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.answers import content_of
+from skthermo._estimators.answers import answer_once
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import reported_by_caller
 from skthermo._tables.arrays import Array, as_columns, as_floats
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
@@ -152,25 +153,9 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     return curve.a90 if np.isfinite(curve.a90) else float(np.nan_to_num(np.mean(curve.bracket), nan=np.inf))
 
 
-class LearnedHeads:
-    """Steps before the last one of pipelines, fitted once for all that begin alike and learn the same records.
-
-    Each is a pipeline whose last step passes on what it gets, so that a ``memory`` remembers all others.
-    """
-
-    def __init__(self) -> None:
-        self._learned: dict[str, tuple[Pipeline, Table]] = {}
-
-    def of(self, pipeline: Pipeline, healthy: Table) -> tuple[Pipeline, Table]:
-        """The steps before the last one of a pipeline, fitted, and what they make of healthy records."""
-        head = Pipeline([*pipeline.steps[:-1], (pipeline.steps[-1][0], "passthrough")], memory=pipeline.memory)
-        try:
-            key = content_of((pipeline.steps[:-1], healthy))
-        except PicklingError:
-            return head, head.fit_transform(healthy)
-        if key not in self._learned:
-            self._learned[key] = head, head.fit_transform(healthy)
-        return self._learned[key]
+def _learned(memory: str | Memory | None, detector: Any, records: Table) -> Any:
+    """A detector fitted to records, or one that was."""
+    return remembered(memory, "detector", lambda: detector.fit(records), lambda: (detector, records))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,23 +173,30 @@ class Candidate:
     @classmethod
     def learned(
         cls,
-        name: str,
-        detector: BaseEstimator,
         fem: FittedChain,
         baseline: Table | None,
         random_state: np.random.RandomState | None,
-        heads: LearnedHeads,
+        memory: str | Memory | None,
+        name: str,
+        detector: BaseEstimator,
     ) -> "Candidate":
-        """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own."""
+        """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own.
+
+        A memory keeps what is fitted, and the steps before the last one are shared by all pipelines that begin alike.
+        """
         view, healthy = read_baseline(fem, detector, baseline)
         fitted = clone(detector)
         seed_parts(fitted, deepcopy(random_state))
-        if isinstance(fitted, Pipeline) and len(fitted) > 1:
-            head, seen = heads.of(fitted, healthy)
-            fitted.steps[:-1] = head.steps[:-1]
-            fitted[-1].fit(seen)
-        else:
-            fitted.fit(healthy)
+        if not isinstance(fitted, Pipeline) or len(fitted) == 1:
+            return cls(name, _learned(memory, fitted, healthy), view, _num_samples(healthy))
+        head = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
+        begins = head.steps[:-1], healthy
+
+        def learn() -> tuple[Pipeline, Table]:
+            return remembered(memory, "head", lambda: (head, head.fit_transform(healthy)), lambda: begins)
+
+        head, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
+        fitted.steps = [*head.steps[:-1], (fitted.steps[-1][0], _learned(memory, fitted[-1], seen))]
         return cls(name, fitted, view, _num_samples(healthy))
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -218,6 +219,10 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
                     here = replace(simulation, T=T)
                     drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                 if part == "baseline":
+                    measurement = here.measurement.resampled(here.fem, replicates.fault_stream(number))
+                    if measurement is not here.measurement:
+                        here = replace(here, measurement=measurement)
+                        drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                     levels = replicates.noise_levels(number)
                     drawn = [(noise * levels, gappy) for noise, gappy in drawn]
                 steps.append(_rates(here, chain, seeds, drawn, number * N_DRAWS))
@@ -237,11 +242,9 @@ def _rates(
     n_years = YEARS if chain.model is simulation.fem.model else 1
     clean = clean_frequencies(chain, simulation.scenarios, simulation.T, len(seeds), first, n_years)
     changed = replace(simulation, clean=clean)
-    repeats: list[Evaluation] = []
-    for number, (pair, measured) in enumerate(zip(seeds, drawn, strict=True)):
-        records = changed.records(simulation.scenarios, number, pair, measured)
-        repeats.append(changed.evaluate(records, repeats[-1].errors if repeats else {}))
-    found = _counted(repeats[0].with_repeats(repeats[1:]), simulation.scenarios, simulation.T)
+    draws = enumerate(zip(seeds, drawn, strict=True))
+    records = (changed.records(simulation.scenarios, number, *pair) for number, pair in draws)
+    found = _counted(changed.evaluate(itertools.chain.from_iterable(records), {}), simulation.scenarios, simulation.T)
     return {key: rates for key, rates in found.items() if len(rates[0]) == len(seeds)}
 
 
@@ -263,7 +266,8 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
         return "Intervals include noise only, not other weather, other training records or an error of the model."
     names = [column for column in parts.columns if column in NAMES]
     lines = [
-        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}."
+        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}. "
+        "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()

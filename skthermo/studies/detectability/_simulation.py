@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -17,7 +18,7 @@ from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, as_columns, as_floats
+from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
@@ -29,6 +30,7 @@ SIMULATED, REFERENCE = "simulated", "reference"
 
 Answer = TypeVar("Answer")
 Key: TypeAlias = tuple[str, ...]
+Repeat: TypeAlias = tuple[int, Sequence[int]]  # number and seeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +99,8 @@ class Evaluation:
     """
 
     decisions: Mapping[Key, Array]
+    transitions: Mapping[Key, Array]
     errors: Mapping[str, Exception]
-    transitions: Mapping[Key, Array] = field(default_factory=dict)
     calibration: Mapping[Key, Array] = field(default_factory=dict)
     indices: Mapping[Key, pd.Series] = field(default_factory=dict)
 
@@ -122,8 +124,12 @@ class Evaluation:
             if one.source == SIMULATED
         ]
         widths = [(rate.highest - rate.lowest) / 2 for rate in rates if rate.n_records]
-        n_repeats = len(next(iter(self.decisions.values())))
-        return int(np.ceil(n_repeats * (max(widths, default=0.0) / tol) ** 2))
+        return int(np.ceil(self.n_repeats * (max(widths, default=0.0) / tol) ** 2))
+
+    @property
+    def n_repeats(self) -> int:
+        """Number of repeats."""
+        return len(next(iter(self.decisions.values())))
 
     def records(self, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
         """Those of a detector, in the order of the scenarios."""
@@ -235,6 +241,13 @@ class Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
+    def resampled(self, fem: FittedChain, random_state: np.random.RandomState) -> Measurement:
+        """With drawn outliers, and the gaps beside them, of other records that could have trained the chain."""
+        if self.outliers is None or is_real(self.outliers):
+            return self
+        service = fem.recorder_.service if isinstance(self.outliers, str) else self.outliers
+        return replace(self, outliers=service.resampled(random_state)) if service.has_faults else self
+
     def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
@@ -268,7 +281,7 @@ class Simulation:
         records = itertools.chain(self.records(self.scenarios, 0, seeds), self._measured(measured))
         found = self.evaluate(records, errors, with_indices=True)
         with without_warnings():
-            return self._calibrated(found, 0, seeds)
+            return self._calibrated(found, [(0, seeds)])
 
     @property
     def share_in_replicates(self) -> float:
@@ -285,14 +298,22 @@ class Simulation:
     def repeats(
         self, numbers: range, seeds: Sequence[Sequence[int]], n_jobs: int | None, verbose: int = 0
     ) -> list[Evaluation]:
-        """Evaluate the records of some later repeats; the warnings of the first are the only ones given."""
-        with without_warnings(), answers_kept():
-            jobs = (delayed(self._one_repeat)(number, seeds[number]) for number in numbers)
-            return run_jobs(jobs, len(numbers), unit="repeats", n_jobs=n_jobs, verbose=verbose)
+        """Evaluate the records of some later repeats; the warnings of the first are the only ones given.
 
-    def _one_repeat(self, number: int, seeds: Sequence[int]) -> Evaluation:
+        Jobs are as many repeats as are evaluated together, however many run side by side.
+        """
+        size = max(MOST_ROWS // (len(self.T) * (len(self.scenarios) + 1)), 1)
+        repeats = [(number, seeds[number]) for number in numbers]
+        some = (repeats[first : first + size] for first in range(0, len(repeats), size))
+        with without_warnings(), answers_kept():
+            jobs = (delayed(self._some_repeats)(part) for part in some)
+            options = {"count": lambda one: one.n_repeats, "unit": "repeats", "n_jobs": n_jobs, "verbose": verbose}
+            return run_jobs(jobs, len(numbers), **options)
+
+    def _some_repeats(self, repeats: Sequence[Repeat]) -> Evaluation:
         with without_warnings(), answers_kept(), single_blas_thread():
-            return self._calibrated(self.evaluate(self.records(self.scenarios, number, seeds), {}), number, seeds)
+            records = (self.records(self.scenarios, number, seeds) for number, seeds in repeats)
+            return self._calibrated(self.evaluate(itertools.chain.from_iterable(records), {}), repeats)
 
     def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:
         for scenario in self.scenarios:
@@ -341,27 +362,31 @@ class Simulation:
         """Frequencies of the healthy structure before noise."""
         names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
         with without_warnings():
-            return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
+            if names:
+                return self.clean[names[0]][0]
+            return self.fem.thermal_.in_weather(self._weather, YEARS * len(self.T)).simulated()
 
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
     ) -> Evaluation:
         """Decisions of every detector that has not failed and, if asked, its damage indices, on one after another.
 
-        Without indices, as in later repeats, whose warnings are not given, some are evaluated together.
+        Records of one scenario and source are those of one repeat after another. Without indices, as in later repeats,
+        whose warnings are not given, some are evaluated together.
         """
-        decisions, transitions, indices = {}, {}, {}
+        decisions, transitions, indices = defaultdict(list), defaultdict(list), {}
         for some in ([one] for one in records) if with_indices else _together(records):
             answers, errors = ask_each(self.candidates, partial(self._answers, some, with_indices), errors)
             for name, found in answers.items():
                 for one, (index, decided, during) in zip(some, found, strict=True):
                     key = name, one.scenario.name, one.source
-                    decisions[key] = decided[np.newaxis]
+                    decisions[key].append(decided)
                     if during is not None:
-                        transitions[key] = during[np.newaxis]
+                        transitions[key].append(during)
                     if with_indices:
                         indices[key] = index
-        return Evaluation(decisions, errors, transitions, indices=indices)
+        stacked = ({key: np.array(values) for key, values in one.items()} for one in (decisions, transitions))
+        return Evaluation(*stacked, errors=errors, indices=indices)
 
     def _answers(self, records: Sequence[Records], with_indices: bool, name: str) -> list[tuple[Any, Array, Any]]:
         """Damage index, decisions and those of transitions of one detector for each of some records."""
@@ -378,13 +403,14 @@ class Simulation:
         found = candidate.damage_indices(entering, rows) if with_indices else during
         return list(zip(found, candidate.decisions(entering), during, strict=True))
 
-    def _calibrated(self, found: Evaluation, repeat: int, seeds: Sequence[int]) -> Evaluation:
+    def _calibrated(self, found: Evaluation, repeats: Sequence[Repeat]) -> Evaluation:
         """The evaluation with decisions on healthy records with noise of other seeds."""
         healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
         if not healthy:
             return found
-        others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
-        again = self.evaluate(self.records(healthy, repeat, others), found.errors)
+        others = (np.random.RandomState(seeds).randint(LARGEST_SEED, size=2) for _, seeds in repeats)
+        records = (self.records(healthy, number, pair) for (number, _), pair in zip(repeats, others, strict=True))
+        again = self.evaluate(itertools.chain.from_iterable(records), found.errors)
         calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
         return replace(found, errors=again.errors, calibration=calibration)
 

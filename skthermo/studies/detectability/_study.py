@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 from time import process_time
 from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
+from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
@@ -21,7 +22,7 @@ from skthermo._tables.arrays import as_random_state, check_jobs, check_probabili
 from skthermo._validation import Stages, held, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
-from skthermo.studies.detectability._candidates import Candidate, LearnedHeads
+from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
@@ -88,7 +89,8 @@ class DetectabilityStudy(BaseEstimator):
 
         - "noise": another draw of the noise;
         - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
-          that the structure is another one than the chain; the detectors stay as they are, as they would in service;
+          that the structure is another one than the chain, and have had other gaps and outliers; the detectors stay as
+          they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;
         - "model": another FE model of ``models`` in the chain;
         - "auto": "noise", "baseline" and "weather", and "model" if ``models`` are given;
@@ -106,6 +108,9 @@ class DetectabilityStudy(BaseEstimator):
         Number of parallel jobs (joblib), which share the repeats and the replicates. Results do not depend on it.
     random_state : int, RandomState or None, default=None
         Seed of noise, gaps and outliers, of replicates, and of parts of detectors without a seed of their own.
+    memory : str or joblib.Memory, optional
+        Folder that keeps what detectors have learned, so that other studies in which they learn the same baseline do
+        not fit them again.
     verbose : bool or int, default=0
         Whether `run` prints a line with the time of each of its stages, and after the second repeat how long the others
         and the replicates will take; from 2, joblib prints how many of them are done.
@@ -210,6 +215,7 @@ class DetectabilityStudy(BaseEstimator):
         n_replicates: int = 10,
         n_jobs: int | None = None,
         random_state: int | np.random.RandomState | None = None,
+        memory: str | Memory | None = None,
         verbose: bool | int = 0,
     ):
         self.fem = fem
@@ -225,6 +231,7 @@ class DetectabilityStudy(BaseEstimator):
         self.n_replicates = n_replicates
         self.n_jobs = n_jobs
         self.random_state = random_state
+        self.memory = memory
         self.verbose = verbose
 
     results_ = held("_found.table")
@@ -252,6 +259,7 @@ class DetectabilityStudy(BaseEstimator):
     uncertainty_summary = _of_findings(StudyFindings.uncertainty_summary)
     detector_name = _of_findings(StudyFindings.detector_name)
 
+    @answers_kept()
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -331,11 +339,9 @@ class DetectabilityStudy(BaseEstimator):
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
         stages = Stages(self, 5 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once(), answers_kept():
-            parts, heads = seeded(self.random_state), LearnedHeads()
-            candidates, errors = ask_each(
-                detectors, lambda name: Candidate.learned(name, detectors[name], self.fem, baseline, parts, heads), {}
-            )
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
+            learned = partial(Candidate.learned, self.fem, baseline, seeded(self.random_state), self.memory)
+            candidates, errors = ask_each(detectors, lambda name: learned(name, detectors[name]), {})
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)

@@ -18,6 +18,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import findings_of, warn_each, warn_user
 from skthermo._tables.arrays import (
     Array,
@@ -67,7 +68,7 @@ from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, g
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._regression import TemperatureMapper, remembered
+from skthermo.surrogate._regression import TemperatureMapper
 from skthermo.surrogate._simulator import Box, Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
@@ -779,7 +780,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(weather.filled))
+        theta = self.thermal_.learned(weather.filled)
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         excess = excess.assign(outside_bounds=outside)
         if offers(self.mapper_, "from_fleet"):

@@ -15,7 +15,7 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_each, warn_user, without_warnings
 from skthermo._tables.arrays import (
     HUGE,
     Array,
@@ -394,10 +394,15 @@ class ThermalModel(SavesFrames):
     mode_names: Sequence[Any]
     n_jobs: int | None
 
+    def learned(self, temperatures: Table) -> Array:
+        """What the mapper gives, without its warning of the weather, of which the chain says more."""
+        with reported_by_caller({"implausible-temperatures"}):
+            return as_columns(self.mapper.predict(temperatures))
+
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
         warn_each(self._warnings(weather))
-        theta, impossible = possible(self.mapper.predict(weather.filled))
+        theta, impossible = possible(self.learned(weather.filled))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
             warn_user(
@@ -435,7 +440,7 @@ class ThermalModel(SavesFrames):
 
     def predicted(self, weather: Weather) -> Array:
         """Frequencies of the healthy structure, without warnings."""
-        theta = as_columns(self.mapper.predict(weather.filled))
+        theta = self.learned(weather.filled)
         return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
 
     def simulated(self, weather: Weather, modes: Sequence[int] | None = None, **changes: Any) -> Array:
@@ -464,7 +469,7 @@ class ThermalModel(SavesFrames):
         n_parameters = len(self.parameter_names)
 
         def predict(filled: Table) -> Array:
-            return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
+            return np.hstack([self.learned(filled), self.discrepancy(filled)])
 
         def log_frequencies(both: Array) -> Array:
             return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
@@ -476,7 +481,7 @@ class ThermalModel(SavesFrames):
         """Covariances of ln f as the mapper states them; zero where it does not."""
         if not offers(self.mapper, "predict_covariance"):
             return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
-        theta = as_columns(self.mapper.predict(weather.filled))
+        theta = self.learned(weather.filled)
         return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
 
 
@@ -540,7 +545,8 @@ class StructureInWeather:
 
 def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
-    return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
+    frequencies = simulator.frequencies(possible(theta)[0], n_jobs, warn=False, n_rows=len(theta))
+    return as_floats(aligner.inverse_transform(frequencies))
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import joblib
 import numpy as np
 from joblib import Memory
 from numpy.typing import ArrayLike
@@ -15,13 +14,14 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import Bunch
 
+from skthermo._estimators.answers import content_of
+from skthermo._estimators.memory import folder_of, identity_of, remembered
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats, is_auto, tolerance
 from skthermo._tables.frames import Table, column_names
 from skthermo._validation import validate_data
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample, share_reordered
-from skthermo.surrogate._regression import content_of, folder_of, remembered
 from skthermo.surrogate._simulator import NO_BASIS, SOLVES_PER_ROW, Box, Simulator, reason_of
 from skthermo.surrogate.inverse._refinement import Refinement, ResponseSurface, ShapeInputs
 
@@ -244,19 +244,19 @@ class Inversions:
         """Inversions by a refinement that is adapted to the inputs of `fit` and the regressor's guess."""
         if folder_of(memory) is None:
             return cls(refinement.adapted(inputs, guess))
-        content = content_of(replace(refinement, n_jobs=None), inputs, guess)
+        content = identity_of(replace(refinement, n_jobs=None), inputs, guess)
         simulator, surface = remembered(
             memory, "adaptation", lambda: _changes(refinement, refinement.adapted(inputs, guess)), lambda: (content,)
         )
         if simulator is not None:
             simulator = replace(simulator, model=refinement.simulator.model)  # not the copy that was read
         adapted = replace(refinement, simulator=simulator or refinement.simulator, surface=surface)
-        return cls(adapted, memory, content, joblib.hash(inputs))
+        return cls(adapted, memory, content, content_of(inputs))
 
     def found(self, inputs: Array, guess: Array, scatter: Array) -> Bunch:
         """What `Refinement.refined` gives."""
         folder = folder_of(self.memory)
-        is_kept = folder is not None and folder.is_dir() and joblib.hash(inputs) == self.seen
+        is_kept = folder is not None and folder.is_dir() and content_of(inputs) == self.seen
         return remembered(
             self.memory if is_kept else None,
             "inversion",
