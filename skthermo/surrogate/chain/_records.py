@@ -252,6 +252,11 @@ class ServiceRecords:
         places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
         return cls(missing[order], outliers[order], places.to_numpy())
 
+    @property
+    def has_faults(self) -> bool:
+        """Whether there is a gap or an outlier."""
+        return bool(self.missing.any() or not np.isnan(self.outliers).all())
+
     def draw(self, places: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records whose faults rows of weather in order of time have, (n_rows,).
 
@@ -260,7 +265,7 @@ class ServiceRecords:
         begins, or in records with the most usual faults, which are mostly none. All records are taken equally often.
         """
         n_records, n_rows = len(self.places), len(places)
-        if not self.missing.any() and np.isnan(self.outliers).all():
+        if not self.has_faults:
             return np.zeros(n_rows, dtype=np.intp)  # all records are alike
         passes = random_state.uniform(size=n_rows) < 1 / MEAN_LENGTH
         which = random_state.uniform(size=n_rows)
@@ -274,6 +279,11 @@ class ServiceRecords:
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
+
+    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
+        """Gaps and outliers that the training records could have had as well, in their own weather."""
+        taken = self.draw(self.places, random_state)
+        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
         """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
