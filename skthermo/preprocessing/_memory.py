@@ -88,10 +88,8 @@ class ExponentialMeans(PastFeatures):
         Earliest record of `fit`: means of records that begin with it have no past, and no warning says so again.
     lookback_ : int or numpy.timedelta64
         How far back means look: a number of rows, or a time on a DatetimeIndex.
-    n_features_in_ : int
-        Number of sensors.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of sensors and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
