@@ -390,9 +390,9 @@ class Simulation:
                     if one.has_onsets:
                         seen = one.beginning(memory).entering(candidate)
                         during[number] = transitions_of(candidate.decisions([seen])[0], memory)
-        rows = [one.rows for one in records]
-        found = candidate.damage_indices(entering, rows) if with_indices else during
-        return list(zip(found, candidate.decisions(entering), during, strict=True))
+        found = candidate.damage_indices(entering, [one.rows for one in records]) if with_indices else None
+        decisions = candidate.decisions(entering, found)
+        return list(zip(found or during, decisions, during, strict=True))
 
     def _calibrated(self, found: Evaluation, repeats: Sequence[Repeat]) -> Evaluation:
         """The evaluation with decisions on healthy records with noise of other seeds."""
