@@ -243,8 +243,9 @@ class Candidate:
 
     def decisions(self, entering: Sequence[Table], indices: Sequence[pd.Series] | None = None) -> list[Array]:
         """Decision function of each of some tables, NaN where there is none; float32 is as much as alarms and intervals
-        need. A `DamageDetector` whose damage indices are known is not asked again."""
-        if indices is not None and isinstance(self.last, DamageDetector):
+        need. They follow from known damage indices where the detector's decisions are those of `DamageDetector`."""
+        follow = getattr(type(self.last), "decision_function", None) is DamageDetector.decision_function
+        if indices is not None and follow:
             return [np.asarray(-index.to_numpy() - self.last.offset_, dtype=np.float32) for index in indices]
         return self._each(self.last.decision_function, entering, np.float32)
 

@@ -222,10 +222,15 @@ class Records:
         return self._known[candidate.head]
 
     def seen_by(self, candidate: Candidate) -> Table:
-        """The columns that a detector sees."""
-        if self.source == SIMULATED:
-            return candidate.view.table(self.T, self.values)
-        return candidate.view.reference(self.values, self.T, self.scenario.name)
+        """The columns that a detector sees, in one table for all that see the same."""
+        view = candidate.view
+        seen = (*view.positions, view.is_frame)
+        if seen not in self._known:
+            if self.source == SIMULATED:
+                self._known[seen] = view.table(self.T, self.values)
+            else:
+                self._known[seen] = view.reference(self.values, self.T, self.scenario.name)
+        return self._known[seen]
 
 
 @dataclass(frozen=True, eq=False)
