@@ -79,6 +79,7 @@ fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
 bars = ax.bar(names, architectures["error (%)"], color="0.75")
 bars[search.best_index_].set_color("C0")
 ax.bar_label(bars, [f"{score:.3f}" for score in architectures["score"]], fontsize="small")
+ax.margins(y=0.1)
 ax.set(ylabel="error of the parameters (%)", title="Networks by their error, with the score above each")
 ax.set_xticks(range(len(names)), names, rotation=30, ha="right")
 
@@ -105,7 +106,9 @@ def monitoring(n_days=60, noise=0.005, seed=0):
 
 T, F = monitoring(60 if options.full else 30)
 ten_days = pd.DataFrame({"air (°C)": T["T1"], "$f_1$ (Hz)": F["f1"]})[:240]
-ten_days.plot(subplots=True, style=".", xlabel="", figsize=(9, 5))
+fig, axes = plt.subplots(2, figsize=(9, 5), layout="constrained", sharex=True)
+for ax, name in zip(axes, ten_days, strict=True):
+    ten_days[name].plot(ax=ax, style=".", xlabel="", ylabel=name)
 
 # %%
 # The chain as one estimator

@@ -39,6 +39,7 @@ from skthermo._io import bars_of, without_bars
 from skthermo._tables.arrays import (
     Array,
     as_columns,
+    is_frame_of_floats,
     is_model,
     refuse_huge,
     refuse_infinite,
@@ -165,7 +166,7 @@ def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
 
     With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
     """
-    check = _validate_floats if is_float_frame(X) else sklearn.utils.validation.validate_data
+    check = _validate_floats if is_frame_of_floats(X) else sklearn.utils.validation.validate_data
     return _as_numbers(partial(check, estimator), X, "X", options)
 
 
@@ -173,11 +174,6 @@ def _validate_floats(estimator: BaseEstimator, X: pd.DataFrame, *, reset: bool =
     """scikit-learn's `validate_data` of a frame of floats, whose values it checks sooner as an array."""
     sklearn.utils.validation.validate_data(estimator, X, reset=reset, skip_check_array=True)
     return sklearn.utils.check_array(X.to_numpy(), input_name="X", estimator=estimator, **options)
-
-
-def is_float_frame(X: Any) -> bool:
-    """Whether X is a frame of ordinary floats, in which nothing has to be converted."""
-    return isinstance(X, pd.DataFrame) and all(dtype == np.float64 for dtype in X.dtypes.tolist())
 
 
 def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
@@ -210,7 +206,7 @@ def with_nan(X: Any) -> Any:
 
     Times, text, booleans and bytes are errors.
     """
-    if is_float_frame(X):
+    if is_frame_of_floats(X):
         return X
     refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):

@@ -40,7 +40,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fem.affine": {"fem.modal"},
     "fem.assembly": {"fem.elements", "fem.affine"},
     "fem.external": {"fem.affine"},
-    "detection": {"preprocessing.checks"},  # the compensator names implausible temperatures
+    "residuals": {"preprocessing.checks"},  # a range of weather names implausible temperatures
     "preprocessing.checks": set(),
     "surrogate.inverse": set(),
     "surrogate.chain": {"surrogate.inverse"},

@@ -59,13 +59,15 @@ ELEMENT_METHODS = ("properties", "dofs", "ends", "stiffness", "mass")
 LONGEST_SIGNATURE = 700  # characters that help() prints
 
 
-def is_contract_of_an_element(name):
-    """Methods whose parameters the protocol of elements documents, once for all of them."""
+def is_documented_elsewhere(name):
+    """Methods whose parameters the protocol of elements documents, or the class that has the protocol of a chain."""
     owner, _, method = name.rpartition(".")
+    if owner.endswith(".FittedChain"):
+        return True
     return owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
 
 
-DOCUMENTED = [c for c in CALLABLES if not is_contract_of_an_element(c[0]) and c[0] not in PROTOCOLS]
+DOCUMENTED = [c for c in CALLABLES if not is_documented_elsewhere(c[0]) and c[0] not in PROTOCOLS]
 CLASSES = [(name, thing) for name, thing in OBJECTS if inspect.isclass(thing)]
 
 

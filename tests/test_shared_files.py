@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from skthermo._io import alone_with, write_when_complete
+from skthermo._io import ReadWhenAsked, alone_with, write_when_complete
 
 HOLDER = """
 import sys
@@ -81,3 +81,11 @@ def test_a_link_and_its_file_have_one_lock(tmp_path, holder):
     link.symlink_to(tmp_path / "state")
     with pytest.raises(TimeoutError, match="is in use"), alone_with(link, 0):
         pass
+
+
+def test_names_of_objects_are_known_without_reading_them():
+    read = []
+    objects = ReadWhenAsked({"a": lambda: read.append("a")})
+    assert "a" in objects
+    assert "b" not in objects
+    assert not read

@@ -1,5 +1,7 @@
 """Records in every container: names, missing values, units, and files that keep fitted objects."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +10,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
 
 from skthermo._tables.arrays import as_floats, as_random_state, real_array
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.frames import as_index, column_names, frame_like, usual_step
+from skthermo._tables.text import plain
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
@@ -254,3 +257,26 @@ def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
         estimator.fit(values)
     assert "\n" not in str(refused.value)
     assert "sklearn" not in refused.traceback[-1].path.parts
+
+
+@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Brussels"])
+def test_stamps_come_back_from_nanoseconds_and_missing_ones_stay_missing(zone):
+    stamps = pd.date_range("2025-03-29", periods=5, freq="12h", tz=zone).as_unit("ns")
+    back = as_index([*stamps.asi8.tolist(), None], zone)
+    assert back[:5].equals(stamps)
+    assert back.tz == stamps.tz
+    assert pd.isna(back[5])
+
+
+def test_the_usual_step_ignores_gaps_and_is_zero_for_one_record():
+    stamps = pd.date_range("2025-01-01", periods=50, freq="3h")
+    assert usual_step(stamps.delete(slice(10, 30))) == pd.Timedelta("3h")
+    assert usual_step(stamps[:1]) == pd.Timedelta(0)
+
+
+def test_values_become_those_of_json_and_stay_as_they_are_then():
+    moment = pd.Timestamp("2025-01-01 12:00", tz="UTC")
+    facts = {"at": moment, "for": pd.Timedelta("90s"), 3: (np.float32(0.5), np.int64(2), np.nan, pd.NaT, None, True)}
+    found = plain(facts)
+    assert found == {"at": moment.isoformat(), "for": 90.0, "3": [0.5, 2, None, None, None, True]}
+    assert json.loads(json.dumps(found, allow_nan=False)) == found == plain(found)

@@ -55,8 +55,10 @@ def _within(**changes: Any) -> Iterator[None]:
 
 def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
     """Warn at the nearest line outside skthermo, scikit-learn and joblib, once for all folds of a cross-validation or
-    search; a worker process, which sees only its own folds, warns once in its life. The text ends with the kind."""
-    warn_each([category(message, kind)])
+    search; a worker process, which sees only its own folds, warns once in its life. The text ends with the kind; an
+    empty one is no warning."""
+    if message:
+        warn_each([category(message, kind)])
 
 
 def warn_each(warned: Iterable[SkthermoWarning]) -> None:

@@ -69,6 +69,9 @@ class ReadWhenAsked(Mapping[Any, Any]):
     def __getitem__(self, name: Any) -> Any:
         return self._readers[name]()
 
+    def __contains__(self, name: Any) -> bool:
+        return name in self._readers
+
     def __iter__(self) -> Iterator[Any]:
         return iter(self._readers)
 

@@ -141,7 +141,7 @@ def as_random_state(seed: Any) -> np.random.RandomState:
 
 def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """At most that many of the rows, spread evenly over them."""
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
+    return rows if len(rows) <= most else rows[np.linspace(0, len(rows) - 1, most).astype(int)]
 
 
 def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
@@ -214,6 +214,11 @@ def is_real(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
 
 
+def is_frame_of_floats(values: Any) -> bool:
+    """Whether a frame of pandas holds floats of 64 bits, and nothing else, which needs no further check of types."""
+    return hasattr(values, "iloc") and values.ndim == 2 and {*values.dtypes} == {np.dtype(float)}
+
+
 def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     """Raise an error for an array, a table or nested lists with values that are no numbers.
 
@@ -246,12 +251,16 @@ def refuse_no_table(
     """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
     whose names are not all text or all numbers; a vector may stand for a table of one column."""
     expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
-    refuse_no_array(values, what, expected)
-    refuse_no_numbers(values, what)
-    array: Any = values if hasattr(values, "dtypes") else np.asarray(values)
-    shape, dtypes = array.shape, getattr(array, "dtypes", [getattr(array, "dtype", None)])
-    if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
-        raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    if is_frame_of_floats(values):
+        array: Any = values
+    else:
+        refuse_no_array(values, what, expected)
+        refuse_no_numbers(values, what)
+        array = values if hasattr(values, "dtypes") else np.asarray(values)
+        dtypes = getattr(array, "dtypes", [getattr(array, "dtype", None)])
+        if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
+            raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
+    shape = array.shape
     if len(shape) == 1 and or_vector:
         shape = (*shape, 1)
     if len(shape) == 1 and hasattr(values, "iloc"):

@@ -233,13 +233,7 @@ def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp
 
 def check_duration(value: Any, name: str) -> pd.Timedelta:
     """A duration of zero or more, as a text or a Timedelta."""
-    try:
-        duration = pd.Timedelta(pd.NaT if isinstance(value, Real) else value).as_unit("ns")
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{name} is {value!r}; expected a duration, such as '7D'") from error
-    if not duration >= pd.Timedelta(0):
-        raise ValueError(f"{name} is {value!r}; expected a duration of zero or more, such as '7D'")
-    return duration
+    return pd.Timedelta(as_duration(value, name, may_be_zero=True))
 
 
 def usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
@@ -318,8 +312,8 @@ def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
         ) from error
 
 
-def as_duration(value: Any, name: str) -> np.timedelta64:
-    """A positive duration of fixed length; that called "tolerance" may be zero."""
+def as_duration(value: Any, name: str, *, may_be_zero: bool = False) -> np.timedelta64:
+    """A positive duration of fixed length, or one of zero or more."""
     units = re.findall("[A-Za-z]+", value) if isinstance(value, str) else None
     if any(unit.isupper() and unit not in LONE_CAPITALS for unit in units or ()):
         raise ValueError(
@@ -332,6 +326,7 @@ def as_duration(value: Any, name: str) -> np.timedelta64:
         duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration of fixed length, such as '1h'") from error
-    if units == [] or not duration >= ZERO or (name != "tolerance" and duration == ZERO):
-        raise ValueError(f"{name} is {value!r}; expected a positive duration with its unit, such as '1h'")
+    if units == [] or not duration >= ZERO or (duration == ZERO and not may_be_zero):
+        expected = "a duration of zero or more" if may_be_zero else "a positive duration"
+        raise ValueError(f"{name} is {value!r}; expected {expected} with its unit, such as '1h'")
     return duration

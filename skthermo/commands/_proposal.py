@@ -7,19 +7,20 @@ import json
 import re
 import shutil
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 import skthermo
+from skthermo._estimators.warnings import without_warnings
 from skthermo._io import write_when_complete
 from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
-from skthermo.commands._choice import Candidate, candidates
 from skthermo.commands._looking import Look, is_in_kelvin, look_at
 from skthermo.commands._new_records import in_celsius, joined
 from skthermo.commands._record_files import PARQUET, CsvFormat
@@ -45,6 +46,9 @@ FEATURES = {
     "ExponentialMeans": "Means of earlier temperatures that explain the responses.",
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
+DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day can be evaluated together
+SINGLE = ("MahalanobisDetector", {}, "each record for itself")
+DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
 WIDTH = 110  # of comments
 OTHERS = """
 # An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives one,
@@ -57,6 +61,40 @@ OTHERS = """
 # [page]
 # title = "Bridge over the river"
 # drift_limit = 0.1"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A detector by its class and settings, what it evaluates, what it finds, and how small changes are that it finds.
+
+    The ``size`` is the geometric mean of the smallest changes of each response alone, infinite where none is found.
+    """
+
+    kind: str
+    chosen: Mapping[str, Any]
+    text: str
+    finds: str
+    size: float
+
+    def __str__(self) -> str:
+        return f"{self.kind}, {self.text}: {self.finds}"
+
+
+def candidates(
+    step: pd.Timedelta, baseline: pd.DataFrame, monitor: Callable[[str, Mapping[str, Any]], Monitor]
+) -> list[Candidate]:
+    """Detectors that are possible, the best first; the single record where nothing speaks for another."""
+    kinds = [SINGLE, DAY] if step <= DENSE else [SINGLE]
+    tried = []
+    for kind, chosen, text in kinds:
+        try:
+            with without_warnings():  # the fit that follows gives them
+                smallest = monitor(kind, chosen).fit(baseline).smallest_changes_
+            size = float(np.exp(np.log(list(smallest.single.values())).mean()))
+            tried.append(Candidate(kind, chosen, text, str(smallest), size if np.isfinite(size) else np.inf))
+        except ValueError as error:
+            tried.append(Candidate(kind, chosen, text, f"it cannot be fitted to this baseline: {error}", np.inf))
+    return sorted(tried, key=lambda one: one.size)
 
 
 @dataclass(frozen=True)

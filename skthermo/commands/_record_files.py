@@ -61,11 +61,6 @@ class CsvFormat:
     time_zone: str | None = None
     missing: Sequence[float] = ()
 
-    @property
-    def first_values_line(self) -> int:
-        """Line of the first record."""
-        return self.names_line + 1 if self.values_line is None else self.values_line
-
 
 def read_file(
     file: Path, form: CsvFormat, *, ignore: Collection[str] = (), leave_unfinished: bool = False
@@ -117,7 +112,7 @@ def _csv(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished:
     if not rows:
         raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
     names = rows[0][1]
-    records = [one for one in rows[1:] if one[0] >= form.first_values_line]
+    records = [one for one in rows[1:] if one[0] >= (form.values_line or 0)]
     stamp_columns = list(form.stamp_columns) or names[:1]
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
     if len(names) < 2 or len(set(wanted)) < len(wanted) or any(name not in names for name in stamp_columns):

@@ -136,21 +136,16 @@ OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "mon
 
 
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
-    """Parameters of a class or function by name, with their descriptions."""
+    """Parameters of a class or function by name, with their descriptions; defaults made by a factory are empty."""
     doc = inspect.getdoc(maker) or ""
     types = dict(_types(doc))
     texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
     kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
     return {
-        name: Setting(_default(one.default), texts.get(name, ""))
+        name: Setting({} if "factory" in repr(one.default) else one.default, texts.get(name, ""))
         for name, one in inspect.signature(maker).parameters.items()
         if name not in without and one.kind not in kinds
     }
-
-
-def _default(value: Any) -> Any:
-    """The default of a parameter; those of dataclasses may be made by a factory, and are empty."""
-    return {} if "factory" in repr(value) else value
 
 
 def _descriptions(doc: str) -> Iterator[tuple[str, str]]:

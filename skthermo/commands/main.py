@@ -216,7 +216,8 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
         raise ValueError(f"no new records are named for {files[0]}; expected their file, such as new.csv")
     if records:
         work = partial(work, files=records)
-    bridges = [Bridge(file, _for_one(options, len(files))) for file in files]
+    of_fleet = {} if len(files) == 1 else {"report": None, "title": None}  # what is named is the fleet's page
+    bridges = [Bridge(file, argparse.Namespace(**vars(options) | of_fleet)) for file in files]
     done, errors = [], {}
     for bridge in bridges:
         one, error = attempt(work, bridge)
@@ -244,12 +245,6 @@ def _settings_in(path: Path) -> Path:
     """The settings in a bridge's folder; any other path as it is."""
     settings = path / "monitor.toml"
     return settings if settings.is_file() else path
-
-
-def _for_one(options: argparse.Namespace, number: int) -> argparse.Namespace:
-    """Options of one bridge: the page that is named is that of the fleet, where there are several."""
-    alone = {} if number == 1 else {"report": None, "title": None}
-    return argparse.Namespace(**vars(options) | alone)
 
 
 def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:

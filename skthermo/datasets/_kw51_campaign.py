@@ -361,12 +361,11 @@ def make_kw51_campaign(
     retrofit : bool, default=True
         Whether the bridge is strengthened from 2019-05-15 00:00 to 2019-09-27 01:00.
     drift : mapping of str to float, optional
-        Share of its stiffness that a damage group loses each year, steadily from the first record on; a negative
-        share is gained.
+        Share of its stiffness that a damage group loses each year, steadily from the first record on.
     damage : mapping of str to float, optional
         Severity by damage group, as in ``model.damaged``: 0.5 halves the stiffness.
     damage_from : str, Timestamp or datetime, optional
-        When the damage begins. By default it is there from the first record on.
+        When the damage begins; by default with the first record.
     shapes : bool, default=False
         Whether mode shapes at the sensors are simulated, too.
     random_state : int, RandomState or None, default=None

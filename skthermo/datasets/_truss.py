@@ -157,15 +157,13 @@ def make_truss_campaign(
         Correlation of the noise of neighbouring records, as in `~skthermo.fem.add_noise`.
     drift : mapping of str to float, optional
         Share of its stiffness that a group loses each year (of ``samples_per_year`` records), steadily from the first
-        record on; a negative share is gained.
+        record on.
     damage : mapping of str to float, optional
-        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``. It multiplies what the
-        drift leaves.
+        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``, of what the drift leaves.
     damage_from : str, Timestamp or datetime, optional
-        When the damage begins. By default it is there from the first record on.
+        When the damage begins; by default with the first record.
     random_state : int, RandomState or None, default=None
-        Seed. With the same integer, campaigns that differ in ``damage``, ``drift`` or ``noise`` have the
-        same temperatures.
+        Seed. With the same integer, campaigns have the same temperatures, whatever else is asked for.
 
     Returns
     -------

@@ -47,7 +47,6 @@ from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._likelihood import mean_log_density, with_log_volumes
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records, gross_errors
-from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -60,6 +59,7 @@ from skthermo.residuals.weather import (
     TrainingRange,
     filled_text,
     unpredicted_text,
+    warn_of_implausible,
     warn_of_unseen_weather,
 )
 
@@ -75,7 +75,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Predicts the targets from all other columns: any of scikit-learn's regressors (one that takes a single target is
         fitted once for each), a pipeline with ``LagFeatures``, or `~skthermo.surrogate.DataInformedFEM`.
     targets : sequence of str or sequence of int
-        Names of the frequency columns in a frame, or their positions counted from 0, in the order of the output.
+        Names of the frequency columns in a frame, or their positions counted from 0.
     cv : "contiguous", int, cross-validation splitter or iterable, default=None
         Folds by which the baseline is predicted:
 
@@ -102,11 +102,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     block_ : timedelta64, int or None
         Length of the blocks that are dealt to the folds, as a time or in rows; None with other folds.
     sensors_ : object
-        What each of the other columns shows, given any others: ``sensors_.fill(T)`` gives filled temperatures and their
-        standard deviations, ``sensors_.departures(T)`` what each shows beyond that.
+        What each of the other columns shows, given any others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     spread_ : object
         Covariance of the residuals, by weather with "auto" and "local". ``spread_.smoothing`` says over how many
-        records of similar weather it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
+        records it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
     targets_ : ndarray of int
@@ -372,13 +371,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
         reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
-        outside = reach.warning(inputs)
-        if outside:
-            warn_user(outside, WeatherWarning, "outside-training-weather")
+        warn_user(reach.warning(inputs), WeatherWarning, "outside-training-weather")
         warn_of_fleet(self.regression_.from_fleet(filled), "Their residuals count less, by that uncertainty")
-        apart = self.sensors_.warning(temperatures)
-        if apart:
-            warn_user(apart, RecordsWarning, "sensor-disagrees")
+        warn_user(self.sensors_.warning(temperatures), RecordsWarning, "sensor-disagrees")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -391,18 +386,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, values, self.targets_)
         is_named = isinstance(X, pd.DataFrame)
         warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
-        known = Plausible.beside(self.training_range_.lowest, self.training_range_.highest)
-        far = known.implausible(as_floats(temperatures))
-        if far.any():  # only a warning, as another column may be something else than a temperature
-            column = int(far.sum(axis=0).argmax())
-            value = as_floats(temperatures)[far[:, column].argmax(), column]
-            warn_user(
-                f"temperatures are implausible: {self.training_range_.names[column]!r} is {value:g} in "
-                f"{far[:, column].sum()} of {len(far)} rows, {far.sum()} values in all. Their predictions are wrong. "
-                "Give degrees Celsius, and NaN where a value is missing",
-                RecordsWarning,
-                "implausible-temperatures",
-            )
+        warn_of_implausible(self.training_range_, temperatures)
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:
@@ -527,8 +511,7 @@ def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
     filled, deviations = sensors.fill(temperatures)
     consequence = "The spread of residuals includes the error of that"
     message = filled_text(deviations, column_names(temperatures, "x"), consequence)
-    if message:
-        warn_user(message, RecordsWarning, "filled-temperatures")
+    warn_user(message, RecordsWarning, "filled-temperatures")
     return frame_like(temperatures, filled)
 
 
@@ -537,8 +520,7 @@ def warn_of_unpredicted(predicted: Array, weather: Array) -> NDArray[np.bool_]:
     unknown = np.isnan(predicted).all(axis=1)
     others = "for which the estimator predicts nothing, such as those with lags that reach to no record"
     message = unpredicted_text(unknown & ~explained_rows(predicted), weather, others)
-    if message:
-        warn_user(message, UnevaluatedRowsWarning, "not-predicted")
+    warn_user(message, UnevaluatedRowsWarning, "not-predicted")
     return unknown
 
 

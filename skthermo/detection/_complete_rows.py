@@ -35,6 +35,7 @@ from skthermo.residuals.weather import PredictionError, TrainingRange
 
 REPORTED = (
     "filled-temperatures",
+    "implausible-temperatures",
     "not-predicted",
     "outside-training-weather",
     "sensor-disagrees",

@@ -17,6 +17,7 @@ from skthermo.detection._windows import Windows
 from skthermo.residuals.gaussian import Gaussian, check_invertible
 
 CLIPPED = 1.5  # standard deviations within a window beyond which a record moves the mean of the window no more
+TOGETHER = 512  # windows whose values a processor keeps at hand
 OF_COLUMNS = "implausible-values", "isolated-level", "equal-columns", "few-values"  # kinds of findings
 SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
 
@@ -59,11 +60,17 @@ def robust_means(rows: Array, limit: float) -> Array:
 
     Moving all values moves it as far, and moving any of them never moves it the other way.
     """
-    counts = (~np.isnan(rows)).sum(axis=1)
-    middle = np.maximum([counts - 1, counts], 0) // 2
-    medians = np.take_along_axis(np.sort(rows, axis=1), middle.T, axis=1).mean(axis=1, keepdims=True)
-    moves = np.nan_to_num(np.clip(rows - medians, -limit, limit)).sum(axis=1)
-    return medians[:, 0] + moves / np.maximum(counts, 1)
+    means = np.empty(len(rows))
+    for start in range(0, len(rows), TOGETHER):
+        some = rows[start : start + TOGETHER]
+        counts, moves = (~np.isnan(some)).sum(axis=1), np.sort(some, axis=1)
+        middle = np.maximum([counts - 1, counts], 0) // 2
+        medians = np.take_along_axis(moves, middle.T, axis=1).mean(axis=1, keepdims=True)
+        np.subtract(some, medians, out=moves)
+        np.maximum(np.minimum(moves, limit, out=moves), -limit, out=moves)
+        np.copyto(moves, 0.0, where=np.isnan(moves))
+        means[start : start + TOGETHER] = medians[:, 0] + moves.sum(axis=1) / np.maximum(counts, 1)
+    return means
 
 
 @dataclass(frozen=True)

@@ -46,9 +46,9 @@ class OutlierDetector(DamageDetector):
           on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
           raise more false alarms than asked for.
     block : int or duration, optional
-        Length of the blocks of time of the conformal threshold, as in `~skthermo.preprocessing.BlockedKFold`: a number
-        of rows or, for frames on a ``DatetimeIndex``, a duration such as ``"1D"``; only the block itself is then left
-        out. By default five correlation times, or a fiftieth of the records where that is longer.
+        Length of the blocks of time of the conformal threshold, as in `~skthermo.preprocessing.BlockedKFold`; only the
+        block itself is then left out. By default five correlation times, or a fiftieth of the records where that is
+        longer.
 
     Attributes
     ----------

@@ -46,12 +46,8 @@ class Discoveries:
 
     Notes
     -----
-    Benjamini and Hochberg's procedure on the bridges' p values, which also holds where common weather makes them
-    depend on each other positively. Each bridge's p value takes the shape of the tail from the baselines of all others
-    (of more than a hundred bridges, from 99 in 100): a generalised Pareto law of their excesses, each over the mean
-    excess of its own baseline, never lighter than an exponential one. So it allows for outliers that the bridge's own
-    baseline does not show, but not for weather that no baseline shows. With few other bridges, the tail is that of
-    `Monitor.event_p_values`.
+    Benjamini and Hochberg's procedure on the bridges' p values, each with the tail that the baselines of the other
+    bridges show: they allow for outliers, but not for weather that no baseline shows (:ref:`how-events-are-tested`).
 
     References
     ----------

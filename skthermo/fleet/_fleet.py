@@ -218,7 +218,7 @@ class Fleet:
         return len(self._outcomes)
 
     def __repr__(self) -> str:
-        states = self._states()
+        states = pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts()
         watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
         words = {"alarm": "in alarm", "watch": "to be watched", "not evaluated": "not evaluated"}
         watched += [f"{states[state]} {text}" for state, text in words.items() if states.get(state)]
@@ -445,9 +445,6 @@ class Fleet:
             Plain sentences.
         """
         return "\n".join(_sentences(self))
-
-    def _states(self) -> dict[str, int]:
-        return pd.Series([one.standing["state"] for one in self._outcomes.values()]).value_counts().to_dict()
 
 
 def _row(one: BridgeOutcome) -> dict[str, Any]:

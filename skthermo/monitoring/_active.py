@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import DAY, check_duration, usual_step
@@ -238,6 +239,7 @@ class ActiveDetector(SavesFrames):
         self._check_memory()
         self._check_monotone()
 
+    @answers_kept()
     def _check_monotone(self) -> None:
         """Refuse a detector by which a response that changes more is in alarm less; warn where no change is seen."""
         times, blind = self.trained.index.asi8, []

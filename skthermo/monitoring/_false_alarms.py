@@ -201,9 +201,8 @@ class FalseAlarmEstimate:
 
     ``expected`` is their number on average over baselines and years. In a single year there are ``lowest`` to
     ``highest`` of them with a probability of 90 %, by chance and because one baseline leaves the rate uncertain.
-    ``n_years`` is the time that the baseline's evaluated records cover, ``n_peaks`` the number of its highest
-    excursions that the threshold comes from, ``missing_season`` the seasons without baseline records, for which there
-    is no estimate ("" if there is none), ``method`` how the threshold was found, in words.
+    ``n_years`` is the time that the baseline's evaluated records cover, ``missing_season`` the seasons without baseline
+    records, for which there is no estimate ("" if there is none), ``method`` how the threshold was found, in words.
     """
 
     rule: EventRule
@@ -211,7 +210,6 @@ class FalseAlarmEstimate:
     lowest: int
     highest: int
     n_years: float
-    n_peaks: int
     missing_season: str
     method: str
     tail: Tail
@@ -281,90 +279,106 @@ def estimate_false_alarms(
     changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
-    n_years = _years(known.index, hold)
     infinite = known.index[np.isinf(known)]
     if len(known) < 2 or len(infinite):
         raise ValueError(
             f"{len(known)} baseline records have a damage index, {len(infinite)} of them an infinite one"
             f"{f' (the first at {infinite[0]})' if len(infinite) else ''}; expected at least 2, all of them finite"
         )
-    scale = seasonal_scale(known)
-    standard = known / np.sqrt(scale)
-    quiet = release_level(standard, hold, persistence)
-    excursions = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
-    excursions["index"] = excursions["peak"] * np.sqrt(scale[excursions["peak_time"]].to_numpy())
-    excursions = excursions.sort_values("peak", ascending=False)
-    squares, asked = excursions["peak"].to_numpy() ** 2, per_year * n_years
-    years = counted_number(n_years, "year", 2)
-    if len(squares) < FEWEST_PEAKS or asked > len(squares):
+    found = Excursions.of(known, hold, persistence)
+    asked = per_year * found.n_years
+    if len(found.squares) < FEWEST_PEAKS or asked > len(found.squares):
         raise ValueError(
-            f"{name} is {per_year:g}, but the baseline of {years} has only "
-            f"{counted_number(len(squares), 'excursion')} followed by {counted_number(hold / DAY, 'day')} of quiet; "
-            f"expected at least {FEWEST_PEAKS}, and as many as alarms are asked for"
+            f"{name} is {per_year:g}, but the baseline of {found.years} has only "
+            f"{counted_number(len(found.squares), 'excursion')} followed by {counted_number(hold / DAY, 'day')} of "
+            f"quiet; expected at least {FEWEST_PEAKS}, and as many as alarms are asked for"
         )
-    scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
-    tail = Tail.of(squares, asked, tuple(scales.tolist()))
+    tail = Tail.of(found.squares, asked, found.scales)
     release = release_level(known, hold, persistence) if release is None else release
-    rule, missing_season = (
-        EventRule(max(tail.threshold(asked), release), release, hold, persistence),
-        _days_without_records(known.index),
-    )
-    lowest, highest = tail.numbers(asked, n_years)
+    rule = EventRule(max(tail.threshold(asked), release), release, hold, persistence)
+    lowest, highest = tail.numbers(asked, found.n_years)
     method = (
-        f"from the {tail.k + 1} highest of {len(squares)} excursions of the damage index in {years} of baseline"
-        + (", extrapolated" if asked < FAR else "")
+        f"from the {tail.k + 1} highest of {len(found.squares)} excursions of the damage index in {found.years} of "
+        "baseline" + (", extrapolated" if asked < FAR else "")
     )
-    seen = None if smallest_at is None else smallest_at(rule.threshold)
-    _warn_of_baseline(excursions, tail, rule, asked, per_year, years, missing_season, seen)
-    return FalseAlarmEstimate(rule, per_year, lowest, highest, n_years, tail.k + 1, missing_season, method, tail)
+    found.warn(tail, rule, per_year, None if smallest_at is None else smallest_at(rule.threshold))
+    return FalseAlarmEstimate(rule, per_year, lowest, highest, found.n_years, found.missing_season, method, tail)
 
 
-def _warn_of_baseline(
-    excursions: pd.DataFrame,
-    tail: Tail,
-    rule: EventRule,
-    asked: float,
-    per_year: float,
-    years: str,
-    missing_season: str,
-    seen: SmallestChanges | None,
-) -> None:
-    """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
-    highest, second = excursions["index"].iloc[:2]
-    if missing_season:
-        warn_user(
-            f"the baseline has no record of {missing_season}. The number of false alarms is that of the other seasons, "
-            "and unknown for these. Refit with a whole year",
-            WeatherWarning,
-            "missing-seasons",
-        )
-    if asked < FAR:
-        warn_user(
-            f"at {counted_number(per_year, 'false alarm')} a year, {asked:.2g} events are expected in the {years} of "
-            f"the baseline; it should be {FAR} or more. The threshold {rule.threshold:.3g} is extrapolated from its "
-            f"excursions, the highest of them {highest:.3g}.{'' if seen is None else f' Now {seen}.'} Use a longer "
-            "baseline, or allow more alarms a year",
-            FewRecordsWarning,
-            "extrapolated-threshold",
-        )
-    elif seen is not None and seen.is_large:
-        warn_user(
-            f"the threshold {rule.threshold:.3g} is so high that {seen} (expected an alarm at {100 * LARGE:g} % of all "
-            "responses). Smaller changes count as healthy. Use a longer window or a closer regression, or allow more "
-            "alarms a year",
-            ResultWarning,
-            "undetected-changes",
-        )
-    if tail.has_outlier(DOUBTFUL):
-        others = Tail.of(excursions["peak"].to_numpy()[1:] ** 2, asked, tail.scales).threshold(asked)
-        warn_user(
-            f"the highest excursion of the baseline, {excursions['peak_time'].iloc[0]}, has a damage index of "
-            f"{highest:.3g}, the next {second:.3g}: chance explains that in fewer than {DOUBTFUL:.0%} of baselines. It "
-            f"raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. Put NaN there if "
-            "it is a fault or another state",
-            RecordsWarning,
-            "baseline-excursion",
-        )
+@dataclass(frozen=True)
+class Excursions:
+    """Excursions of a baseline's indices beyond the level that they stay within, the highest first.
+
+    ``table`` has ``peak``, over the root of the seasonal scale, ``index`` and ``peak_time``; ``scales`` are quantiles
+    of that scale. ``n_years`` is the time that the records cover, ``missing_season`` what they do not, in words.
+    """
+
+    table: pd.DataFrame
+    scales: tuple[float, ...]
+    n_years: float
+    missing_season: str
+
+    @classmethod
+    def of(cls, known: pd.Series, hold: pd.Timedelta, persistence: int) -> Excursions:
+        """Of indices in order of time, all of them finite."""
+        scale = seasonal_scale(known)
+        standard = known / np.sqrt(scale)
+        quiet = release_level(standard, hold, persistence)
+        table = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
+        table["index"] = table["peak"] * np.sqrt(scale[table["peak_time"]].to_numpy())
+        scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
+        table = table.sort_values("peak", ascending=False)
+        return cls(table, tuple(scales.tolist()), _years(known.index, hold), _days_without_records(known.index))
+
+    @property
+    def squares(self) -> Array:
+        """Squared peaks."""
+        return self.table["peak"].to_numpy() ** 2
+
+    @property
+    def years(self) -> str:
+        """The time that the records cover, in words."""
+        return counted_number(self.n_years, "year", 2)
+
+    def warn(self, tail: Tail, rule: EventRule, per_year: float, seen: SmallestChanges | None) -> None:
+        """Warn of a threshold without some seasons, from too short a time, or raised by a single excursion."""
+        highest, second = self.table["index"].iloc[:2]
+        asked = per_year * self.n_years
+        if self.missing_season:
+            warn_user(
+                f"the baseline has no record of {self.missing_season}. The number of false alarms is that of the other "
+                "seasons, and unknown for these. Refit with a whole year",
+                WeatherWarning,
+                "missing-seasons",
+            )
+        if asked < FAR:
+            now = "" if seen is None else f" Now {seen}."
+            warn_user(
+                f"at {counted_number(per_year, 'false alarm')} a year, {asked:.2g} events are expected in the "
+                f"{self.years} of the baseline; it should be {FAR} or more. The threshold {rule.threshold:.3g} is "
+                f"extrapolated from its excursions, the highest of them {highest:.3g}.{now} Use a longer baseline, or "
+                "allow more alarms a year",
+                FewRecordsWarning,
+                "extrapolated-threshold",
+            )
+        elif seen is not None and seen.is_large:
+            warn_user(
+                f"the threshold {rule.threshold:.3g} is so high that {seen} (expected an alarm at {100 * LARGE:g} % of "
+                "all responses). Smaller changes count as healthy. Use a longer window or a closer regression, or "
+                "allow more alarms a year",
+                ResultWarning,
+                "undetected-changes",
+            )
+        if tail.has_outlier(DOUBTFUL):
+            others = Tail.of(self.squares[1:], asked, self.scales).threshold(asked)
+            warn_user(
+                f"the highest excursion of the baseline, {self.table['peak_time'].iloc[0]}, has a damage index of "
+                f"{highest:.3g}, the next {second:.3g}: chance explains that in fewer than {DOUBTFUL:.0%} of "
+                f"baselines. It raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. "
+                "Put NaN there if it is a fault or another state",
+                RecordsWarning,
+                "baseline-excursion",
+            )
 
 
 def _years(stamps: pd.DatetimeIndex, hold: pd.Timedelta) -> float:

@@ -488,11 +488,8 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        For a healthy structure, the p value of its highest event is at most p with probability p or less, if squared
-        peaks over their scale in the season have an exponential tail, as those of normal residuals have. Single
-        outliers are no peaks where ``persistence`` is more than 1; where the baseline shows a heavier tail, that is
-        taken. The p value comes from the highest excursions of the baseline, by which the detector in charge when the
-        event began was given its threshold, and allows for their number, however small.
+        The p value comes from the highest excursions of the baseline, by which the detector in charge when the event
+        began was given its threshold (:ref:`how-events-are-tested`).
         """
         check_is_fitted(self)
         if tail_shape is not None and not (is_real(tail_shape) and 0 <= tail_shape < 1):

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text, percent
@@ -113,6 +114,7 @@ class LoweredIndices(SavesFrames):
     within: pd.Timedelta
 
     @classmethod
+    @answers_kept()  # of the weather, which is the same in all calls
     def of(
         cls,
         index_of: Callable[[pd.DataFrame], Array],

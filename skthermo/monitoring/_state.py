@@ -154,12 +154,9 @@ class MonitorState(SavesFrames):
         log, numbers, points = _followed(rules, begin.log, states, series, modes, raw.index)
         reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :], outside[len(known) :])
         reasons = known["reason"].tolist() + reasons
-        before = self.evaluations["state"].iloc[: self.evaluations.index.searchsorted(begin.day)]
-        pending = _pending(
-            (index > active.threshold) & (numbers[DAMAGE] == 0),
-            is_doubtful | is_blind | np.isnan(index),
-            [*before[-1:]],
-        )
+        before = self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)]
+        is_above = (index > active.threshold) & (numbers[DAMAGE] == 0)
+        pending = _pending(is_above, is_doubtful | is_blind | np.isnan(index), [*before["state"].iloc[-1:]])
         remarks = {
             "stiffer than the baseline": numbers.get(STIFFENING, np.zeros(len(raw))) > 0,
             "above the threshold, not yet for long": pending,
@@ -170,19 +167,24 @@ class MonitorState(SavesFrames):
             reasons[row] = "; ".join(filter(None, [reasons[row], *(text for text, at in remarks.items() if at[row])]))
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
-        points = _since([*self.checkpoints[:place], *points], store.last - store.max_delay)
-        needed = active.memory.start(records.index.asi8, records.index.searchsorted(points[0].day), points[0].day.value)
-        evaluations = pd.concat([self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)], answers])
-        kept_since = store.last - store.retention
         state = replace(
             self,
-            corrected=records.iloc[min(needed, records.index.searchsorted(kept_since)) :],
-            checkpoints=tuple(points),
+            checkpoints=tuple(_since([*self.checkpoints[:place], *points], store.last - store.max_delay)),
             log=log,
-            evaluations=evaluations.iloc[evaluations.index.searchsorted(kept_since) :],
+            evaluations=pd.concat([before, answers]),
             days=self._with_days(active.corrections, states, _days_of(answers, seen.n_left_out)),
         )
-        return state, self._news(answers.iloc[len(known) :], fresh)
+        return state._remembering(active, records), self._news(answers.iloc[len(known) :], fresh)
+
+    def _remembering(self, active: ActiveDetector, records: pd.DataFrame) -> MonitorState:
+        """The state with those of some corrected records that are kept, or that records to come need."""
+        first, since = self.checkpoints[0].day, self.store.last - self.store.retention
+        needed = active.memory.start(records.index.asi8, records.index.searchsorted(first), first.value)
+        return replace(
+            self,
+            corrected=records.iloc[min(needed, records.index.searchsorted(since)) :],
+            evaluations=self.evaluations.iloc[self.evaluations.index.searchsorted(since) :],
+        )
 
     def without(
         self, active: ActiveDetector, start: pd.Timestamp, end: pd.Timestamp | None = None

@@ -30,6 +30,7 @@ MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
 LONGEST_NAME = 36  # number of letters above which a name is shortened
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
+DENSE = 10_000  # points from which on files of vectors, such as SVG, hold them as an image
 HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""
 FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
@@ -99,12 +100,14 @@ def marker_style(number: int, n_points: int) -> dict[str, object]:
         "markersize": size,
         "color": COLOURS[number % len(COLOURS)],
         "markeredgewidth": 0.8 if marker in "x+" else 0.0,
+        "rasterized": n_points > DENSE,
     }
 
 
-def line_style(number: int, dashes: int = 0) -> dict[str, object]:
+def line_style(number: int, dashes: int = 0, n_points: int = 0) -> dict[str, object]:
     """Options of plot for lines: colour, and dashes that tell them apart in greyscale too."""
-    return {"linestyle": LINES[dashes % len(LINES)], "color": COLOURS[number % len(COLOURS)], "linewidth": 1.0}
+    style = {"linestyle": LINES[dashes % len(LINES)], "color": COLOURS[number % len(COLOURS)], "linewidth": 1.0}
+    return style | {"rasterized": n_points > DENSE}
 
 
 def panels(
@@ -274,6 +277,7 @@ def _mark_edge(
         along = getattr(line, f"get_{other}data")(orig=False)[rows]
         points = {other: along, direction: np.full(len(along), edge)}
         style = {"linestyle": "", "marker": marker, "markersize": 5, "color": line.get_color(), "markeredgewidth": 0}
+        style["rasterized"] = len(along) > DENSE
         ax.plot(points["x"], points["y"], transform=transform, gid=f"{BEYOND} {direction}", **style)
     far = np.concatenate([values[rows] for values, rows in zip(columns, beyond, strict=True)])
     text = f"{len(far)} beyond, {'up' if is_upper else 'down'} to {far.max() if is_upper else far.min():.4g}"
@@ -286,6 +290,7 @@ def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> No
     for label, x in places.items():
         if len(x):
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
+            style["rasterized"] = len(x) > DENSE
             ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not evaluated", **style)
             nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
             texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")

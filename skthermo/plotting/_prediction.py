@@ -17,6 +17,7 @@ from skthermo._tables.frames import check_same_rows
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
+    DENSE,
     ORANGE,
     Display,
     date_axis,
@@ -47,7 +48,8 @@ class PredictionDisplay(Display):
     """Measured and predicted frequencies or parameters: in time, over a temperature, or one over the other.
 
     There is a panel for each mode or parameter. A few values far from the others do not stretch the axes: triangles at
-    the edge and a number stand for them. Lines break at NaN and in long gaps of time.
+    the edge and a number stand for them. Lines break at NaN and in long gaps of time. From 10,000 points on, lines and
+    points are images in files of vectors, such as SVG; no point is left out.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -310,7 +312,7 @@ class PredictionDisplay(Display):
             if kind == "points" or (kind == "time" and number == 0):
                 self._draw_lines(label, x, values, marker_style(number, len(x)))
             else:
-                style = line_style(number, number - (kind == "time"))
+                style = line_style(number, number - (kind == "time"), len(x))
                 self._draw_lines(label, *with_breaks(x, values), style)
         ends: list[Array] = []
         if self.lowest is not None and self.highest is not None:
@@ -318,7 +320,7 @@ class PredictionDisplay(Display):
             ends = [with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest)]
             is_known = np.isfinite(ends).all(axis=0)
             style = {"color": ORANGE if self.predicted else BLUE, "alpha": 0.25, "linewidth": 0, "zorder": 1}
-            style["label"] = shortened(self.interval_label)
+            style |= {"label": shortened(self.interval_label), "rasterized": len(x) > DENSE}
             for column, one in enumerate(self.axes_):
                 both = [end[:, column] for end in ends]
                 self.bands_.append(one.fill_between(x, *both, where=is_known[:, column], **style))

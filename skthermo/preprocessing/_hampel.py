@@ -56,10 +56,8 @@ class HampelFilter(RecordTransformer):
         Positions of the columns that are filtered.
     regression_ : object or None
         What the weather explains of the targets, piecewise-linear in it.
-    n_features_in_ : int
-        Number of columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns and, where `fit` saw a frame with such, their names.
 
     See Also
     --------

@@ -66,10 +66,8 @@ class KNNGapImputer(KNNImputer):
         Records of `fit`, prepared for the search of neighbours; None where ``KNNImputer`` does the search.
     indicator_ : MissingIndicator or None
         Makes the columns of ``add_indicator``.
-    n_features_in_ : int
-        Number of columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -77,11 +75,10 @@ class KNNGapImputer(KNNImputer):
 
     Notes
     -----
-    The results are those of ``KNNImputer``, whose time grows with the square of the number of rows n. Here, rows with
-    the same missing columns are searched together by k-d trees, and the time grows as n log n. ``KNNImputer`` itself
+    The results are those of ``KNNImputer``, in a time that grows as n log n, not as n squared. ``KNNImputer`` itself
     does the work for few rows, for very many different patterns of missing columns, for another metric, and for other
-    ``missing_values`` than NaN. Where several rows are equally far away, the two may choose different neighbours; and
-    with ``weights="distance"`` the ninth digit can differ, because ``KNNImputer`` loses digits of very small distances.
+    ``missing_values`` than NaN. Where several rows are equally far away, the two may choose different neighbours; with
+    ``weights="distance"`` the ninth digit can differ.
 
     Examples
     --------

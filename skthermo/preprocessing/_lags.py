@@ -30,15 +30,13 @@ class LagFeatures(PastFeatures):
     Parameters
     ----------
     lags : int or sequence of int, default=24
-        Number of columns for each sensor, the current value included: 24 gives the values at
-        t, t-1, ..., t-23. Or an explicit list of lags, such as ``[0, 1, 24]``. At most 10,000 or as many as there are
-        rows, and at most 100 years back.
+        Number of columns for each sensor, the current value included, or an explicit list of lags, such as ``[0, 1,
+        24]``. At most 10,000 or as many as there are rows, and at most 100 years back.
     freq : str or timedelta, optional
-        Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most
-        frequent time between consecutive records of `fit`.
+        Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most frequent time between
+        records of `fit`.
     tolerance : str or timedelta, optional
-        How much older than t - k freq the record for lag k may be; "0h" allows only records at exactly
-        that time. By default 6 freq.
+        How much older than t - k freq the record for lag k may be. By default 6 freq.
     padding : {"edge", "nan"}, default="edge"
         Values before the first record: those of the first record, or NaN.
 
@@ -59,23 +57,20 @@ class LagFeatures(PastFeatures):
     lookback_ : int or numpy.timedelta64
         How far back the longest lag looks: a number of rows, or a time on a DatetimeIndex, the tolerance included.
     first_rows_ : ndarray
-        First records of `fit`, as many as lags reach back and one more: the padding of records that begin with them
-        is known from `fit`, and no warning says so again.
-    n_features_in_ : int
-        Number of sensors.
-    feature_names_in_ : ndarray of str
-        Names of the sensors, where `fit` saw a frame with such names.
+        First records of `fit`: the padding of records that begin with them is known from `fit`, and no warning says so
+        again.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of sensors and, where `fit` saw a frame with such, their names.
 
     Notes
     -----
     On an array, or a frame without a DatetimeIndex, lag k is the value k rows earlier, and the rows of `fit` are not
     used in `transform`: give the rows before new records, too, and leave their results out.
 
-    On a DatetimeIndex, or an index of periods or of other stamps, lag k is the last record at or before t - k freq, or
-    NaN if that record is older than the tolerance. Records of `fit` and of `transform` are searched together; for a
-    stamp in both, the values of `transform` count. Rows may come in any order, which the result keeps. A missing value
-    is NaN in every lag that refers to it. Lags that find no record before the first one give a warning
-    (``no-earlier-records``).
+    On a DatetimeIndex, or an index of other stamps, lag k is the last record at or before t - k freq, or NaN if that
+    record is older than the tolerance. Records of `fit` and of `transform` are searched together; for a stamp in both,
+    the values of `transform` count. Rows may come in any order. Lags that find no record before the first one give a
+    warning (``no-earlier-records``).
 
     Examples
     --------
@@ -127,9 +122,9 @@ class LagFeatures(PastFeatures):
                     )
         else:
             self.freq_ = _most_frequent_step(stamps) if self.freq is None else as_duration(self.freq, "freq")
-            self.tolerance_ = (
-                DEFAULT_TOLERANCE * self.freq_ if self.tolerance is None else as_duration(self.tolerance, "tolerance")
-            )
+            self.tolerance_ = DEFAULT_TOLERANCE * self.freq_
+            if self.tolerance is not None:
+                self.tolerance_ = as_duration(self.tolerance, "tolerance", may_be_zero=True)
             if max(self.lags_) > LONGEST_LAG / self.freq_:
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"

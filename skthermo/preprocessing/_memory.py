@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from numbers import Integral
 from typing import Any, NamedTuple
@@ -88,10 +88,8 @@ class ExponentialMeans(PastFeatures):
         Earliest record of `fit`: means of records that begin with it have no past, and no warning says so again.
     lookback_ : int or numpy.timedelta64
         How far back means look: a number of rows, or a time on a DatetimeIndex.
-    n_features_in_ : int
-        Number of sensors.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of sensors and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -408,7 +406,7 @@ class _Mean(NamedTuple):
 
 @dataclass(frozen=True)
 class _Candidates:
-    """Inputs side by side: the weather, a trend and a step, and the means that are tried; their products by fold."""
+    """Inputs in rows: the weather, a trend and a step, and the means that are tried; their products by fold."""
 
     inputs: Array
     values: Array
@@ -420,6 +418,7 @@ class _Candidates:
     time: NDArray[np.intp]
     means: dict[_Mean, NDArray[np.intp]]
     has_all_seasons: bool
+    known_left: dict[bytes, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, times: NDArray[np.int64], T: Array, F: Array) -> _Candidates | None:
@@ -450,7 +449,7 @@ class _Candidates:
         inputs = np.hstack(blocks)
         grams = Grams.of(inputs, values, folds)
         return cls(
-            inputs,
+            np.ascontiguousarray(inputs.T),
             values,
             scale,
             (times[rows] - times[0]) / DAY_NS,
@@ -471,15 +470,24 @@ class _Candidates:
 
     def errors(self, *blocks: NDArray[np.intp], after: float = 0.0) -> Array:
         """Mean absolute error out of fold by fold and mode, relative to the scale of the mode, after some time."""
-        columns = np.concatenate(blocks)
-        square = np.ix_(range(N_FOLDS), range(self.values.shape[1]), columns, columns)
-        grams = Grams(self.grams.inputs[square], self.grams.targets[..., columns], self.grams.counts)
-        errors = np.empty(self.grams.counts.shape)
-        for fold in range(N_FOLDS):
-            rows = (self.folds == fold) & (self.ages >= after)
-            left = np.abs(self.values[rows] - self.inputs[np.ix_(rows, columns)] @ grams.coefficients(fold).T)
-            errors[fold] = means_of_known(left)
-        return errors
+        left = self._left(np.concatenate(blocks))
+        counted = ~np.isnan(left) & (self.ages >= after)[:, np.newaxis]
+        starts = np.searchsorted(self.folds, np.arange(N_FOLDS))
+        sums, counts = (np.add.reduceat(part, starts) for part in (np.where(counted, left, 0.0), counted.astype(float)))
+        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
+
+    def _left(self, columns: NDArray[np.intp]) -> Array:
+        """What some columns leave of each value out of fold, found once."""
+        key = columns.tobytes()
+        if key not in self.known_left:
+            square = np.ix_(range(N_FOLDS), range(self.values.shape[1]), columns, columns)
+            grams = Grams(self.grams.inputs[square], self.grams.targets[..., columns], self.grams.counts)
+            inputs, left = self.inputs[columns], np.empty_like(self.values)
+            for fold, coefficients in enumerate(grams.coefficients_without_each()):
+                rows = self.folds == fold
+                left[rows] = np.abs(self.values[rows] - (coefficients @ inputs[:, rows]).T)
+            self.known_left[key] = left
+        return self.known_left[key]
 
     def fall(self, known: list[NDArray[np.intp]], block: NDArray[np.intp], mean: _Mean) -> tuple[float, float]:
         """By what share a mean lowers the error, and the ratio of errors in the fold where it does so least.

@@ -46,15 +46,15 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         Frequencies in Hz, (n_modes,), and shapes at the sensors, (n_sensors, n_modes), real or complex, of any scale
         and phase; from an FE model, ``(f[0], phi[0][dofs])`` after ``f, phi = model.modes(theta)``. A mapping has
         ``frequencies``, ``shapes`` and, optionally, ``sensors``, names by which the sensors of the records are chosen.
-        Shapes may be None: then frequency alone decides. If frequencies are a Series, its index names the modes.
+        Where shapes are None, frequency alone decides. If frequencies are a Series, its index names the modes.
     max_shift : float, default=0.15
         Largest relative difference of a pole's frequency from that of its mode.
     min_mac : float, default=0.8
         Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and that of its mode.
     follow : float, str, timedelta or None, default=None
         Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
-        of records, or a duration such as "30D" for records on a DatetimeIndex, which is divided by their median step.
-        None keeps the reference. Shapes are always compared with those of the reference.
+        of records, or a duration such as "30D" for records on a DatetimeIndex. None keeps the reference. Shapes are
+        always compared with those of the reference.
     max_drift : float, default=0.3
         Largest relative difference of a followed frequency from that of the reference.
     close : float, default=0.02

@@ -209,10 +209,8 @@ class HingeFeatures(RecordTransformer):
     ----------
     knots_ : ndarray of shape (n_knots, n_features)
         The knots of every column.
-    n_features_in_ : int
-        Number of columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -321,10 +319,8 @@ class SensorMeans(RecordTransformer):
         Positions of the columns of each role. Roles are sorted, as they are after `transform`.
     offsets_ : ndarray of shape (n_features,)
         By how much each sensor reads more than the mean of its role; NaN where a column is left out.
-    n_features_in_ : int
-        Number of columns.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -414,10 +410,8 @@ class BiasAligner(RecordTransformer):
         Means of the measured frequencies in Hz, NaN ignored.
     reference_ : ndarray of shape (n_modes,)
         Means after `transform`, in Hz.
-    n_features_in_ : int
-        Number of modes.
-    feature_names_in_ : ndarray of str
-        Names of the modes, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of modes and, where `fit` saw a frame with such, their names.
 
     Examples
     --------

@@ -95,15 +95,20 @@ class Grams(NamedTuple):
                 grams.counts[fold, mode] = n_known
         return grams
 
-    def coefficients(self, without: int | None = None) -> Array:
-        """Ridge coefficients of each mode, (n_modes, n_inputs), without one of the folds."""
-        kept = [fold for fold in range(len(self.counts)) if fold != without]
-        gram, target, counts = (part[kept].sum(axis=0) for part in self)
-        penalty = PENALTY * np.maximum(counts, 1.0)[:, np.newaxis] * np.ones(gram.shape[-1])
-        penalty[:, 0] = 1e-9  # of the constant
-        return np.linalg.solve(gram + penalty[:, :, np.newaxis] * np.eye(gram.shape[-1]), target[..., np.newaxis])[
-            ..., 0
-        ]
+    def coefficients(self) -> Array:
+        """Ridge coefficients of each mode, (n_modes, n_inputs)."""
+        return _ridge(*(part.sum(axis=0) for part in self))
+
+    def coefficients_without_each(self) -> Array:
+        """The same without each of the folds, (n_folds, n_modes, n_inputs)."""
+        others = 1.0 - np.eye(len(self.counts))
+        return _ridge(*(np.tensordot(others, part, 1) for part in self))
+
+
+def _ridge(gram: Array, target: Array, counts: Array) -> Array:
+    penalty = PENALTY * np.maximum(counts, 1.0)[..., np.newaxis] * np.ones(gram.shape[-1])
+    penalty[..., 0] = 1e-9  # of the constant
+    return np.linalg.solve(gram + penalty[..., np.newaxis] * np.eye(gram.shape[-1]), target[..., np.newaxis])[..., 0]
 
 
 @dataclass(frozen=True)
@@ -137,11 +142,10 @@ def out_of_fold(inputs: Array, values: Array, folds: NDArray[np.intp], *, trim: 
     centre = median(values)
     centred = trained = values - centre
     for _ in range(2 if trim else 1):
-        grams = Grams.of(inputs, trained, folds)
         predicted = np.empty_like(values)
-        for fold in range(folds.max() + 1):
+        for fold, coefficients in enumerate(Grams.of(inputs, trained, folds).coefficients_without_each()):
             rows = folds == fold
-            predicted[rows] = inputs[rows] @ grams.coefficients(fold).T
+            predicted[rows] = inputs[rows] @ coefficients.T
         trained = without_far(centred, centred - predicted)
     return predicted + centre
 

@@ -10,7 +10,7 @@ from skthermo._tables.text import bounds_text, counted, duration_text, percent, 
 from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.reporting._figures import draw_curve, draw_damage_indices
-from skthermo.reporting._findings import COLUMNS, LEVEL, REFERENCE, SIMULATED, Finding
+from skthermo.reporting._findings import COLUMNS, LEVEL, REFERENCE, SIMULATED, Finding, with_severities
 from skthermo.reporting._html import Html, Section, bar, bullets, element, figure, paragraphs, section, table
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage
 
@@ -107,7 +107,7 @@ def _expected(study: DetectabilityStudy) -> str:
 
 def _smallest(rows: pd.DataFrame, findings: Sequence[Finding]) -> Html:
     """A sentence for each family with severities, also for those that have no smallest one."""
-    tested = _with_severities(rows)
+    tested = with_severities(rows)
     if not len(tested):
         return paragraphs("No damage group was tested on its own, so that there is no smallest damage to report.")
     sentences = {found.family: found.sentence() for found in findings}
@@ -117,7 +117,7 @@ def _smallest(rows: pd.DataFrame, findings: Sequence[Finding]) -> Html:
 
 def _smallest_table(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[Html]:
     """The smallest severities with their bounds, and those on the fitted curves; nothing without any."""
-    tested = _with_severities(rows)
+    tested = with_severities(rows)
     if not len(tested):
         return []
     cells = {found.family: found.cells() for found in findings}
@@ -129,10 +129,6 @@ def _smallest_table(rows: pd.DataFrame, findings: Sequence[Finding]) -> list[Htm
         "with 95 % confidence."
     )
     return [table(caption, COLUMNS, [cells.get(family, [family, *unclear]) for family in families], is_cards=True)]
-
-
-def _with_severities(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows[(rows["measure"] == "POD") & rows["family"].notna() & (rows["severity"].fillna(0) != 0)]
 
 
 def _share_evaluated(study: DetectabilityStudy) -> str:

@@ -66,13 +66,16 @@ class Finding:
         return [self.family, smallest, bounds, *on_curve, self.remark]
 
 
+def with_severities(rows: pd.DataFrame) -> pd.DataFrame:
+    """Results of simulated damage that belongs to a family and has a severity."""
+    rows = rows[(rows["measure"] == "POD") & (rows["source"] == SIMULATED) & rows["family"].notna()]
+    return rows[rows["severity"].fillna(0) != 0]
+
+
 def findings_of(study: DetectabilityStudy) -> list[Finding]:
     """Findings for all families of simulated records; none for damage and strengthening, or a severity twice, in one
     family."""
-    rows = study.results_
-    rows = rows[(rows["measure"] == "POD") & (rows["source"] == SIMULATED) & rows["family"].notna()]
-    rows = rows[rows["severity"].notna() & (rows["severity"] != 0)]
-    families = rows.groupby("family", sort=False)
+    families = with_severities(study.results_).groupby("family", sort=False)
     return [found for name, some in families if (found := _finding(study, str(name), some)) is not None]
 
 

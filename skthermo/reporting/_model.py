@@ -132,7 +132,7 @@ def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def _doubts(report: FitReport) -> list[str]:
     doubts = [f"{counted(int(n), 'record')} left out: {reason}." for reason, n in report.left_out.items()]
-    found = [*([] if report.findings is None else report.findings.warnings()), *report.warnings()]
+    found = [*report.findings.warnings(), *report.warnings()]
     doubts += [f"{capital(warning.args[0])}." for warning in found]
     for name, deviation in report.deviations.items():
         if not deviation < LARGE_DEVIATION:

@@ -257,15 +257,23 @@ class BaselineResiduals:
         if len(ends) == n_rows:
             return taken
         logs = np.log(self._levels[1][:, : self.n_modes])
-        here, row = np.log(self._scatter_at(similar)[:, : self.n_modes]), 0
-        while row < n_rows:
-            later = np.searchsorted(ends, row, side="right")
-            stop = min(ends[later] if later < len(ends) else n_rows, row + n_records - taken[row])
-            records = np.arange(taken[row], taken[row] + stop - row)
-            is_other = (np.abs(here[row:stop] - logs[records]) > np.log(MOST_SCALED)).any(axis=1)
-            length = 1 + int(np.argmax(np.append(is_other[1:], True)))
-            taken[row : row + length] = records[:length]
-            row += length
+        here = np.log(self._scatter_at(similar)[:, : self.n_modes])
+        starts = np.union1d([0], ends)
+        stops = np.append(starts[1:], n_rows)
+        while len(starts):  # runs, each of which may end early, where another one begins
+            lengths = stops - starts
+            first, run = np.cumsum(lengths) - lengths, np.repeat(np.arange(len(starts)), lengths)
+            step = np.arange(len(run)) - first[run]
+            rows, records = starts[run] + step, taken[starts][run] + step
+            is_other = records >= n_records
+            some = ~is_other & (step > 0)
+            changes = np.abs(here[rows[some]] - logs[records[some]])
+            is_other[some] = (changes > np.log(MOST_SCALED)).any(axis=1)
+            reached = np.minimum.reduceat(np.where(is_other, step, lengths[run]), first)
+            kept = step < reached[run]
+            taken[rows[kept]] = records[kept]
+            goes_on = reached < lengths
+            starts, stops = (starts + reached)[goes_on], stops[goes_on]
         return taken
 
     def _carried(self, values: Array, taken: NDArray[np.intp], similar: scipy.sparse.csr_array) -> Array:

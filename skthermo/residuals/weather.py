@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from sklearn.preprocessing import StandardScaler
 from skthermo._estimators.warnings import warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats, range_sums
 from skthermo._tables.frames import column_names, frame_like, has_stamps, row_times
-from skthermo.exceptions import WeatherWarning
+from skthermo.exceptions import RecordsWarning, WeatherWarning
+from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
@@ -85,6 +86,23 @@ class TrainingRange:
         )
 
 
+def warn_of_implausible(known: TrainingRange, temperatures: Any) -> None:
+    """Warn of temperatures that no weather gives, beside a known range; an input may be something else, so it is no
+    error."""
+    values = as_floats(temperatures)
+    far = Plausible.beside(known.lowest, known.highest).implausible(values)
+    if far.any():
+        column = int(far.sum(axis=0).argmax())
+        value = values[far[:, column].argmax(), column]
+        warn_user(
+            f"temperatures are implausible: {known.names[column]!r} is {value:g} in {far[:, column].sum()} of "
+            f"{len(far)} rows, {far.sum()} values in all. Their predictions are wrong. Give degrees Celsius, and NaN "
+            "where a value is missing",
+            RecordsWarning,
+            "implausible-temperatures",
+        )
+
+
 def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
     """Warn of the fold that has most records in weather that the other folds, from 0, have not seen."""
     values, worst, text = as_floats(weather), SHARE_OUTSIDE, ""
@@ -102,8 +120,7 @@ def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: s
                 f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}. "
                 f"{consequence}. Train on a whole year, in folds that each have all seasons, such as blocks of a week"
             )
-    if text:
-        warn_user(text, WeatherWarning, "weather-of-one-fold")
+    warn_user(text, WeatherWarning, "weather-of-one-fold")
 
 
 @dataclass(frozen=True)
@@ -380,7 +397,9 @@ class NearestPlaces:
         return {"places": self.places, "number": self.number}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _kept=None)
+        vars(self).update(state)
+        empty = np.empty((0, self.number))
+        self._kept = _row_keys(self.places[:0]), empty, empty.astype(np.intp)  # in order; distances and positions
 
     @cached_property
     def _tree(self) -> NearestNeighbors:
@@ -388,35 +407,20 @@ class NearestPlaces:
 
     def of(self, wanted: Array) -> tuple[Array, NDArray[np.intp]]:
         """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
-        distances, near = np.empty((len(wanted), self.number)), np.empty((len(wanted), self.number), dtype=np.intp)
-        keys, kept = _row_keys(wanted), self._kept
-        new = np.ones(len(wanted), dtype=bool)
-        if kept is not None:
-            at = np.minimum(np.searchsorted(kept.keys, keys), len(kept.keys) - 1)
-            new = kept.keys[at] != keys
-            distances[~new], near[~new] = kept.distances[at[~new]], kept.near[at[~new]]
-        for part in parts(int(new.sum()), self.number):
-            rows = np.flatnonzero(new)[part]
-            distances[rows], near[rows] = self._tree.kneighbors(wanted[rows])
-        if new.any() and (0 if kept is None else kept.near.size) + new.sum() * self.number <= MOST_KEPT:
-            found = _KeptPlaces(keys[new], distances[new], near[new])
-            self._kept = found.sorted() if kept is None else kept.with_more(found)
-        return distances, near
-
-
-class _KeptPlaces(NamedTuple):
-    """Bytes of the coordinates of wanted places, in order, and what was found for each."""
-
-    keys: NDArray[np.void]
-    distances: Array
-    near: NDArray[np.intp]
-
-    def sorted(self) -> _KeptPlaces:
-        first = np.unique(self.keys, return_index=True)[1]
-        return _KeptPlaces(*(part[first] for part in self))
-
-    def with_more(self, found: _KeptPlaces) -> _KeptPlaces:
-        return _KeptPlaces(*(np.concatenate(both) for both in zip(self, found, strict=True))).sorted()
+        keys, found = _row_keys(wanted), self._kept
+        at = np.searchsorted(found[0], keys)
+        new = np.append(found[0], keys[:1])[at] != keys
+        new |= at == len(found[0])
+        if new.any():
+            rows = wanted[new]
+            searched = zip(*(self._tree.kneighbors(rows[part]) for part in parts(len(rows), self.number)), strict=True)
+            both = zip(found, ([keys[new]], *searched), strict=True)
+            joined = [np.concatenate([before, *more]) for before, more in both]
+            first = np.unique(joined[0], return_index=True)[1]
+            found = tuple(part[first] for part in joined)
+            at = np.searchsorted(found[0], keys)
+            self._kept = found if found[1].size <= MOST_KEPT else self._kept
+        return found[1][at], found[2][at]
 
 
 def _row_keys(rows: Array) -> NDArray[np.void]:

@@ -74,8 +74,8 @@ class ModelUpdater(Estimator):
         Measured mode j is column j of its frequencies. To use shapes, it must have ``local_modes``, ``n_dof`` and
         ``track``, as `~skthermo.fem.AffineModel` has.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-        Box of multipliers that contains 1: a half-width, lowest and highest of each parameter, or a mapping that
-        gives one or the other for every parameter.
+        Box of multipliers that contains 1: a half-width, or lowest and highest multiplier of each parameter, or a
+        mapping from each parameter to either.
     shape_weight : float or array-like of shape (n_modes,), default=0.0
         Weights v. With 0, measured shapes only tell which mode is which.
     n_starts : int, default=1
@@ -87,10 +87,8 @@ class ModelUpdater(Estimator):
     max_iter : int, default=200
         Most evaluations (least_squares) or iterations (lbfgs) of one start.
     reduce : "auto", bool or float, default="auto"
-        Whether the starts search by a reduced model, ``model.reduced(bounds)``. The best of them goes on with the model
-        itself, so that ``theta_`` is its optimum. "auto" reduces where ``model.reduction_pays``, given the number of
-        starts, and a basis is accurate; True allows a relative error of 1e-5 in the frequencies, as "auto" does; a
-        number sets the error allowed.
+        Whether the starts search by a reduced model, as ``reduce`` of `~skthermo.surrogate.InverseSurrogate`. The best
+        of them goes on with the model itself, so that ``theta_`` is its optimum.
     n_jobs : int, optional
         Jobs over which starts are spread, through joblib.
     random_state : int, RandomState or None, default=None
@@ -106,20 +104,18 @@ class ModelUpdater(Estimator):
         One row for each measured mode: ``measured``, ``before`` (theta = 1) and ``after`` in Hz, ``error_before`` and
         ``error_after`` in percent and, with shapes, ``mac_before`` and ``mac_after``.
     starts_ : DataFrame
-        One row for each start: ``start`` (its theta), ``objective``, ``success``, ``n_evaluations``, ``n_failed`` (how
-        many of these met theta without modes), ``theta`` (where it ended), and ``optimum``, a number for each different
-        optimum from 0, the best.
+        One row for each start: ``start`` (its theta), ``objective``, ``success``, ``n_evaluations``, ``n_failed``
+        (those without modes), ``theta`` (where it ended), and ``optimum``, a number for each different one from 0, the
+        best.
     covariance_ : ndarray of shape (n_parameters, n_parameters)
-        Covariance of ``theta_``, if the weights describe the noise (see Notes): the inverse of the Gauss-Newton matrix
-        J' J. A parameter that the measurements do not determine has an infinite variance and NaN covariances.
+        Covariance of ``theta_``, if the weights describe the noise (see Notes). A parameter that the measurements do
+        not determine has an infinite variance and NaN covariances.
     measured_ : Measured
         What `fit` was given, with its weights.
     has_deviations_ : bool
         Whether `fit` was given ``frequency_std``, which `sample_models` needs.
-    n_features_in_ : int
-        Number of modes.
-    feature_names_in_ : ndarray of str
-        Their names, where `fit` saw a frame with such names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of modes and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
@@ -309,17 +305,10 @@ class ModelUpdater(Estimator):
 
         Notes
         -----
-        *Randomised maximum a posteriori* [Kit95]_, [OHR96]_: each model minimises the squares of all residuals in
-        units of their standard deviations, where noise of the measurements' size has been added to the measured
-        frequencies and shapes, and noise of the prior's size to its mean. Where residuals are linear in theta, the
-        models are independent draws from the posterior distribution; else approximately so.
-
-        *Prior.* Multipliers of parameters and of groups are normally distributed about 1, the nominal model of
-        ``model``, and independent. Draws end at the bounds if they would pass them: ``bounds`` for the parameters, and
-        four standard deviations, or a tenth of the nominal stiffness, for the groups.
-
-        *Deviations.* With many records, the error of the model (some tenths of a percent) is larger than that of the
-        mean; ``frequency_std`` should hold both. The mass is taken as known, unless a parameter scales it.
+        Randomised maximum a posteriori [Kit95]_, [OHR96]_, with independent Gaussian priors about the nominal model;
+        :doc:`/guide/updating` explains the method. Draws end at the bounds if they would pass them: ``bounds`` for the
+        parameters, and four standard deviations, or a tenth of the nominal stiffness, for the groups. The mass is taken
+        as known, unless a parameter scales it.
 
         Examples
         --------

@@ -12,7 +12,7 @@ here; the part "defaults" has the defaults of all. "service" is a monitor that i
 records, a year of ten, and then updated by each of the other days; "fleet" are bridges with a year of hourly records
 each, whose files are updated by a day, in seconds by the clock. The exit code is 1 if a step takes more than three
 times as many seconds a row or bridge as with the next smaller size, where a quadratic one takes ten times as many, a
-part more than 4 GB, or an update of the last days more than twice as long as one of the first.
+part more than 4 GB, an update of the last days more than twice as long as one of the first, a drawing more than 2 MB.
 """
 
 import argparse
@@ -26,6 +26,7 @@ import tempfile
 import time
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import joblib
@@ -57,6 +58,8 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 MOST_GIGABYTES, MOST_RATIO, MOST_GROWTH = 4.0, 3.0, 2.0
 LEAST_SECONDS = 0.5  # of a step, below which its ratio says nothing
+MOST_MEGABYTES = 2.0  # of a drawing
+ROWS_FOR_DRAWINGS = 5000  # that what is drawn is learned from
 PER_DAY = 144
 LEAST_BASELINE = 30 * PER_DAY  # records
 N_FITTED = 4  # monitors of different bridges, which all bridges of a fleet share
@@ -147,9 +150,9 @@ def study(T, F):
     yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, whole, scenarios, **options).run(T, baseline=T.join(F))
 
 
-def defaults(T, F):
+def defaults(T, F, n_replicates=10):
     fem = DataInformedFEM(make_truss(), random_state=0)
-    options = {"random_state": 0}
+    options = {"n_replicates": n_replicates, "random_state": 0}
     yield "fit", lambda: fem.fit(T, F)
     yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, detector_of(F), [{"bottom": 0.1}], **options).run(T)
 
@@ -188,13 +191,28 @@ def service(T, F):
 
 
 def drawings(T, F):
-    fem, detector = quick_chain().fit(T, F), MahalanobisDetector().fit(F)
-    yield "PredictionDisplay", lambda: saved(PredictionDisplay.from_estimator(fem, T, F))
-    yield "DamageIndexDisplay", lambda: saved(DamageIndexDisplay.from_estimator(detector, F))
+    some = slice(None, None, max(len(T) // ROWS_FOR_DRAWINGS, 1))
+    fem, detector = quick_chain().fit(T[some], F[some]), MahalanobisDetector().fit(F[some])
+    predicted, index = fem.predict(T), detector.damage_index(F)
+    ends = (1 - 2 * fem.noise_) * predicted, (1 + 2 * fem.noise_) * predicted
+    made = {
+        "PredictionDisplay": partial(PredictionDisplay.from_predictions, F, predicted, *ends),
+        "PredictionDisplay, scatter": partial(PredictionDisplay.from_predictions, F, predicted, kind="scatter"),
+        "DamageIndexDisplay": partial(DamageIndexDisplay.from_predictions, index, detector.threshold_),
+    }
+    displays, sizes = {}, []
+    for name, make in made.items():
+        yield name, lambda name=name, make=make: displays.update({name: make()})
+        for kind in ("png", "svg"):
+            yield f"{name}, {kind}", lambda name=name, kind=kind: sizes.append(saved(displays[name], kind))
+    says(f"files have up to {max(sizes):.2f} MB", is_missed=max(sizes) > MOST_MEGABYTES)
 
 
-def saved(display):
-    display.figure_.savefig(io.BytesIO(), format="png")
+def saved(display, kind="png"):
+    """Megabytes of the file of a display."""
+    file = io.BytesIO()
+    display.figure_.savefig(file, format=kind)
+    return file.tell() / 1e6
 
 
 def says(text, *, is_missed=False):
@@ -256,17 +274,17 @@ OF_RECORDS = (preprocessing, chain, detection, monitoring, study, defaults, serv
 PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
 
 
-def one(part, size):
+def one(part, size, **options):
     """Print seconds of each step of a part, and gigabytes, as lines of JSON."""
     if part is fleet:
         steps, clock = fleet(size), time.perf_counter
     else:
         T, F = records(size, 10 if part is service else 1)
-        steps, clock = part(T, with_faults(F)), time.process_time
+        steps, clock = part(T, with_faults(F), **options), time.process_time
     for step, way in steps:
         start = clock()
         way()
-        print(json.dumps({"step": step, "seconds": clock() - start}))
+        print(json.dumps({"step": step, "seconds": clock() - start}), flush=True)
     print(json.dumps({"gigabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}))
 
 
@@ -275,12 +293,14 @@ def main():
     parser.add_argument("--rows", type=int, nargs="+", default=[5_256, 52_560])
     parser.add_argument("--bridges", type=int, nargs="+", default=[10, 100])
     parser.add_argument("--parts", nargs="+", default=[*PARTS], choices=[*PARTS])
+    parser.add_argument("--replicates", type=int, default=10, help="of the study of the part defaults")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.one:
         part = PARTS[options.parts[0]]
-        one(part, (options.bridges if part is fleet else options.rows)[0])
+        more = {"n_replicates": options.replicates} if part is defaults else {}
+        one(part, (options.bridges if part is fleet else options.rows)[0], **more)
         return 0
     missed = 0
     for part in options.parts:
@@ -288,6 +308,7 @@ def main():
         seconds, peaks, texts = {}, {}, []
         for size in sizes:
             command = [sys.executable, __file__, "--one", f"--{what}s", str(size), "--parts", part]
+            command += ["--replicates", str(options.replicates)]
             done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
             found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
             seconds[size] = {line["step"]: line["seconds"] for line in found if "step" in line}

@@ -1,6 +1,7 @@
 """Several detectors as one."""
 
 import pickle
+from functools import cache
 
 import numpy as np
 import pytest
@@ -40,7 +41,9 @@ def fused(**options):
     return FusedDetector(detectors, **options)
 
 
-FITTED = fused().fit(BASELINE)
+@cache
+def fitted():
+    return fused().fit(BASELINE)
 
 
 def test_the_index_is_the_mean_of_the_indices_over_their_thresholds():
@@ -48,8 +51,8 @@ def test_the_index_is_the_mean_of_the_indices_over_their_thresholds():
     for _, detector in fused().detectors:
         detector.fit(BASELINE)
         expected += -detector.score_samples(LATER) / detector[-1].threshold_ / 2
-    np.testing.assert_allclose(FITTED.damage_index(LATER), expected)
-    assert FITTED.damage_index(LATER).index.equals(LATER.index)
+    np.testing.assert_allclose(fitted().damage_index(LATER), expected)
+    assert fitted().damage_index(LATER).index.equals(LATER.index)
 
 
 def test_one_detector_alone_raises_its_own_alarms():
@@ -60,8 +63,8 @@ def test_one_detector_alone_raises_its_own_alarms():
 
 def test_false_alarms_are_as_asked_and_more_damage_is_found_than_on_average():
     found = {name: (detector.fit(BASELINE).predict(DAMAGED) == -1).mean() for name, detector in fused().detectors}
-    assert (FITTED.predict(LATER) == -1).mean() == pytest.approx(0.02, abs=0.015)
-    assert (FITTED.predict(DAMAGED) == -1).mean() > np.mean(list(found.values()))
+    assert (fitted().predict(LATER) == -1).mean() == pytest.approx(0.02, abs=0.015)
+    assert (fitted().predict(DAMAGED) == -1).mean() > np.mean(list(found.values()))
     assert (fused(contamination=0.1).fit(BASELINE).predict(LATER) == -1).mean() == pytest.approx(0.1, abs=0.035)
 
 
@@ -84,15 +87,17 @@ def test_parameters_are_set_through_it_and_pickles_keep_indices():
     changed = fused().set_params(lines__mahalanobisdetector__contamination=0.1, contamination=0.05)
     assert changed.get_params()["lines__mahalanobisdetector__contamination"] == 0.1
     assert dict(changed.detectors)["lines"][-1].contamination == 0.1
-    assert not hasattr(clone(FITTED), "detectors_")
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(FITTED)).damage_index(LATER), FITTED.damage_index(LATER))
+    assert not hasattr(clone(fitted()), "detectors_")
+    np.testing.assert_array_equal(
+        pickle.loads(pickle.dumps(fitted())).damage_index(LATER), fitted().damage_index(LATER)
+    )
 
 
 def test_windows_and_records_can_be_fused():
     week = behind(LinearRegression(), WindowedAlarm(7))
     mixed = FusedDetector([("records", behind(LinearRegression())), ("weeks", week)]).fit(BASELINE)
     assert (mixed.predict(DAMAGED) != 0).all()  # the first rows by single records alone
-    assert (mixed.predict(DAMAGED) == -1).mean() > (FITTED.predict(DAMAGED) == -1).mean()
+    assert (mixed.predict(DAMAGED) == -1).mean() > (fitted().predict(DAMAGED) == -1).mean()
 
 
 @pytest.mark.parametrize(

@@ -170,6 +170,7 @@ def test_a_row_does_not_depend_on_the_rows_beside_it():
     np.testing.assert_allclose(alone, whole[::30], rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:.*implausible-temperatures")
 def test_weather_of_the_fleet_is_counted_and_only_weather_beyond_it_is_far_outside():
     records = bridge(0, 300)
     compensator = knowing().fit(records[:40])

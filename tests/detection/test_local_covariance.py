@@ -13,7 +13,7 @@ from skthermo.residuals.weather import NearestPlaces, mean_of_nearest, nearest
 from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def history():
     residuals, places = compensator(None).fit_transform(X).to_numpy(), X[["T1"]].to_numpy()
     return History(np.arange(len(X)), places, residuals, Gaussian.of(residuals))

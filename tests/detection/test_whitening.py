@@ -1,6 +1,7 @@
 """Residuals in standard deviations: one covariance, or that of similar weather."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -39,8 +40,12 @@ def compensator(whiten="local", estimator=None, **options):
 
 
 X, LATER = campaign(), campaign(3000, 1)
-LOCAL = compensator().fit(X)
 SOURCE = "skthermo.residuals.local_covariance"
+
+
+@cache
+def locally():
+    return compensator().fit(X)
 
 
 @pytest.fixture(autouse=True)
@@ -58,10 +63,10 @@ def spreads(white, records):
 
 
 def test_local_residuals_have_unit_spread_in_every_regime():
-    for white, records in ((compensator().fit_transform(X), X), (LOCAL.transform(LATER), LATER)):
+    for white, records in ((compensator().fit_transform(X), X), (locally().transform(LATER), LATER)):
         for spread in spreads(white, records):
             np.testing.assert_allclose(spread, np.eye(2), atol=0.3)
-    assert LOCAL.spread_.smoothing is not None
+    assert locally().spread_.smoothing is not None
 
 
 def test_global_residuals_have_unit_spread_on_the_whole_only():
@@ -150,7 +155,9 @@ def test_few_records_have_one_covariance():
 # Weather that the baseline does not know
 
 
-AUTO = compensator("auto").fit(X)
+@cache
+def by_default():
+    return compensator("auto").fit(X)
 
 
 def larger(one, other):
@@ -160,11 +167,13 @@ def larger(one, other):
 
 def test_in_the_weather_of_the_baseline_the_covariance_follows_the_weather():
     weather = LATER[["T1", "T2"]].to_numpy()
-    by_weather, places = AUTO.spread_.by_weather, LOCAL.spread_.by_weather.places
+    by_weather, places = by_default().spread_.by_weather, locally().spread_.by_weather.places
     distances = nearest(places, by_weather.coordinates.transform(weather), by_weather.smoothing.n_neighbors)[0]
-    familiar = (distances.mean(axis=1) < by_weather.familiar) & (AUTO.extrapolation_distance(LATER) == 0).all(axis=1)
+    familiar = (distances.mean(axis=1) < by_weather.familiar) & (by_default().extrapolation_distance(LATER) == 0).all(
+        axis=1
+    )
     assert familiar.mean() > 0.9
-    ours, local = (fitted.spread_.covariances(weather[familiar]) for fitted in (AUTO, LOCAL))
+    ours, local = (fitted.spread_.covariances(weather[familiar]) for fitted in (by_default(), locally()))
     np.testing.assert_allclose(ours, local)
 
 
@@ -173,10 +182,10 @@ def test_in_the_weather_of_the_baseline_the_covariance_follows_the_weather():
 def test_outside_the_weather_of_the_baseline_the_covariance_is_no_smaller_than_that_of_all(first, second):
     lowest, width = X[["T1", "T2"]].min().to_numpy(), np.ptp(X[["T1", "T2"]].to_numpy(), axis=0)
     weather = (lowest + np.array([first, second]) * width)[np.newaxis]
-    local, ours = (fitted.spread_.covariances(weather) for fitted in (LOCAL, AUTO))
+    local, ours = (fitted.spread_.covariances(weather) for fitted in (locally(), by_default()))
     assert (larger(ours, local) > -1e-12).all()
     if max(abs(first - 0.5), abs(second - 0.5)) > 0.75:
-        assert (larger(ours, AUTO.spread_.overall.covariance) > -1e-12).all()
+        assert (larger(ours, by_default().spread_.overall.covariance) > -1e-12).all()
 
 
 @settings(max_examples=30, deadline=None)
@@ -184,13 +193,13 @@ def test_outside_the_weather_of_the_baseline_the_covariance_is_no_smaller_than_t
 def test_a_larger_shift_is_never_a_smaller_index(row, warmer, shift, factor):
     record = LATER.iloc[[row]].copy()
     record[["T1", "T2"]] += warmer * np.ptp(X["T1"])
-    healthy = AUTO.estimator_.predict(record[["T1", "T2"]]) + AUTO.spread_.overall.mean
+    healthy = by_default().estimator_.predict(record[["T1", "T2"]]) + by_default().spread_.overall.mean
     indices = []
     for size in (1.0, factor):
         record[MODES] = healthy + size * shift
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            indices.append(np.linalg.norm(AUTO.transform(record)))
+            indices.append(np.linalg.norm(by_default().transform(record)))
     assert indices[1] >= indices[0] * (1 - 1e-9) - 1e-9
 
 
@@ -212,13 +221,13 @@ def test_an_end_of_the_weather_is_wider_where_the_baseline_shows_that_prediction
 
 def test_extrapolated_rows_are_those_outside_the_weather_of_the_baseline():
     warm = LATER.assign(T1=X["T1"].max() + np.linspace(0, 0.1, len(LATER)) * np.ptp(X["T1"]), T2=X["T2"].max())
-    rows = AUTO.extrapolated(warm)
+    rows = by_default().extrapolated(warm)
     assert list(rows.index) == list(LATER.index)
     np.testing.assert_array_equal(rows, np.linspace(0, 0.1, len(LATER)) > 0.05)
     np.testing.assert_array_equal(
         TemperatureCompensator(LinearRegression(), targets=[2, 3]).fit(X.to_numpy()).extrapolated(warm.to_numpy()), rows
     )
-    assert not AUTO.extrapolated(X.mask(X < 0)).any()
+    assert not by_default().extrapolated(X.mask(X < 0)).any()
 
 
 @pytest.mark.one_case

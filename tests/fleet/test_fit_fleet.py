@@ -28,7 +28,7 @@ from skthermo.fleet._bridge import by_value
 from skthermo.monitoring import Monitor
 
 MODES = ["f1", "f2"]
-pytestmark = pytest.mark.filterwarnings(r"ignore:\d+ of \d+ bridges:UserWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:.*bridges-(warned|failed)")
 
 
 def year(seed, n=365, start="2025-01-01", step=0.0):

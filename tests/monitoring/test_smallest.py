@@ -47,7 +47,9 @@ def of_a_year(last=None, **options):
     return fitted(bridge(**options)[:"2025"], last)
 
 
-@pytest.mark.parametrize("modes", [MODES, *([mode] for mode in MODES)], ids=str)
+@pytest.mark.parametrize(
+    "modes", [MODES, ["f3"], *(pytest.param([mode], marks=pytest.mark.nightly) for mode in MODES[:2])], ids=str
+)
 @pytest.mark.parametrize(
     "last",
     [pytest.param(None, id="window", marks=pytest.mark.nightly), pytest.param(MahalanobisDetector(), id="record")],

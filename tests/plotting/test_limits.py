@@ -104,3 +104,22 @@ def test_drawing_again_counts_anew(later):
         PredictionDisplay.from_predictions(F, ax=axes)
     assert texts(axes.ravel()[0]) == ["2 beyond, up to 1000"]
     assert plt.get_fignums() == [figure.number]
+
+
+def test_many_records_are_all_drawn_in_a_small_file(tmp_path):
+    """Files of vectors hold them as an image, in which each alarm and the extremes have their place."""
+    n_records, random = 50_000, np.random.default_rng(0)
+    index = pd.Series(random.uniform(1, 3, n_records), pd.date_range("2024", periods=n_records, freq="10min"))
+    alarms = random.choice(n_records, 50, replace=False)
+    index.iloc[alarms] = 5.0
+    display = DamageIndexDisplay.from_predictions(index, THRESHOLD)
+    display.figure_.savefig(tmp_path / "drawn.svg")
+    assert (tmp_path / "drawn.svg").stat().st_size < 1e6
+    figure, ax = display.figure_, display.ax_
+    figure.canvas.draw()
+    image = np.asarray(figure.canvas.buffer_rgba())[::-1, :, :3]
+    x = display.points_[""][0].get_xdata(orig=False)
+    places = np.round(ax.transData.transform(np.column_stack([x, index.to_numpy()]))).astype(int)
+    lowest, highest = index.argmin(), index[index < THRESHOLD].argmax()
+    for column, row in places[[*alarms, lowest, highest]]:
+        assert (image[row, column] < 200).any()

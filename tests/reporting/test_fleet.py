@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from skthermo.reporting import owner_report
 from skthermo.reporting._chart import HEIGHT, HIGHEST, chart, line
 from skthermo.reporting.fleet._bridge import Bridge
-from skthermo.reporting.fleet._files import page_names
+from skthermo.reporting.fleet._page import page_names
 from skthermo.reporting.service import Standing
 from tests.reporting.fleets import FakeFleet
 from tests.reporting.monitors import FakeMonitor, event_row

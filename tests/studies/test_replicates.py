@@ -1,6 +1,7 @@
 """Bands of a study: other noise, weather, training records and models, and which of them is how large."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
 from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
+from skthermo.studies.detectability._simulation import Measurement
 from skthermo.studies.replicates import PARTS, Replicates
 from skthermo.studies.replicates._replicates import other_years, resampled_days
 
@@ -181,6 +183,20 @@ def test_a_band_holds_the_rate_of_one_more_campaign():
     assert 0.87 < np.mean(held) < 0.94
 
 
+def test_a_band_holds_the_few_false_alarms_of_one_more_year():
+    random, n_records, expected, held = np.random.RandomState(4), 365, 6, []
+    for _ in range(600):
+        counted = random.poisson(expected)  # in the training records, which replicates draw anew
+        weather, own = random.poisson(counted, (10, 2)), random.poisson(counted, 3)
+        other = random.poisson(random.poisson(counted, (10, 1)), (10, 2))
+        steps, key = np.stack([weather, other], axis=1) / n_records, ("detector", "healthy")
+        parts = ("weather", "baseline")
+        replicates = ReplicateRates({key: steps}, {key: own / n_records}, {key: n_records}, parts, True, [])
+        lowest, highest = replicates.band(key, 0.9)
+        held.append(lowest - 1e-9 <= random.poisson(expected) / n_records <= highest + 1e-9)
+    assert 0.88 < np.mean(held) < 0.96
+
+
 def test_more_parts_do_not_narrow_a_band():
     random = np.random.RandomState(2)
     noise, other = 0.02 * random.standard_normal((300, 3)), 0.03 * random.standard_normal((300, 1))
@@ -289,6 +305,24 @@ def test_uncertain_damage_differs_from_replicate_to_replicate(fem):
     study.run(WEATHER)
     rates = study.replicates_.rates["MahalanobisDetector", "some"][:, -1]
     assert len(np.unique(rates.round(2))) > 3
+
+
+def test_replicates_have_the_outliers_of_other_training_records(fem):
+    service, seeds = fem.recorder_.service, range(20)
+    outliers = np.full_like(service.outliers, np.nan)
+    outliers[np.random.default_rng(0).choice(len(outliers), 20, replace=False), 0] = 0.2
+    given = Measurement("fitted", "fitted", replace(service, outliers=outliers))
+    others = [given.resampled(fem, np.random.RandomState(seed)) for seed in seeds]
+    weather = fem.weather(WEATHER)
+    same, other = (
+        [(one.of(fem, weather, seed)[0] > 0.1).sum() for one, seed in zip(some, seeds, strict=True)]
+        for some in ([given] * len(seeds), others)
+    )
+    np.testing.assert_allclose([np.mean(same), np.mean(other)], 20, atol=5)
+    assert np.var(other) > np.var(same)
+    for known in (None, 0.01):
+        stated = replace(given, outliers=known)
+        assert stated.resampled(fem, np.random.RandomState(0)) is stated
 
 
 @pytest.mark.nightly

@@ -27,12 +27,11 @@ from tests.surrogate.chains import TRUSS, F, Logged, T, chain, fitted, inverse, 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
 
 YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
-FITTED = fitted()
 
 
 def test_predicts_other_temperatures_to_a_fraction_of_the_noise():
-    assert mape(LATER.clean_frequencies, FITTED.predict(LATER.temperatures)).max() < 1.0
-    assert FITTED.score(LATER.temperatures, LATER.clean_frequencies) > 0.9
+    assert mape(LATER.clean_frequencies, fitted().predict(LATER.temperatures)).max() < 1.0
+    assert fitted().score(LATER.temperatures, LATER.clean_frequencies) > 0.9
 
 
 @pytest.mark.nightly
@@ -109,17 +108,17 @@ def test_equals_scikit_learns_transformed_target_regressor(seeded):
 
 
 def test_without_damage_and_noise_simulations_are_predictions():
-    np.testing.assert_array_equal(FITTED.simulate(T), FITTED.predict(T))
+    np.testing.assert_array_equal(fitted().simulate(T), fitted().predict(T))
 
 
 def test_frames_in_frames_out_arrays_in_arrays_out():
     for method in ("predict", "simulate", "predict_parameters"):
-        assert getattr(FITTED, method)(T).index.equals(T.index)
-    assert list(FITTED.predict(T).columns) == list(F.columns)
-    assert list(FITTED.predict_parameters(T).columns) == list(TRUSS.parameter_names)
+        assert getattr(fitted(), method)(T).index.equals(T.index)
+    assert list(fitted().predict(T).columns) == list(F.columns)
+    assert list(fitted().predict_parameters(T).columns) == list(TRUSS.parameter_names)
     arrays = chain().fit(T.to_numpy(), F.to_numpy())
     assert isinstance(arrays.predict(T.to_numpy()), np.ndarray)
-    np.testing.assert_allclose(arrays.predict(T.to_numpy()), FITTED.predict(T), rtol=1e-12)
+    np.testing.assert_allclose(arrays.predict(T.to_numpy()), fitted().predict(T), rtol=1e-12)
 
 
 def gappy():
@@ -239,14 +238,14 @@ def test_pandas_output_everywhere_changes_no_value():
     with config_context(transform_output="pandas"):
         alike = chain(inverse=inverse(refine=0), discrepancy=None).fit(T, F)
         np.testing.assert_allclose(words.fit(T, F).predict(T), alike.predict(T), rtol=1e-12)
-        pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), FITTED.predict(T))
+        pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), fitted().predict(T))
 
 
 def test_an_inverse_within_a_pipeline_gets_the_model_too():
     nested = make_pipeline(inverse().set_params(model=None))
-    fitted = chain(inverse=nested).fit(T, F)
-    assert fitted.inverse_[0].model is TRUSS
-    np.testing.assert_array_equal(fitted.predict(T), FITTED.predict(T))
+    fem = chain(inverse=nested).fit(T, F)
+    assert fem.inverse_[0].model is TRUSS
+    np.testing.assert_array_equal(fem.predict(T), fitted().predict(T))
 
 
 def test_an_aligner_without_a_reference_gets_the_models():

@@ -1,5 +1,7 @@
 """Chains of one mode, which learn a vector of frequencies as scikit-learn's regressors do."""
 
+from functools import cache
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,37 +18,45 @@ from tests.surrogate.chains import TRUSS, F, T
 
 ONE_MODE = CallableModel(lambda theta: 7.5 * np.sqrt(theta), ["stiffness"], 1, vectorized=True)
 CHAIN = DataInformedFEM(ONE_MODE, random_state=0)
-FITTED = clone(CHAIN).fit(T, F["f1"])
-TABLE = clone(CHAIN).fit(T, F[["f1"]])
+
+
+@cache
+def of_vector():
+    return clone(CHAIN).fit(T, F["f1"])
+
+
+@cache
+def of_table():
+    return clone(CHAIN).fit(T, F[["f1"]])
 
 
 def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
     def values(chain):
         return chain.predict(T), *chain.predict(T, return_std=True), *chain.predict_interval(T)
 
-    for vector, table in zip(values(FITTED), values(TABLE), strict=True):
+    for vector, table in zip(values(of_vector()), values(of_table()), strict=True):
         assert type(vector) is np.ndarray
         assert list(table) == ["f1"]
         np.testing.assert_array_equal(vector, table["f1"])
     for one, other in (
-        (FITTED, TABLE),
-        (FITTED.refitted(), TABLE.refitted()),
-        (FITTED.resampled(0), TABLE.resampled(0)),
+        (of_vector(), of_table()),
+        (of_vector().refitted(), of_table().refitted()),
+        (of_vector().resampled(0), of_table().resampled(0)),
     ):
         np.testing.assert_array_equal(one.predict(T), other.predict(T)["f1"])
-    pd.testing.assert_frame_equal(FITTED.simulate(T), TABLE.simulate(T))
+    pd.testing.assert_frame_equal(of_vector().simulate(T), of_table().simulate(T))
 
 
 @pytest.mark.nightly
 def test_scores_take_vectors_and_tables():
-    assert FITTED.score(T, F["f1"]) == FITTED.score(T, F[["f1"]]) == TABLE.score(T, F["f1"])
+    assert of_vector().score(T, F["f1"]) == of_vector().score(T, F[["f1"]]) == of_table().score(T, F["f1"])
     scores = [cross_val_score(CHAIN, T, y, cv=KFold(3)) for y in (F["f1"], F["f1"].to_numpy(), F[["f1"]])]
     np.testing.assert_array_equal(scores[0], scores[1])
     np.testing.assert_array_equal(scores[0], scores[2])
 
 
 def test_names_come_from_the_series():
-    assert FITTED.mode_names_ == clone(CHAIN).fit(T, F["f1"].rename(None)).mode_names_ == ["f1"]
+    assert of_vector().mode_names_ == clone(CHAIN).fit(T, F["f1"].rename(None)).mode_names_ == ["f1"]
     assert clone(CHAIN).fit(T, F["f1"].rename("bending")).mode_names_ == ["bending"]
 
 
@@ -64,8 +74,10 @@ def test_scikit_learns_ensembles_of_regressors(ensemble, weights):
 
 def test_compensators_and_displays_take_it():
     compensated = TemperatureCompensator(CHAIN, targets=["f1"], whiten=None).fit(T.join(F[["f1"]]))
-    np.testing.assert_allclose(compensated.transform(T.join(F[["f1"]]))["f1"], F["f1"] - FITTED.predict(T), atol=1e-12)
-    PredictionDisplay.from_estimator(FITTED, T, F["f1"], confidence=0.9)
+    np.testing.assert_allclose(
+        compensated.transform(T.join(F[["f1"]]))["f1"], F["f1"] - of_vector().predict(T), atol=1e-12
+    )
+    PredictionDisplay.from_estimator(of_vector(), T, F["f1"], confidence=0.9)
 
 
 def test_a_vector_of_several_modes_is_refused():

@@ -102,6 +102,16 @@ def test_sorted_modes_beyond_a_crossing_come_back():
     np.testing.assert_allclose(found.theta, theta, rtol=1e-6)
 
 
+def test_near_modes_that_do_not_cross_cost_one_more_solve_at_most():
+    """Noise leaves a misfit in most records, and the fourth and fifth mode are within 10 %, but never exchanged."""
+    measured = noisy(drawn(200, lowest=0.95, highest=1.05), 0.005)
+    found = surrogate(bounds=0.2, noise=0.005, n_samples=500).invert(measured)
+    assert found.converged.all()
+    assert np.median(found.solves) <= 3
+    again = surrogate(regressor=DummyRegressor(), bounds=0.2, noise=0.005, n_samples=500).invert(measured)
+    np.testing.assert_allclose(found.theta, again.theta, rtol=1e-3)
+
+
 def test_steps_that_raise_the_misfit_are_not_taken():
     """Full Gauss-Newton steps on an arctangent jump to and fro between its flat ends."""
     model = CallableModel(lambda theta: 5 * np.exp(0.1 * np.arctan(np.log(theta) / 0.05)), ["k"], 1)

@@ -58,12 +58,10 @@ class AffineModel(AffineBase):
     Parameters
     ----------
     stiffness : mapping of tuple of str to matrix, or sequence of such pairs
-        Parameter names -> symmetric matrix (n_dof, n_dof), dense or SciPy sparse, in N/m. The
-        key ``()`` is the constant part; a name may occur in a key more than once. Pairs, unlike a mapping, may repeat
-        a key, so that a damage group can hold a part of a parameter's members.
+        Parameter names -> symmetric matrix (n_dof, n_dof), dense or SciPy sparse, in N/m. The key ``()`` is the
+        constant part; a name may occur in a key more than once. Pairs, unlike a mapping, may repeat a key.
     mass : matrix, mapping or sequence of pairs
-        Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless
-        degrees of freedom).
+        Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless degrees of freedom).
     n_modes : int, default=6
         How many of the lowest modes the model gives.
     parameter_names : sequence of str, optional
@@ -72,8 +70,8 @@ class AffineModel(AffineBase):
         Damage group -> the stiffness terms that it scales, by key or by position. By default each parameter is a
         group: all stiffness terms that it multiplies.
     track : bool, default=False
-        True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes
-        swap. False: column j is the j-th lowest mode.
+        True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes swap. False: column j is
+        the j-th lowest mode.
     dofs : sequence of (node, direction), optional
         Labels of the degrees of freedom, one for each row, all different. Error messages name them, and measured
         shapes can be given at them.

@@ -99,9 +99,8 @@ def difference_terms(
     Notes
     -----
     Stiffness that is linear in moduli is a sum of parts none of which has a negative eigenvalue. A term or rest that
-    has one, below -1e-6 relative to the diagonal of the nominal stiffness, is an error, as if thickness was multiplied
-    in place of the modulus, if the factor was larger than stated, and if two groups share members. Matrices therefore
-    need seven digits or more: Nastran's DMIG in large field has them, in small field it has not.
+    has one, below -1e-6 relative to the diagonal of the nominal stiffness, is an error. Matrices therefore need seven
+    digits or more: Nastran's DMIG in large field has them, in small field it has not.
 
     Examples
     --------

@@ -28,7 +28,7 @@ from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import gross_errors
-from skthermo.residuals.weather import TrainingRange, parts
+from skthermo.residuals.weather import TrainingRange, parts, warn_of_implausible
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
 
@@ -208,8 +208,14 @@ class FleetMapper(RegressorMixin, Estimator):
             The median of the posterior.
         std : ndarray or DataFrame of the same shape
             Only with ``return_std``: roots of the diagonal of `predict_covariance`.
+
+        Warns
+        -----
+        UserWarning
+            If inputs are no temperatures of any weather, such as kelvin or -999.
         """
         values, covariance = self._posterior_at(X, check_flag(return_std, "return_std"))
+        warn_of_implausible(self.reach_, X)
         if not return_std:
             return self._as_targets(X, values)
         std = np.sqrt(np.einsum("tii->ti", covariance))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._smallest import blocks_of, crossing, lowered, whole_weeks
@@ -86,6 +87,7 @@ def _medians(old: Array, new: Array) -> list[Any]:
     return [*medians, medians[1] - medians[0], np.nan, False]
 
 
+@answers_kept()
 def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
     """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 

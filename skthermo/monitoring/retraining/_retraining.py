@@ -139,38 +139,18 @@ def retrained(
     baseline = pd.concat([old.trained, harvest.records])
     if prior is not None:
         own = baseline[baseline.index >= since]
-        level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
-        moved = level.prior(prior, own, monitor.random_state)
+        _, moved = _at_new_level(monitor, prior, own)
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
     new = _candidate(monitor, baseline, activated)
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * free.scale
     found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
-    reasons, notes = [f"the new detector is significantly worse in {name!r}" for name in found.worse()], []
-    clearest = changes.clearest
-    if clearest.matters:
-        what = "the new records are not those of the baseline's structure"
-        reasons.insert(0, f"{what}: {clearest.sentence()}; a detector fitted to them would not detect that change")
-    elif clearest.is_real:
-        notes.append(f"small but significant change: {clearest.sentence()}")
-    if np.isnan(clearest.p_value):
-        notes.append("the records cover too few weeks to test whether they differ from the baseline beyond the weather")
-    elif changes.step.is_hidden:
-        error = 100 * changes.step.standard_error.median()
-        notes.append(
-            "the new records have hardly any weather in common with the baseline: a change between the two of up to "
-            f"{2 * error:.2g} % of a frequency could not be distinguished from weather"
-        )
-    years = (baseline.index[-1] - baseline.index[0]) / YEAR
-    shift = pd.DataFrame(
-        {
-            "change": changes.step.change,
-            "standard_error": changes.step.standard_error,
-            "per_year": changes.trend.change / years,
-            "per_year_error": changes.trend.standard_error / years,
-        }
-    )
+    reasons = [
+        *changes.objections(),
+        *(f"the new detector is significantly worse in {name!r}" for name in found.worse()),
+    ]
+    notes, shift = changes.notes(), changes.table((baseline.index[-1] - baseline.index[0]) / YEAR)
     accepted = force or not reasons
     learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector, "shift": shift}
     return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
@@ -197,8 +177,7 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
     missing = [str(name) for name in targets if not len(own) or own[name].notna().sum() < 2]
     if missing:
         return _none("new baseline", f"fewer than two records of {', '.join(missing)} since {since}", harvest.excluded)
-    level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, targets), own)
-    moved = level.prior(prior, own, monitor.random_state)
+    level, moved = _at_new_level(monitor, prior, own)
     baseline = pd.concat([moved, own])
     new = _candidate(monitor, baseline, activated)
     spread = level.old.residuals.std() * level.old.scale
@@ -382,6 +361,12 @@ class NewLevel:
         )
         number = counts[last] - counts[first]
         return np.where(number > 0, (sums[last] - sums[first]) / np.maximum(number, 1), 0.0)
+
+
+def _at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[NewLevel, pd.DataFrame]:
+    """The level of records since an intervention, and older ones moved to it."""
+    level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, list(monitor.targets_)), own)
+    return level, level.prior(prior, own, monitor.random_state)
 
 
 def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -200,6 +201,36 @@ class ShiftsTried:
         """The least likely of all, by its probability among so many."""
         best = min(self.tried, key=lambda one: np.nan_to_num(one.p_value, nan=1.0))
         return replace(best, p_value=min(best.p_value * len(self.tried), 1.0))
+
+    def objections(self) -> Iterator[str]:
+        """What speaks against learning from the new records."""
+        if self.clearest.matters:
+            what = f"the new records are not those of the baseline's structure: {self.clearest.sentence()}"
+            yield f"{what}; a detector fitted to them would not detect that change"
+
+    def notes(self) -> Iterator[str]:
+        """What the engineer should know besides."""
+        if self.clearest.is_real and not self.clearest.matters:
+            yield f"small but significant change: {self.clearest.sentence()}"
+        if np.isnan(self.clearest.p_value):
+            yield "the records cover too few weeks to test whether they differ from the baseline beyond the weather"
+        elif self.step.is_hidden:
+            error = 100 * self.step.standard_error.median()
+            yield (
+                "the new records have hardly any weather in common with the baseline: a change between the two of up "
+                f"to {2 * error:.2g} % of a frequency could not be distinguished from weather"
+            )
+
+    def table(self, years: float) -> pd.DataFrame:
+        """Changes by mode between the baseline and the new records, and a year."""
+        return pd.DataFrame(
+            {
+                "change": self.step.change,
+                "standard_error": self.step.standard_error,
+                "per_year": self.trend.change / years,
+                "per_year_error": self.trend.standard_error / years,
+            }
+        )
 
 
 def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Array, float]:

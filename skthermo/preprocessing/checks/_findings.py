@@ -21,6 +21,7 @@ from skthermo.preprocessing.checks._kinds import Finding
 from skthermo.preprocessing.checks._reading import finding, period_of
 from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table
 from skthermo.preprocessing.checks._signs import (
+    Inputs,
     TimeShift,
     best_shift,
     explained,
@@ -312,11 +313,12 @@ def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
     if records.has_faulty_sensors or records.has_wrong_times or (timed and index[-1] - index[0] < SHORTEST_TREND):
         return found, level
     times = row_times(pd.DataFrame(index=records.index))
-    table = trend_table(inputs[rows], F, times[rows], records.modes, timed)
-    for mode, (name, row) in enumerate(table.iterrows()):
+    beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
+    for mode, name in enumerate(records.modes):
         known = np.flatnonzero(~np.isnan(records.F[:, mode]))
-        of_frequency = LEAST_OF_ALL * robust_deviation(F)[mode]
-        step = largest_step(inputs[rows], F[:, mode])
+        of_frequency = LEAST_OF_ALL * deviations[mode]
+        row = trend_table(beside, F[:, [mode]], times[rows], [name], timed).iloc[0]
+        step = largest_step(beside, F[:, mode])
         if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
             level[rows[step.row] :, mode] = step.change
             detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"

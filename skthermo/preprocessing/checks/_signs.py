@@ -12,7 +12,15 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from skthermo._tables.arrays import Array, as_columns, means_of_known, range_sums, robust_deviation, spread_evenly
+from skthermo._tables.arrays import (
+    Array,
+    as_columns,
+    means_of_known,
+    median,
+    range_sums,
+    robust_deviation,
+    spread_evenly,
+)
 from skthermo._tables.frames import YEAR, column_names, correlation_time, has_stamps, row_times
 from skthermo._validation import check_array
 from skthermo.preprocessing._weather_regression import out_of_fold
@@ -189,10 +197,22 @@ def unexplained(inputs: Array, frequencies: Array, folds: NDArray[np.intp]) -> A
     """Mean square that inputs leave of each mode out of fold, over that which the mean of the other folds leaves."""
     known = np.where(np.isnan(inputs).any(axis=1)[:, np.newaxis], np.nan, frequencies)
     left = known - out_of_fold(inputs, known, folds, trim=False)
-    whole = known - out_of_fold(np.ones((len(inputs), 1)), known, folds, trim=False)
+    whole = known - _means_of_other_folds(known, folds)
     counts = np.maximum((~np.isnan(known)).sum(axis=0), 1)
     squares = [np.nansum(part**2, axis=0) / counts for part in (left, whole)]
     return np.divide(squares[0], squares[1], out=np.full(len(counts), np.nan), where=squares[1] > 0)
+
+
+def _means_of_other_folds(values: Array, folds: NDArray[np.intp]) -> Array:
+    """For each row the means of the columns over the rows of all other folds; medians where these have no value."""
+    known = ~np.isnan(values)
+    sums, counts = (
+        np.column_stack([np.bincount(folds, column) for column in part.T])
+        for part in (np.where(known, values, 0.0), known)
+    )
+    others = counts.sum(axis=0) - counts
+    medians = np.broadcast_to(median(values), sums.shape).copy()
+    return np.divide(sums.sum(axis=0) - sums, others, out=medians, where=others > 0)[folds]
 
 
 def with_past(places: Array) -> Array:
@@ -278,11 +298,45 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
     times = row_times(residuals)
     names = column_names(residuals, "r") if values.ndim == np.ndim(residuals) else ["r1"]
     order = np.argsort(times, kind="stable")
-    return trend_table(np.ones((len(values), 1)), values[order], times[order], names, has_stamps(residuals))
+    return trend_table(Inputs(np.ones((len(values), 1))), values[order], times[order], names, has_stamps(residuals))
 
 
-def trend_table(inputs: Array, values: Array, times: Array, names: Sequence[Hashable], is_timed: bool) -> pd.DataFrame:
-    """Trend of each column beside what inputs, (n_samples, n_inputs), explain of it; rows in order of time."""
+class Inputs:
+    """Inputs beside which trends and steps of columns are sought, (n_samples, n_inputs), in order of time.
+
+    Their orthonormal basis is found once for columns one after the other that have values in the same rows.
+    """
+
+    def __init__(self, values: Array):
+        self.values = values
+        self.are_known = ~np.isnan(values).any(axis=1)
+        self._last: tuple[Rows, Array] | None = None
+
+    @property
+    def number(self) -> int:
+        """Number of inputs."""
+        return self.values.shape[1]
+
+    def known(self, column: Array) -> Rows:
+        """Rows in which the inputs and a column are known."""
+        return np.flatnonzero(self.are_known & ~np.isnan(column))
+
+    def basis(self, rows: Rows) -> Array:
+        """Orthonormal columns that span what the inputs do in some rows."""
+        if self._last is None or not np.array_equal(self._last[0], rows):
+            basis, triangle = np.linalg.qr(self.values[rows])
+            directions, sizes, _ = np.linalg.svd(triangle)
+            self._last = rows, basis @ directions[:, sizes > 1e-8 * sizes.max()]
+        return self._last[1]
+
+    def rest(self, rows: Rows, columns: Array) -> Array:
+        """What the inputs leave of columns in some rows."""
+        basis = self.basis(rows)
+        return columns - basis @ (basis.T @ columns)
+
+
+def trend_table(inputs: Inputs, values: Array, times: Array, names: Sequence[Hashable], is_timed: bool) -> pd.DataFrame:
+    """Trend of each column beside what inputs explain of it; rows in order of time."""
     span = np.ptp(times) if len(times) else 0.0
     places = (times - times[:1]) / span if span > 0 else np.zeros(len(times))
     rows = [_trend(inputs, places, column) for column in values.T]
@@ -291,32 +345,20 @@ def trend_table(inputs: Array, values: Array, times: Array, names: Sequence[Hash
     return table
 
 
-def _trend(inputs: Array, places: Array, column: Array) -> list[float]:
+def _trend(inputs: Inputs, places: Array, column: Array) -> list[float]:
     """Change from place 0 to 1, its standard error, means of the first and last part, and the effective number."""
-    known = np.flatnonzero(~np.isnan(column) & ~np.isnan(inputs).any(axis=1))
-    x, y, beside = places[known], column[known], inputs[known]
-    if len(y) < LEAST_RECORDS + 2 * inputs.shape[1] or np.ptp(x) == 0:
+    known = inputs.known(column)
+    x, y = places[known], column[known]
+    if len(y) < LEAST_RECORDS + 2 * inputs.number or np.ptp(x) == 0:
         return [np.nan] * 5
     # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
-    alone, rest = _beside(beside, np.column_stack([x, y])).T
+    alone, rest = inputs.rest(known, np.column_stack([x, y])).T
     change = alone @ rest / (alone @ alone)
     scatter = rest - change * alone
-    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.shape[1])
+    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.number)
     at = scatter + change * (x - x.mean())
     ends = [at[part].mean() if part.any() else np.nan for part in (x <= 1 / PARTS, x >= 1 - 1 / PARTS)]
     return [change, error, *ends, len(y) / time]
-
-
-def _beside(inputs: Array, columns: Array) -> Array:
-    basis = _orthonormal(inputs)
-    return columns - basis @ (basis.T @ columns)
-
-
-def _orthonormal(inputs: Array) -> Array:
-    """Orthonormal columns that span what the inputs do."""
-    basis, triangle = np.linalg.qr(inputs)
-    directions, sizes, _ = np.linalg.svd(triangle)
-    return basis @ directions[:, sizes > 1e-8 * sizes.max()]
 
 
 def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
@@ -336,18 +378,18 @@ class Step(NamedTuple):
     standard_error: float
 
 
-def largest_step(inputs: Array, column: Array) -> Step | None:
+def largest_step(inputs: Inputs, column: Array) -> Step | None:
     """The step that explains most of a column beside inputs; None where a straight line does nearly as well.
 
     Rows are in order of time. As for a trend, the standard error holds if what remains depends on what was before.
     """
-    known = np.flatnonzero(~np.isnan(column) & ~np.isnan(inputs).any(axis=1))
+    known = inputs.known(column)
     n_places = min(N_PLACES, len(known) // LEAST_RECORDS)
-    if len(known) < LEAST_RECORDS + 2 * inputs.shape[1] or n_places < 2:
+    if len(known) < LEAST_RECORDS + 2 * inputs.number or n_places < 2:
         return None
     at = np.arange(1, n_places) * len(known) // n_places
-    basis, line, rest = _orthonormal(inputs[known]), np.arange(len(known)) / len(known), column[known]
-    line, rest = (values - basis @ (basis.T @ values) for values in (line, rest))
+    basis = inputs.basis(known)
+    line, rest = (inputs.rest(known, values) for values in (np.arange(len(known)) / len(known), column[known]))
     # a step is 1 from its place on: its products are sums of the last rows
     within, products = (part[::-1].cumsum(axis=0)[::-1][at] for part in (basis, rest))
     squares = np.maximum(len(known) - at - (within**2).sum(axis=1), 1e-12 * len(known))
@@ -357,5 +399,5 @@ def largest_step(inputs: Array, column: Array) -> Step | None:
     if rest @ rest - change * products[best] > SHARPER * (rest @ rest - explained_by_line):
         return None
     scatter = rest - change * ((np.arange(len(known)) >= at[best]) - basis @ within[best])
-    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.shape[1])
+    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.number)
     return Step(int(known[at[best]]), float(change), error)

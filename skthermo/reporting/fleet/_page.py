@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
@@ -29,7 +34,6 @@ from skthermo.reporting.fleet._bridge import (
     WITHOUT_MONITOR,
     Bridge,
 )
-from skthermo.reporting.fleet._files import folder_of, link, page_names
 from skthermo.reporting.service import (
     Standing,
     Time,
@@ -40,6 +44,8 @@ from skthermo.reporting.service import (
 )
 from skthermo.surrogate import DataInformedFEM
 
+LONGEST = 60  # letters of a file's name
+RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)$")  # no names of files on Windows
 COLUMNS = [
     "Bridge",
     "State",
@@ -66,7 +72,7 @@ HEADLINES = {
 def fleet_page(fleet: Fleet, file: Path, title: str, now: Time, limit: float, fdr: float) -> tuple[Html, list[Section]]:
     """Write the pages of the single bridges; what stands above the sections of the page of all, and these."""
     written = moment(_as_written(now))
-    folder = folder_of(file)
+    folder = file.with_name(f"{file.stem}_pages")
     folder.mkdir(exist_ok=True)
     names = list(fleet.table.index)
     files = page_names(names)
@@ -100,14 +106,21 @@ class PageWriter:
     @cached_property
     def errors(self) -> dict[Hashable, pd.DataFrame]:
         """Errors by bridge: stage, error and what failed in an owner's words."""
-        return dict(iter(in_words(self.fleet.errors).groupby("bridge")))
+        found = in_words(self.fleet.errors)
+        by_bridge = dict(iter(found.groupby("bridge")))
+        return {name: by_bridge.get(name, found[:0]) for name in self.files}
+
+    @cached_property
+    def messages(self) -> dict[Hashable, list[str]]:
+        """Texts of the warnings by bridge, each once."""
+        warned = self.fleet.warnings
+        return {name: texts.unique().tolist() for name, texts in warned.groupby("bridge")["message"]}
 
     def write(self, name: Hashable) -> Bridge:
         """Write a bridge's page, and tell how it stands."""
-        warned = self.fleet.warnings
-        messages = warned.loc[warned["bridge"] == name, "message"].unique().tolist()
+        messages = self.messages.get(name, [])
         monitor, unread = _opened(self.fleet.monitors, name)
-        failed = self.errors.get(name, in_words(self.fleet.errors)[:0])
+        failed = self.errors[name]
         error = "; ".join(dict.fromkeys(failed["what"]))
         standing = None if monitor is None else Standing.of(monitor, self.now, self.limit, error)
         texts = bullets(messages) or paragraphs("There was no warning.")
@@ -159,6 +172,33 @@ def fit_page(bridge: Bridge, chain: DataInformedFEM | None, warned: Section, wri
     if chain is not None:
         sections.append(settings("For the engineer.", "Settings of the model.", parameters({"model": chain})))
     return sections
+
+
+def page_names(bridges: Iterable[Hashable]) -> dict[Hashable, str]:
+    """A file name for each bridge, of plain letters: no two are equal, in capitals or not."""
+    plain = {bridge: _plain(str(bridge)) for bridge in bridges}
+    shared, names = Counter(name.casefold() for name in plain.values()), {}
+    for bridge, name in plain.items():
+        digest = sha256(repr(bridge).encode("utf-8", "backslashreplace")).hexdigest()[:8]
+        names[bridge] = name if shared[name.casefold()] == 1 else f"{name}-{digest}"
+    taken: dict[str, Hashable] = {}
+    for bridge, name in names.items():
+        number, free = 2, name
+        while free.casefold() in taken:
+            number, free = number + 1, f"{name}-{number}"
+        taken[free.casefold()], names[bridge] = bridge, free
+    return {bridge: f"{name}.html" for bridge, name in names.items()}
+
+
+def link(*parts: str) -> str:
+    """A relative address of a file."""
+    return "/".join(quote(part) for part in parts)
+
+
+def _plain(name: str) -> str:
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    text = re.sub(r"[^A-Za-z0-9]+", "_", letters).strip("_")[:LONGEST].rstrip("_")
+    return f"bridge_{text}".rstrip("_") if not text or RESERVED.match(text) else text
 
 
 def _as_written(now: Time) -> pd.Timestamp:

@@ -266,12 +266,8 @@ class StudyFindings:
 
         Notes
         -----
-        A probability is the share of onsets in all repeats. Those next to each other wait for the same alarm: bounds
-        allow for this dependence as those of rates do. An alarm within the time may be a false one: compare with the
-        probability of the healthy structure.
-
-        Windows that begin before the damage and end in it are evaluated as such, at the onsets of ``transitions_``, of
-        which there are fewer.
+        An alarm within the time may be a false one: compare with the probability of the healthy structure. How the
+        bounds allow for onsets that wait for the same alarm: :ref:`how-rates-are-bounded`.
         """
         check_probability(level, "level")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")

@@ -219,6 +219,10 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
                     here = replace(simulation, T=T)
                     drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                 if part == "baseline":
+                    measurement = here.measurement.resampled(here.fem, replicates.fault_stream(number))
+                    if measurement is not here.measurement:
+                        here = replace(here, measurement=measurement)
+                        drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                     levels = replicates.noise_levels(number)
                     drawn = [(noise * levels, gappy) for noise, gappy in drawn]
                 steps.append(_rates(here, chain, seeds, drawn, number * N_DRAWS))
@@ -262,7 +266,8 @@ def sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, 
         return "Intervals include noise only, not other weather, other training records or an error of the model."
     names = [column for column in parts.columns if column in NAMES]
     lines = [
-        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}."
+        f"{confidence:.0%} prediction intervals include the uncertainty of {_listed([NAMES[name] for name in names])}. "
+        "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
     rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"].dropna()

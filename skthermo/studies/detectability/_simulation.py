@@ -18,7 +18,7 @@ from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
-from skthermo._tables.arrays import Array, as_columns, as_floats
+from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
 from skthermo._validation import _num_samples
 from skthermo.studies.detectability._candidates import Candidate
@@ -246,6 +246,13 @@ class Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
+    def resampled(self, fem: FittedChain, random_state: np.random.RandomState) -> Measurement:
+        """With drawn outliers, and the gaps beside them, of other records that could have trained the chain."""
+        if self.outliers is None or is_real(self.outliers):
+            return self
+        service = fem.recorder_.service if isinstance(self.outliers, str) else self.outliers
+        return replace(self, outliers=service.resampled(random_state)) if service.has_faults else self
+
     def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
@@ -360,7 +367,9 @@ class Simulation:
         """Frequencies of the healthy structure before noise."""
         names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
         with without_warnings():
-            return self.clean[names[0]][0] if names else as_floats(self.fem.simulate(self.T))
+            if names:
+                return self.clean[names[0]][0]
+            return self.fem.thermal_.in_weather(self._weather, YEARS * len(self.T)).simulated()
 
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False

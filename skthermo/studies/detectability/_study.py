@@ -27,6 +27,7 @@ from skthermo.studies.detectability._findings import StudyFindings
 from skthermo.studies.detectability._replicate_rates import ReplicateRates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
+    Evaluation,
     Measurement,
     Simulation,
     ask_each,
@@ -88,7 +89,8 @@ class DetectabilityStudy(BaseEstimator):
 
         - "noise": another draw of the noise;
         - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
-          that the structure is another one than the chain; the detectors stay as they are, as they would in service;
+          that the structure is another one than the chain, and have had other gaps and outliers; the detectors stay as
+          they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;
         - "model": another FE model of ``models`` in the chain;
         - "auto": "noise", "baseline" and "weather", and "model" if ``models`` are given;
@@ -165,17 +167,8 @@ class DetectabilityStudy(BaseEstimator):
     evaluate the same records, so that differences between scenarios or detectors are more certain than each rate. A
     detector's rates do not depend on which others are in the study.
 
-    The bounds ``ci_low`` and ``ci_high`` are of a rate over noise, for this weather, baseline and model; others are in
-    the bands, as far as ``uncertainty`` says so. Records are serially dependent: their effective number is their number
-    over the design effect, the ratio of the variance of the rate, estimated from sums over blocks of ten correlation
-    times in different repeats, to that of independent records. With it, Clopper-Pearson bounds keep their confidence
-    also for rates of 0 and 1 [KG98]_. Measured records are one repeat; their variance between blocks holds that of the
-    weather, too.
-
-    A replicate is a structure that could have given the training records; the detectors stay as they have learned.
-    Bands are those of Student's law on the scale of the logit, with the variances between and within replicates (two
-    draws of the noise in each), about the study's own rate, moved by the mean effect of other weather and models.
-    ``tests/benchmarks/study_bands.py`` measures how often they hold what a measured campaign shows.
+    The bounds ``ci_low`` and ``ci_high`` are of a rate over noise [KG98]_, the bands ``pi_low`` and ``pi_high`` of one
+    measured campaign: :ref:`how-rates-are-bounded`.
 
     References
     ----------
@@ -335,7 +328,9 @@ class DetectabilityStudy(BaseEstimator):
         """
         check_chain(self.fem)
         detectors = self._checked_detectors()
-        most_repeats, tol = self._most_repeats(), check_probability(self.tol, "tol")
+        is_open = is_auto(self.n_repeats) and self.n_repeats == "auto"
+        most_repeats = MOST_REPEATS if is_open else positive_integer(self.n_repeats, "n_repeats")
+        tol = check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         scenarios = self._checked_scenarios(reference)
@@ -354,28 +349,12 @@ class DetectabilityStudy(BaseEstimator):
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
                 first = simulation.first_repeat(measured, seeds[0], errors)
-        left = simulation.without(first.errors)
-        with stages.stage("second repeat"):
-            began = process_time()
-            evaluation = first.with_repeats(left.repeats(range(1, min(len(seeds), 2)), seeds, None))
-            seconds = process_time() - began
-        if self.verbose and len(seeds) > 1:
-            text = replicates.predicted_time(seconds, len(seeds) - 2, left.share_in_replicates)
-            print(f"[{type(self).__name__}] {text}")
-        progress = max(self.verbose - 1, 0)
-        with stages.stage("other repeats"):
-            grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
-            n_repeats = LEAST_REPEATS if grows else len(seeds)
-            evaluation = evaluation.with_repeats(left.repeats(range(2, n_repeats), seeds, self.n_jobs, progress))
-            if grows:
-                wanted = min(evaluation.n_repeats_for(tol, confidence, scenarios), len(seeds))
-                more = range(n_repeats, max(wanted, n_repeats))
-                evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
+        evaluation = self._with_repeats(simulation, first, replicates, seeds, stages, (tol, confidence))
         rates = None
         if replicates.parts:
             with stages.stage(f"{len(replicates.seeds)} replicates"):
                 left = simulation.without(evaluation.errors)
-                rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, progress)
+                rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, max(self.verbose - 1, 0))
         found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
         doubt = found.many_false_alarms()
         doubts = [ResultWarning(doubt, "many-false-alarms")] if doubt else []
@@ -383,10 +362,33 @@ class DetectabilityStudy(BaseEstimator):
         warn_each(doubts)
         return self.findings_.table
 
-    def _most_repeats(self) -> int:
-        if isinstance(self.n_repeats, str) and self.n_repeats == "auto":
-            return MOST_REPEATS
-        return positive_integer(self.n_repeats, "n_repeats")
+    def _with_repeats(
+        self,
+        simulation: Simulation,
+        first: Evaluation,
+        replicates: Replicates,
+        seeds: Any,
+        stages: Stages,
+        bounds: tuple[float, float],
+    ) -> Evaluation:
+        """The evaluation of the first repeat with all others: as many as asked for or, for "auto", as bounds need."""
+        left, progress = simulation.without(first.errors), max(self.verbose - 1, 0)
+        with stages.stage("second repeat"):
+            began = process_time()
+            evaluation = first.with_repeats(left.repeats(range(1, min(len(seeds), 2)), seeds, None))
+            seconds = process_time() - began
+        if self.verbose and len(seeds) > 1:
+            text = replicates.predicted_time(seconds, len(seeds) - 2, left.share_in_replicates)
+            print(f"[{type(self).__name__}] {text}")
+        with stages.stage("other repeats"):
+            grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
+            n_repeats = LEAST_REPEATS if grows else len(seeds)
+            evaluation = evaluation.with_repeats(left.repeats(range(2, n_repeats), seeds, self.n_jobs, progress))
+            if grows:
+                wanted = min(evaluation.n_repeats_for(*bounds, simulation.scenarios), len(seeds))
+                more = range(n_repeats, max(wanted, n_repeats))
+                evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
+        return evaluation
 
     @property
     def _found(self) -> StudyFindings:

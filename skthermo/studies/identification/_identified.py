@@ -206,31 +206,6 @@ def alike_sets(indistinguishable: Sequence[Sequence[str]], similarity: pd.DataFr
     return sets
 
 
-def answer(found: IdentifiedDamage) -> Iterator[str]:
-    explanations = statements(found)
-    first, *others = explanations
-    shown = " observable in these modes" if found.unobservable else ""
-    yield (
-        f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
-        f"{chance_text(first.probability)}."
-    )
-    if first.has_else:
-        what = (
-            "No damage of these groups explains" if first.is_else else "Damage of these groups alone does not explain"
-        )
-        yield f"{what} the shifts: {_departure(found)}."
-        yield f"Likely causes: {likely_causes(found)}."
-    yield from _others(first, others)
-    if not first.is_healthy:
-        unchanged = sum(one.probability for one in explanations if one.is_healthy)
-        observable = "observable " if found.unobservable else ""
-        yield f"Probability of no {observable}change: {chance_text(unchanged)}."
-    if first.probability < SURE and not first.is_else:
-        yield from _averages(found, first)
-    if first.is_healthy:
-        yield from _unnoticed(found)
-
-
 def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
     """What else could be: the most probable explanation with one thing more, then others."""
     probable = [one for one in others if not one.is_healthy and one.probability >= NAMED]
@@ -264,62 +239,6 @@ def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
         yield f"95{SPACE}% upper bounds on undetected losses of stiffness: {listed(losses)}."
-
-
-def limits(found: IdentifiedDamage) -> Iterator[str]:
-    best = statements(found)[0]
-    for causes in found.indistinguishable:
-        yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
-    if found.unobservable:
-        yield f"Damage in {listed(found.unobservable, 'or')} is unobservable in these modes."
-    if best.is_healthy and found.p_value < RARE:
-        yield f"However, such shifts are rare in a healthy structure (p value {probability_text(found.p_value)})."
-    if np.isnan(found.misfit_p_value):
-        yield "There are no more shifts than causes: the fit explains any shift and cannot be tested."
-    elif found.misfit_p_value < RARE and not best.has_else:
-        yield (
-            "The most probable explanation does not explain all of the shifts (p value "
-            f"{probability_text(found.misfit_p_value)}): {_departure(found)}."
-        )
-    if found.rest >= NAMED:
-        yield f"Explanations that are not listed have a probability of {chance_text(found.rest)} together."
-
-
-def warnings(found: IdentifiedDamage) -> Iterator[SkthermoWarning]:
-    yield from found.records.warnings()
-    best = statements(found)[0]
-    if found.indistinguishable:
-        sets = "; ".join(" and ".join(causes) for causes in found.indistinguishable)
-        yield ResultWarning(
-            f"these modes cannot distinguish groups: {sets}. Only their common effect is known. Measure their shapes, "
-            "or other modes",
-            "indistinguishable-groups",
-        )
-    if found.unobservable:
-        names = ", ".join(found.unobservable)
-        yield ResultWarning(
-            f"these modes do not show damage of {names}: its severity would have a standard error above {VISIBLE:.0%}. "
-            "Take records over a longer time, or measure other modes",
-            "unobservable-groups",
-        )
-    highest = [str(cause) for cause in found.most_probable if _is_at_bound(found, cause)]
-    if highest:
-        yield ResultWarning(
-            f"the severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}. Usually something "
-            "else has changed. See summary_table",
-            "severity-at-bound",
-        )
-    if best.has_else or found.misfit_p_value < RARE:
-        doubt = (
-            f"probability of something else {chance_text(found.probability_other)}"
-            if best.has_else
-            else f"probability of such a misfit by chance {chance_text(found.misfit_p_value)}"
-        )
-        yield ResultWarning(
-            f"damage of these groups alone does not explain the shifts ({doubt}). Likely causes: "
-            f"{likely_causes(found)}",
-            "unexplained-shifts",
-        )
 
 
 def _is_at_bound(found: IdentifiedDamage, cause: str) -> bool:
@@ -535,10 +454,49 @@ class IdentifiedDamage(Sentences):
         return UncertainDamage(name, self.draws)
 
     def _answer(self) -> Iterator[str]:
-        return answer(self)
+        explanations = statements(self)
+        first, *others = explanations
+        shown = " observable in these modes" if self.unobservable else ""
+        yield (
+            f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
+            f"{chance_text(first.probability)}."
+        )
+        if first.has_else:
+            what = (
+                "No damage of these groups explains"
+                if first.is_else
+                else "Damage of these groups alone does not explain"
+            )
+            yield f"{what} the shifts: {_departure(self)}."
+            yield f"Likely causes: {likely_causes(self)}."
+        yield from _others(first, others)
+        if not first.is_healthy:
+            unchanged = sum(one.probability for one in explanations if one.is_healthy)
+            observable = "observable " if self.unobservable else ""
+            yield f"Probability of no {observable}change: {chance_text(unchanged)}."
+        if first.probability < SURE and not first.is_else:
+            yield from _averages(self, first)
+        if first.is_healthy:
+            yield from _unnoticed(self)
 
     def _limits(self) -> Iterator[str]:
-        return limits(self)
+        best = statements(self)[0]
+        for causes in self.indistinguishable:
+            yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
+        if self.unobservable:
+            yield f"Damage in {listed(self.unobservable, 'or')} is unobservable in these modes."
+        if best.is_healthy and self.p_value < RARE:
+            rare = probability_text(self.p_value)
+            yield f"However, such shifts are rare in a healthy structure (p value {rare})."
+        if np.isnan(self.misfit_p_value):
+            yield "There are no more shifts than causes: the fit explains any shift and cannot be tested."
+        elif self.misfit_p_value < RARE and not best.has_else:
+            yield (
+                "The most probable explanation does not explain all of the shifts (p value "
+                f"{probability_text(self.misfit_p_value)}): {_departure(self)}."
+            )
+        if self.rest >= NAMED:
+            yield f"Explanations that are not listed have a probability of {chance_text(self.rest)} together."
 
     def _remarks(self) -> Iterator[str]:
         return self.records.sentences()
@@ -551,7 +509,39 @@ class IdentifiedDamage(Sentences):
         SkthermoWarning
             With its ``kind``.
         """
-        yield from warnings(self)
+        yield from self.records.warnings()
+        best = statements(self)[0]
+        if self.indistinguishable:
+            sets = "; ".join(" and ".join(causes) for causes in self.indistinguishable)
+            yield ResultWarning(
+                f"these modes cannot distinguish groups: {sets}. Only their common effect is known. Measure their "
+                "shapes, or other modes",
+                "indistinguishable-groups",
+            )
+        if self.unobservable:
+            yield ResultWarning(
+                f"these modes do not show damage of {', '.join(self.unobservable)}: its severity would have a standard "
+                f"error above {VISIBLE:.0%}. Take records over a longer time, or measure other modes",
+                "unobservable-groups",
+            )
+        highest = [str(cause) for cause in self.most_probable if _is_at_bound(self, cause)]
+        if highest:
+            yield ResultWarning(
+                f"the severity is at its upper bound of {HIGHEST_SEVERITY:.0%}: {', '.join(highest)}. Usually "
+                "something else has changed. See summary_table",
+                "severity-at-bound",
+            )
+        if best.has_else or self.misfit_p_value < RARE:
+            doubt = (
+                f"probability of something else {chance_text(self.probability_other)}"
+                if best.has_else
+                else f"probability of such a misfit by chance {chance_text(self.misfit_p_value)}"
+            )
+            yield ResultWarning(
+                f"damage of these groups alone does not explain the shifts ({doubt}). Likely causes: "
+                f"{likely_causes(self)}",
+                "unexplained-shifts",
+            )
 
     def __repr__(self) -> str:
         best = self.explanations.iloc[0]

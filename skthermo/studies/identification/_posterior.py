@@ -82,10 +82,6 @@ class Posterior:
     def probability_of(self, cause: str) -> float:
         return sum(one.probability for one in self.explanations if cause in one.causes)
 
-    @property
-    def no_damage(self) -> float:
-        return sum(one.probability for one in self.explanations if not one.causes)
-
     def table(self, causes: Sequence[Cause]) -> pd.DataFrame:
         """Average amount of each cause over all explanations, where those without it count as 0.
 

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._effects import ChangedStructure, central_differences
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, check_dofs, check_noise
+from skthermo._tables.arrays import Array, as_floats, check_dofs
 from skthermo.exceptions import RecordsWarning
+from skthermo.studies.identification._shift import stated_deviations
 
 STATES = ("healthy", "damaged")
 ALIKE = 0.5  # MAC of a measured healthy shape with the model's below which it counts as another mode
@@ -130,7 +131,7 @@ class ShapeShift:
         Of effects at different theta, those count whose unchanged shapes are most like the measured healthy ones:
         frequencies alone may have led theta astray where they hardly depend on it.
         """
-        stated = stated_variances(noise, len(modes))
+        stated = stated_deviations(noise, len(modes), what="shape_noise", most=1)
         records = read_records(shapes, candidates[0].reference.shape)
         known = np.logical_and(*(measured_sensors(state) for state in records))
         known &= known.sum(axis=0) > 1
@@ -151,8 +152,8 @@ class ShapeShift:
         components = [effects.components(state) for state in records]
         number = [(~np.isnan(values)).sum(axis=0) for values in components]
         healthy, changed = (np.nanmean(values, axis=0) for values in components)
-        variance = np.maximum(scatter(components, effects.modes, len(modes), is_needed=isinstance(noise, str)), stated)
-        variance = variance[effects.modes]
+        variance = scatter(components, effects.modes, len(modes), is_needed=stated is None)
+        variance = np.maximum(variance, 0.0 if stated is None else stated**2)[effects.modes]
         return cls(effects, changed - healthy, variance * (1 / number[0] + 1 / number[1]))
 
 
@@ -192,18 +193,6 @@ def mac_of(effects: ShapeEffects, records: NDArray) -> Array:
     across = np.bincount(effects.modes, squares, minlength=len(effects.across))
     lengths = (effects.known * effects.reference**2).sum(axis=0)
     return np.where(lengths > 0, 1 - across / np.where(lengths > 0, lengths, 1.0), 0.0)
-
-
-def stated_variances(noise: ArrayLike | Literal["fitted"], n_modes: int) -> Array:
-    """Variances of one record's components as they are stated, (n_modes,); 0 where they are fitted."""
-    if isinstance(noise, str):
-        if noise != "fitted":
-            raise ValueError(f'shape_noise is {noise!r}; expected "fitted" or standard deviations')
-        return np.zeros(n_modes)
-    stated = check_noise(noise, n_modes, what="shape_noise", most=1)
-    if (stated == 0).any():
-        raise ValueError(f"shape_noise is {noise!r}; expected standard deviations above 0")
-    return stated**2
 
 
 def scatter(components: list[Array], modes: NDArray[np.intp], n_modes: int, *, is_needed: bool) -> Array:

@@ -11,7 +11,7 @@ from scipy import stats
 from skthermo._effects import healthy_frequencies
 from skthermo._tables.arrays import Array, check_noise, means_of_known, median, robust_deviation
 from skthermo._tables.frames import has_stamps, row_times
-from skthermo.residuals.scatter import PSEUDO_RECORDS, Scatter
+from skthermo.residuals.scatter import PSEUDO_RECORDS
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
@@ -89,16 +89,23 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     )
 
 
-def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
-    """How records scatter: as in training, or as stated."""
+def stated_deviations(noise: Any, n_modes: int, *, what: str, **options: Any) -> Array | None:
+    """Standard deviations above 0 as they are stated; None where they are fitted."""
     if isinstance(noise, str):
         if noise != "fitted":
-            raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        return fem.residuals().scatter
-    deviations = check_noise(noise, len(fem.mode_names_), fem.mode_names_)
+            raise ValueError(f'{what} is {noise!r}; expected "fitted" or standard deviations')
+        return None
+    deviations = check_noise(noise, n_modes, what=what, **options)
     if (deviations == 0).any():
-        raise ValueError(f"noise is {noise!r}; expected standard deviations above 0, which errors are derived from")
-    return Scatter.independent(deviations, len(fem.residuals().values))
+        raise ValueError(f"{what} is {noise!r}; expected standard deviations above 0, which errors are derived from")
+    return deviations
+
+
+def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
+    """How records scatter: as in training, or as stated."""
+    names = fem.mode_names_
+    deviations = stated_deviations(noise, len(names), what="noise", mode_names=names)
+    return fem.residuals().scatter if deviations is None else fem.residuals().independent_scatter(deviations)
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:

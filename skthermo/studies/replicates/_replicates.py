@@ -209,6 +209,10 @@ class Replicates:
         errors = self.fem.residuals().level_errors
         return np.exp(errors * np.random.RandomState([self.seeds[number], 1]).standard_normal(len(errors)))
 
+    def fault_stream(self, number: int) -> np.random.RandomState:
+        """Random numbers of the gaps and outliers that other training records have."""
+        return np.random.RandomState([self.seeds[number], 2])
+
 
 def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> list[FEModel]:
     """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""

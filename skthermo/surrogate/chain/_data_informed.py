@@ -116,36 +116,28 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     model : FE model
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
-        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets this one.
-        ``set_params(inverse__n_samples=500)`` puts the default inverse in the place of None, with ``reduce`` and
-        ``n_jobs`` of the chain, and sets its parameter; so do the names of a grid search, and those of the mapper.
+        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets this one. Names such as
+        ``inverse__n_samples`` in ``set_params`` and grids reach the default parts, too.
     mapper : regressor, optional
-        M2. By default ``TemperatureMapper()``, behind the `~skthermo.preprocessing.ExponentialMeans` of earlier
-        temperatures that the frequencies remember, if `~skthermo.preprocessing.find_memory` finds such. With lags of
-        hours, for example ``make_pipeline(LagFeatures(), TemperatureMapper())``.
+        M2. By default ``TemperatureMapper()``, behind the means of earlier temperatures that
+        `~skthermo.preprocessing.find_memory` finds. With lags of hours, for example ``make_pipeline(LagFeatures(),
+        TemperatureMapper())``.
     aligner : transformer, "auto" or "passthrough", default="auto"
-        Maps measured frequencies onto the model's and back. "auto" is ``BiasAligner(method="scale")``: the mean of each
-        measured mode, over that of the nominal model, is a factor. ``BiasAligner()`` is the paper's shift. A
-        `~skthermo.preprocessing.BiasAligner` without a reference gets this model.
+        Maps measured frequencies onto the model's and back. "auto" is ``BiasAligner(method="scale")``, and
+        ``BiasAligner()`` the paper's shift. A `~skthermo.preprocessing.BiasAligner` without a reference gets this
+        model.
     imputer : transformer or "passthrough", default="passthrough"
         Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only. Without one,
-        an inverse that refines estimates the parameters of such rows from the modes that are there; without refining,
-        they do not train M2.
+        rows with gaps do not train M2 unless the inverse refines.
     discrepancy : "auto", regressor or None, default="auto"
-        What the FE model cannot follow: predictions, healthy or damaged, are multiplied with the ratio of measured over
-        modelled frequencies, which a regressor learns mode by mode from the inputs of M2. "auto" is a
-        `TemperatureMapper`; None is the paper's chain.
+        Learns from the inputs of M2, mode by mode, what the FE model cannot follow: the ratio of measured over modelled
+        frequencies. "auto" is a `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
-        Whether M1, predictions and simulations use a reduced model, ``model.reduced``, much faster for large models.
-        "auto" reduces where that is expected to save time and a basis is accurate; ``report_`` says which. True allows
-        a relative error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. An
-        `InverseSurrogate` whose own ``reduce`` is "auto" gets this value, and predictions use its reduced model if that
-        covers the parameters of the training weather, plus a quarter of their range on either side. Rows outside the
-        box of a reduced model are solved by the model itself, with a warning that counts them. Frequencies of many rows
-        come from a `~skthermo.fem.FrequencySurface` where that saves time.
+        Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `InverseSurrogate` says, which
+        gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
     memory : str or joblib.Memory, optional
-        Folder for the checks of the training records and, unless the inverse has a memory of its own, for simulations
-        and the parameters of these records, so that searches make them once. See ``memory`` of `InverseSurrogate`.
+        Folder for the checks of the training records and, unless the inverse has a memory of its own, for all that
+        ``memory`` of `InverseSurrogate` stores.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -168,12 +160,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     records_ : TrainingRecords
         The training records, and what M2 learned from them.
     thermal_ : ThermalModel
-        Mapper, simulator, aligner and discrepancy, which predict: ``thermal_.simulated(weather(T), modes)`` gives other
-        modes than the measured ones, as the FE model does.
+        Mapper, simulator, aligner and discrepancy, which predict: ``thermal_.simulated(weather(T), modes)`` also gives
+        modes that were not measured.
     recorder_ : RecordSimulator
-        What draws noise, gaps and outliers as the training records have them: ``recorder_.noise(weather(T))``,
-        ``recorder_.gaps(weather(T))`` and ``recorder_.service_of(F)``, whose ``missing`` and ``outliers`` are those of
-        the training records.
+        What draws noise, gaps and outliers as the training records have them (``noise``, ``gaps`` and ``service_of``).
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -301,28 +291,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             `~skthermo.preprocessing.check_records` finds.
         """
         T, F = self._read_records(X, y)
-        tolerance(self.model, self.reduce)
-        self.mode_names_ = column_names(F, "f")
-        self.parameter_names_ = list(self.model.parameter_names)
-        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
-        inverse = ChainInverse(self.inverse_)
-        surrogate = next(iter(inverse.surrogates), None)
-        self.box_ = None if surrogate is None else Box.of(surrogate.bounds, self.parameter_names_)
-        if shapes is None and inverse.shape_inputs is not None:
-            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
+        inverse = self._begin(F, shapes)
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
-        findings = findings_of(self._findings, T, F, mended=mended)
-        warn_each(misplaced_columns(T, F))
-        warn_each(mode_warnings(self.model, F))
-        self.sensors_ = SensorRegression.of(T)
-        filled = frame_like(T, self.sensors_.fill(T)[0])
-        usable = without_outliers(findings, F)
-        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
-        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
-            self.mapper_ = make_pipeline(means, self.mapper_)
+        findings = self._look_at(T, F)
+        filled, usable = frame_like(T, self.sensors_.fill(T)[0]), without_outliers(findings, F)
         stages = Stages(self, 5, X, y)
         with stages.stage("noise"):
             self.noise_ = measurement_noise(self.mapper_, filled, usable)
@@ -333,32 +307,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with stages.stage("temperature mapper", self.mapper_):
             fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
-            inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-            known = getattr(surrogate, "simulator_", None)
-            simulator = Simulator.around(self.model, learned, self.reduce, known)
-            records = TrainingRecords(
-                temperatures=T,
-                frequencies=F,
-                inputs=as_floats(inputs),
-                targets=estimates.theta,
-                learned=learned,
-                usable=as_floats(usable),
-                modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
-                weights=weights,
-                parameter_names=self.parameter_names_,
-            )
-            thermal = ThermalModel(
-                mapper=self.mapper_,
-                simulator=simulator,
-                aligner=self.aligner_,
-                discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
-                sensors=self.sensors_,
-                training_range=TrainingRange.of(inputs, records.trained),
-                parameter_names=self.parameter_names_,
-                mode_names=self.mode_names_,
-                n_jobs=self.n_jobs,
-            )
-            self._hold(thermal, RecordSimulator(thermal, records))
+            self._learn_discrepancy(inverse, T, F, filled, usable, estimates.theta, weights)
             self.report_ = report_of(self, estimates, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -441,7 +390,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
         learned = possible(mapper.predict(filled))[0]
         records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
-        discrepancy = self.discrepancy_.again(records.inputs, records.ratios, records.weights, mapper)
+        discrepancy = self.discrepancy_.again(records.ratios, mapper)
         thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
         return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.recorder_.service))
 
@@ -681,23 +630,18 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         mass : matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
             Mass added to the model's in kg; a vector holds lumped masses.
         noise : float, array-like of shape (n_modes,) or "fitted", default=0.0
-            Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the relative
-            residuals of a whole training record, out of fold, so that modes scatter together, scatter more in frost,
-            and are missing as in the training records. Runs of consecutive records are drawn if residuals are serially
-            correlated [PR94]_, scaled to the weather of the rows, which should be in order of time. A second draw with
-            a small weight smooths the residuals, so that the largest of the training records can be exceeded.
+            Relative standard deviation of Gaussian noise on the frequencies. With "fitted", each row gets the
+            out-of-fold residuals of a whole training record of similar weather, with the modes that are missing there,
+            in runs as long as residuals are correlated (:doc:`/guide/records_theory`). Rows should be in order of time.
         gaps : float or "fitted", optional
-            Values that are missing. With "fitted", modes and whole records are missing as in the training records: as
-            often, together, and for as long (``recorder_.gaps`` says which temperatures are missing, too). A number is
-            the share of the values that are missing, each by itself; 0 gives complete records. By default, modes are
-            missing with ``noise="fitted"`` only, as in the record that the noise of a row is of.
+            Values that are missing: with "fitted", modes and whole records as often, together, and for as long as in
+            the training records; a number is the share of the values, each by itself. By default, modes are missing
+            with ``noise="fitted"`` only, as in the record that the noise of a row is of.
         outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
-            Values that are far off. With "fitted", those training residuals that are far from their neighbours
-            (`~skthermo.preprocessing.HampelFilter`) come back as often, in the same modes together, and for as many
-            records; their sizes are smoothed. If the training records were cleaned, give the frequencies before that:
-            what cleaning has changed or removed comes back. A number is the share of the values whose noise is ten
-            times as large, each by itself; 0 leaves outliers out. By default they come with ``noise="fitted"`` only,
-            one record at a time.
+            Values that are far off: with "fitted", those of the training records, in the same modes together, and for
+            as many records; a number is the share of the values whose noise is ten times as large. If the training
+            records were cleaned, give the frequencies before that: what cleaning has changed or removed comes back. By
+            default they come with ``noise="fitted"`` only, one record at a time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -780,7 +724,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = as_columns(self.mapper_.predict(weather.filled))
+        theta = self.thermal_.learned(weather.filled)
         outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
         excess = excess.assign(outside_bounds=outside)
         if offers(self.mapper_, "from_fleet"):
@@ -880,6 +824,30 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         gross_errors(T, F, model=self.model).refuse_meaningless()
         return T, F
 
+    def _begin(self, F: Table, shapes: ArrayLike | None) -> ChainInverse:
+        """Clone the parts for frequencies and, perhaps, shapes; the inverse."""
+        tolerance(self.model, self.reduce)
+        self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
+        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
+        inverse = ChainInverse(self.inverse_)
+        bounds = [part.bounds for part in inverse.surrogates]
+        self.box_ = Box.of(bounds[0], self.parameter_names_) if bounds else None
+        if shapes is None and inverse.shape_inputs is not None:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
+        return inverse
+
+    def _look_at(self, T: Table, F: Table) -> RecordFindings:
+        """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
+        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
+        findings = findings_of(self._findings, T, F, mended=mended)
+        warn_each(misplaced_columns(T, F))
+        warn_each(mode_warnings(self.model, F))
+        self.sensors_ = SensorRegression.of(T)
+        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
+        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
+            self.mapper_ = make_pipeline(means, self.mapper_)
+        return findings
+
     def _findings(self, T: Table, F: Table) -> RecordFindings:
         """What `check_records` finds, read from the memory if these records were checked before."""
         return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
@@ -897,6 +865,37 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         if shapes is not None:
             warn_each(inverse.shape_warnings(aligned))
         return aligned
+
+    def _learn_discrepancy(
+        self, inverse: ChainInverse, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Any
+    ) -> None:
+        """Learn what the model cannot follow, and hold all that predicts."""
+        inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
+        known = next((getattr(part, "simulator_", None) for part in inverse.surrogates), None)
+        simulator = Simulator.around(self.model, learned, self.reduce, known)
+        records = TrainingRecords(
+            temperatures=T,
+            frequencies=F,
+            inputs=as_floats(inputs),
+            targets=theta,
+            learned=learned,
+            usable=as_floats(usable),
+            modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
+            weights=weights,
+            parameter_names=self.parameter_names_,
+        )
+        thermal = ThermalModel(
+            mapper=self.mapper_,
+            simulator=simulator,
+            aligner=self.aligner_,
+            discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
+            sensors=self.sensors_,
+            training_range=TrainingRange.of(inputs, records.trained),
+            parameter_names=self.parameter_names_,
+            mode_names=self.mode_names_,
+            n_jobs=self.n_jobs,
+        )
+        self._hold(thermal, RecordSimulator(thermal, records))
 
     def _hold(self, thermal: ThermalModel, recorder: RecordSimulator) -> Self:
         """Hold what was learned, and its parts by the names that users know."""

@@ -80,42 +80,16 @@ class FittedChain(Protocol):
         """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
 
     def weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them."""
 
     def predict(self, X: ArrayLike) -> Table:
-        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Frequencies of the healthy structure in Hz, as `DataInformedFEM.predict` gives them."""
 
     def predict_parameters(self, X: ArrayLike) -> Table:
-        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        """
+        """Multipliers of the nominal parameters, as `DataInformedFEM.predict_parameters` gives them."""
 
     def simulate(self, X: ArrayLike, **options: Any) -> Table:
-        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-        **options : dict
-            Damage, noise, gaps and outliers.
-        """
+        """Frequencies as monitoring would record them, as `DataInformedFEM.simulate` gives them."""
 
 
 LEAST_SCATTER = 1e-12  # of a mode, so that an exact fit does not divide by zero
@@ -173,32 +147,29 @@ class FitReport(SavesFrames):
     outside : Series
         Share of rows outside, by parameter.
     deviations : Series
-        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound),
-        from the residual scatter of the chain and the derivatives of the model; infinite where the modes do not
-        determine a parameter.
+        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound);
+        infinite where the modes do not determine a parameter.
     errors : DataFrame
-        MAPE of the chain and of the training mean, by mode, in percent. They are in-sample: the rows trained the chain.
+        In-sample MAPE of the chain and of the training mean, by mode, in percent.
     n_scored : int
         Number of rows used for ``errors``, spread evenly over the training rows.
     n_unconverged : int or None
         Rows whose parameters have not converged in refining; None without refining.
     n_by_full_model, n_full_solves : int
         Rows whose refined parameters are outside the box of the reduced model, and how often the full model was solved
-        for them; 0 without a reduced model.
+        for them.
     round_trip : Series or None
-        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent; None
-        where the inverse does not give it.
-    scatter : Series or None
+        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent.
+    scatter : Series
         Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
-    variation : DataFrame or None
-        By mode, in percent: ``noise``, the standard deviation of the records about a regression on their weather, out
-        of fold; ``weather``, the standard deviation of what the weather does to the FE model's frequencies; and
-        ``discrepancy``, its root mean square over the training records.
-    findings : RecordFindings or None
+    variation : DataFrame
+        By mode, in percent: ``noise`` of the records, ``weather``, the standard deviation of what it does to the FE
+        model's frequencies, and ``discrepancy``, its root mean square over the training records.
+    findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
-        With a mapper that has learned from a fleet: ``lowest`` and ``highest`` value of each of its inputs in these
-        records, and ``fleet lowest`` and ``fleet highest`` with those of the fleet.
+        With a mapper that has learned from a fleet: lowest and highest value of each input in these records and in the
+        fleet's.
     pooling_probability : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     solved : str
@@ -227,16 +198,16 @@ class FitReport(SavesFrames):
     deviations: pd.Series
     errors: pd.DataFrame
     n_scored: int
-    n_unconverged: int | None = None
-    n_by_full_model: int = 0
-    n_full_solves: int = 0
-    round_trip: pd.Series | None = None
-    scatter: pd.Series | None = None
-    variation: pd.DataFrame | None = None
-    findings: RecordFindings | None = None
-    fleet: pd.DataFrame | None = None
-    pooling_probability: Mapping[Any, float] | None = None
-    solved: str = ""
+    n_unconverged: int | None
+    n_by_full_model: int
+    n_full_solves: int
+    round_trip: pd.Series | None
+    scatter: pd.Series
+    variation: pd.DataFrame
+    findings: RecordFindings
+    fleet: pd.DataFrame | None
+    pooling_probability: Mapping[Any, float] | None
+    solved: str
 
     def __repr__(self) -> str:
         tables = self._modes().to_string(), self._parameters().to_string()
@@ -247,8 +218,7 @@ class FitReport(SavesFrames):
         return text + self._modes().to_html() + self._parameters().to_html()
 
     def _sentences(self) -> list[str]:
-        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper."]
-        lines += [self.solved] if self.solved else []
+        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper.", self.solved]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
         lines += [
             f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
@@ -280,9 +250,9 @@ class FitReport(SavesFrames):
         if self.pooling_probability is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.pooling_probability.items())
             lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
-        if self.findings is not None and getattr(self.findings.memory, "features", None) is not None:
+        if getattr(self.findings.memory, "features", None) is not None:
             lines.append(self.findings.memory.summary())
-        if self.findings is not None and len(self.findings.table):
+        if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.n_scored} rows spread evenly over the training rows."]
 
@@ -303,9 +273,7 @@ class FitReport(SavesFrames):
 
     def _modes(self) -> pd.DataFrame:
         table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
-        table = table.join(self.errors.round(3).add_suffix(" (%)"))
-        if self.variation is not None:
-            table = table.join(self.variation.round(3).add_suffix(" (%)"))
+        table = table.join([part.round(3).add_suffix(" (%)") for part in (self.errors, self.variation)])
         if self.round_trip is not None:
             table = table.assign(**{"round trip (%)": self.round_trip.round(3) + 0.0})  # not -0.0
         return table
@@ -392,7 +360,7 @@ class FitReport(SavesFrames):
         )
 
     def _many_outliers(self) -> Iterator[SkthermoWarning]:
-        far = np.zeros(0, dtype=bool) if self.findings is None else self.findings.outliers.to_numpy()
+        far = self.findings.outliers.to_numpy()
         if far.sum() <= MANY_OUTLIERS * far.size:
             return
         yield RecordsWarning(
@@ -402,8 +370,6 @@ class FitReport(SavesFrames):
         )
 
     def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
-        if self.variation is None:
-            return
         weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
         large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
         modes = ", ".join(
@@ -436,19 +402,14 @@ class FitReport(SavesFrames):
 def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
-    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-    measured, predicted = F[rows], chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
+    measured, of_model, predicted = _in_sample(chain)
     hidden = hidden_offsets(chain.aligner_, records.frequencies)
     errors_of_means = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
-    unexplained = unexplained_offset(hidden, predicted, records.temperatures, errors_of_means)
-    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
     outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
     full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
     known, scatter = ~np.isnan(theta).any(axis=1), np.nan_to_num(robust_deviation(measured / predicted))
-    delta = chain.discrepancy_.at(records.inputs[records.trained])
-    effect = np.log(records.modelled[records.trained])
     last = last_step(chain.inverse_)
     round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
     return FitReport(
@@ -458,29 +419,41 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
         filled=filled(records.temperatures, chain.sensors_),
         offsets=mode_offsets(chain.model, records.frequencies),
         hidden_offsets=hidden,
-        unexplained_offset=unexplained,
+        unexplained_offset=unexplained_offset(hidden, of_model, records.temperatures, errors_of_means),
         n_outside=None if box is None else int(outside.any(axis=1).sum()),
         outside=pd.Series(outside[known].mean(axis=0), index=names),
         deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
         errors=pd.DataFrame(errors, index=modes),
-        n_scored=len(rows),
+        n_scored=len(measured),
         n_unconverged=estimates.n_unconverged,
         n_by_full_model=int((full_solves > 0).sum()),
         n_full_solves=int(full_solves.sum()),
         round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
         scatter=pd.Series(100 * scatter, index=modes),
-        variation=pd.DataFrame(
-            {
-                "noise": 100 * chain.noise_,
-                "weather": 100 * np.nanstd(effect, axis=0),
-                "discrepancy": 100 * np.sqrt((delta**2).mean(axis=0)),
-            },
-            index=modes,
-        ),
+        variation=_variation(chain),
         findings=findings,
         fleet=weather_of_fleet(chain),
         pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         solved=chain.simulator_.described,
+    )
+
+
+def _in_sample(chain: FittedChain) -> tuple[Array, Array, Array]:
+    """Frequencies of some training rows: measured, of the model itself, and predicted by the chain."""
+    records = chain.records_
+    rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
+    of_model = chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
+    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
+    return as_floats(records.frequencies)[rows], of_model, predicted
+
+
+def _variation(chain: FittedChain) -> pd.DataFrame:
+    """What noise, the weather and the discrepancy do to each mode, in percent."""
+    records = chain.records_
+    weather = np.nanstd(np.log(records.modelled[records.trained]), axis=0)
+    discrepancy = np.sqrt((chain.discrepancy_.at(records.inputs[records.trained]) ** 2).mean(axis=0))
+    return 100 * pd.DataFrame(
+        {"noise": chain.noise_, "weather": weather, "discrepancy": discrepancy}, index=chain.mode_names_
     )
 
 

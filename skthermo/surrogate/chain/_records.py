@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +13,6 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from sklearn.base import BaseEstimator, clone
-from sklearn.model_selection import BaseCrossValidator
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import without_warnings
@@ -36,7 +35,7 @@ from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
 from skthermo.residuals.weather import SensorRegression, warn_of_unseen_weather
-from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather, ratio_regressor, ratios_of
+from skthermo.surrogate.chain._stages import Discrepancy, Ratios, ThermalModel, Weather, ratio_regressor
 
 MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
 MOST_FOR_NOISE = 3000  # records, spread evenly, that the noise is estimated from
@@ -75,15 +74,14 @@ class TrainingRecords(SavesFrames):
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
     @property
-    def ratios(self) -> Array:
-        """Measured over modelled frequencies, which a discrepancy learns, (n_rows, n_modes)."""
-        return self.usable / self.modelled
+    def ratios(self) -> Ratios:
+        """Measured over modelled frequencies, which a discrepancy learns."""
+        return Ratios(self.inputs, self.usable / self.modelled, self.weights)
 
     def learns(self, regressor: BaseEstimator, mapper: BaseEstimator, sensors: SensorRegression) -> Discrepancy:
         """The discrepancy that a regressor learns of these records, beside a fitted mapper."""
         folds = BlockedKFold(N_FOLDS).fold_of(as_frame(self.temperatures))
-        chain = {"mapper": mapper, "sensors": sensors}
-        return Discrepancy.of(regressor, self.inputs, self.ratios, self.weights, folds, **chain)
+        return Discrepancy.of(regressor, self.ratios, folds, mapper=mapper, sensors=sensors)
 
     def resampled(
         self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
@@ -108,66 +106,60 @@ class TrainingRecords(SavesFrames):
             self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
         )
 
-    def out_of_fold(
-        self,
-        mapper: BaseEstimator,
-        frequencies_of: Callable[[Array], Array],
-        discrepancy: Discrepancy,
-        folds: BaseCrossValidator | None = None,
-        propagated: Callable[[Array, Array], Array] | None = None,
-    ) -> BaselineResiduals:
+    def out_of_fold(self, model: ThermalModel) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        ``frequencies_of`` gives frequencies in the measured domain, and ``propagated`` covariances of ln f for a mapper
-        that states its errors. By default, a fold holds every fifth of blocks of a week, or longer where residuals are
-        correlated for longer.
+        A fold holds every fifth of blocks of a week, or longer where residuals are correlated for longer.
         """
-        order = np.argsort(row_times(self.temperatures), kind="stable")
         measured = as_floats(self.frequencies)
         known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
+        order = np.argsort(row_times(self.temperatures), kind="stable")
         order = order[known[order]]
         inputs, theta, measured = self.inputs[order], self.targets[order], measured[order]
         usable = ~np.isnan(theta).any(axis=1)
         if usable.sum() < 2 * N_FOLDS:
             raise ValueError(f"{usable.sum()} records have parameters; expected at least {2 * N_FOLDS} for residuals")
-        own = measured / (self.modelled[order] * np.exp(discrepancy.at(inputs))) - 1
-        records = as_frame(self.temperatures).iloc[order]
-        if folds is None:
-            known = ~np.isnan(own).all(axis=1)
-            in_sample = BaselineResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
-            folds = BlockedKFold(N_FOLDS).remembering(records, CORRELATION_TIMES * in_sample.correlation_time)
-        learner, predicted, fold_of = last_step(mapper), np.full_like(theta, np.nan), np.zeros(len(order), dtype=int)
-        named, states = pd.DataFrame(theta, columns=list(self.parameter_names)), offers(mapper, "predict_covariance")
-        covariances, beyond = np.zeros((*theta.shape, theta.shape[1])) if states else None, np.zeros(len(order))
-        for fold, (train, test) in enumerate(folds.split(records)):
-            train = train[usable[train]]
-            weights = None if self.weights is None else self.weights[order][train]
-            fitted = fit_weighted(clone(learner), inputs[train], named.iloc[train], weights)
-            predicted[test], fold_of[test] = as_columns(fitted.predict(inputs[test])), fold
+        own = measured / (self.modelled[order] * np.exp(model.discrepancy.at(inputs))) - 1
+        records, weights = as_frame(self.temperatures).iloc[order], self.ratios.weights_of(order)
+        fold_of = _remembering_folds(records, inputs, own)
+        learner, predicted, beyond = last_step(model.mapper), np.full_like(theta, np.nan), np.zeros(len(order))
+        named, states = pd.DataFrame(theta, columns=list(self.parameter_names)), offers(learner, "predict_covariance")
+        covariances = np.zeros((*theta.shape, theta.shape[1])) if states else None
+        for fold in range(N_FOLDS):
+            train, test = np.flatnonzero(usable & (fold_of != fold)), fold_of == fold
+            weighted = named.iloc[train], None if weights is None else weights[train]
+            fitted = fit_weighted(clone(learner), inputs[train], *weighted)
+            predicted[test] = as_columns(fitted.predict(inputs[test]))
             if covariances is not None:
                 covariances[test] = predicted_covariance(fitted, inputs[test])
                 found = reach_of(fitted, inputs[test])
                 beyond[test] = 0.0 if found is None else found[0].excess(found[1]).mean(axis=1)
         if not states:
             warn_of_unseen_weather(records, fold_of, "Standard deviations, intervals and noise are unreliable there")
-        modelled = frequencies_of(predicted)
-        expected = np.full_like(modelled, np.nan)
-        for fold in range(fold_of.max() + 1):
+        modelled = model.frequencies(predicted)
+        expected, ratios = np.full_like(modelled, np.nan), self.usable[order] / modelled
+        for fold in range(N_FOLDS):
             train, test = usable & (fold_of != fold), fold_of == fold
-            weights = None if self.weights is None else self.weights[order]
             # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
-            learned = discrepancy.relearned(inputs, self.usable[order] / modelled, weights, train)
-            expected[test] = modelled[test] * np.exp(learned.at(inputs[test]))
+            others = Ratios(inputs, np.where(train[:, np.newaxis], ratios, np.nan), weights)
+            expected[test] = modelled[test] * np.exp(model.discrepancy.relearned(others).at(inputs[test]))
         values = measured / expected - 1
         known = ~np.isnan(values).all(axis=1)
         residuals = BaselineResiduals(
             inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
         )
-        if covariances is None or propagated is None:
+        if covariances is None:
             return residuals
-        errors = np.sqrt(np.einsum("ijj->ij", propagated(predicted, covariances)))
+        errors = np.sqrt(np.einsum("ijj->ij", model.propagated(predicted, covariances)))
         reach = (reach_of(learner, inputs) or (None,))[0]
         return replace(residuals, errors=errors[known], reach=reach, beyond=beyond[known])
+
+
+def _remembering_folds(records: pd.DataFrame, inputs: Array, own: Array) -> NDArray[np.intp]:
+    """The fold of each record, in blocks of a week or of five correlation times of in-sample residuals."""
+    known = ~np.isnan(own).all(axis=1)
+    in_sample = BaselineResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
+    return BlockedKFold(N_FOLDS).remembering(records, CORRELATION_TIMES * in_sample.correlation_time).fold_of(records)
 
 
 def without_outliers(findings: RecordFindings, F: Table) -> Table:
@@ -191,12 +183,12 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
         with without_warnings():
             inputs = clone(mapper[:-1]).fit_transform(T, np.where(np.isnan(logs), median(logs), logs))
     inputs, residuals = as_floats(inputs)[rows], logs[rows] - median(logs)
-    measured, records = np.exp(residuals), as_frame(T).iloc[rows]
-    folds = BlockedKFold(N_FOLDS).fold_of(records) if len(rows) >= N_FOLDS else np.zeros(len(rows))
+    ratios = Ratios(inputs, np.exp(residuals))
+    folds = BlockedKFold(N_FOLDS).fold_of(as_frame(T).iloc[rows]) if len(rows) >= N_FOLDS else np.zeros(len(rows))
     known = ~np.isnan(inputs).any(axis=1)
-    for one in ratios_of(ratio_regressor(), inputs, measured, None):
+    for one in ratios.learned_by(ratio_regressor()):
         for fold in range(N_FOLDS):
-            learned = one.refitted(ratio_regressor(), inputs, measured, None, one.rows[folds[one.rows] != fold])
+            learned = one.refitted(ratio_regressor(), ratios, one.rows[folds[one.rows] != fold])
             test = np.flatnonzero((folds == fold) & known)
             if learned.regressor is not None and len(test):
                 residuals[np.ix_(test, one.modes)] -= learned.logs(inputs[test])
@@ -260,6 +252,11 @@ class ServiceRecords:
         places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
         return cls(missing[order], outliers[order], places.to_numpy())
 
+    @property
+    def has_faults(self) -> bool:
+        """Whether there is a gap or an outlier."""
+        return bool(self.missing.any() or not np.isnan(self.outliers).all())
+
     def draw(self, places: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records whose faults rows of weather in order of time have, (n_rows,).
 
@@ -268,7 +265,7 @@ class ServiceRecords:
         begins, or in records with the most usual faults, which are mostly none. All records are taken equally often.
         """
         n_records, n_rows = len(self.places), len(places)
-        if not self.missing.any() and np.isnan(self.outliers).all():
+        if not self.has_faults:
             return np.zeros(n_rows, dtype=np.intp)  # all records are alike
         passes = random_state.uniform(size=n_rows) < 1 / MEAN_LENGTH
         which = random_state.uniform(size=n_rows)
@@ -282,6 +279,11 @@ class ServiceRecords:
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
+
+    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
+        """Gaps and outliers that the training records could have had as well, in their own weather."""
+        taken = self.draw(self.places, random_state)
+        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
         """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
@@ -355,8 +357,7 @@ class RecordSimulator(SavesFrames):
     @cached_property
     def residuals(self) -> BaselineResiduals:
         """Out-of-fold residuals of the training records by weather, for which the mapper is fitted in each fold."""
-        model = self.model
-        return self.records.out_of_fold(model.mapper, model.frequencies, model.discrepancy, propagated=model.propagated)
+        return self.records.out_of_fold(self.model)
 
     @cached_property
     def service(self) -> ServiceRecords:

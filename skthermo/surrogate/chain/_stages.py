@@ -15,7 +15,7 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.warnings import warn_each, warn_user, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo._tables.arrays import (
     HUGE,
     Array,
@@ -232,55 +232,39 @@ class Discrepancy:
     """
 
     regressor: BaseEstimator
-    learned: tuple[Ratios, ...]
+    learned: tuple[LearnedRatios, ...]
     levels: Array
     shares: Array
     sensors: SensorRegression | None = None
     mapper: Any = None
 
     @classmethod
-    def of(
-        cls,
-        regressor: BaseEstimator,
-        inputs: Array,
-        ratios: Array,
-        weights: Array | None,
-        folds: NDArray[np.intp],
-        **chain: Any,
-    ) -> Discrepancy:
-        """Learn from inputs of M2, ratios of measured over modelled frequencies, weights and the folds of the rows."""
-        n_modes = ratios.shape[1]
-        learned = () if regressor is None else ratios_of(regressor, inputs, ratios, weights)
+    def of(cls, regressor: BaseEstimator, ratios: Ratios, folds: NDArray[np.intp], **chain: Any) -> Discrepancy:
+        """Learn from ratios of measured over modelled frequencies, and the folds of their rows."""
+        n_modes = ratios.values.shape[1]
+        learned = () if regressor is None else ratios.learned_by(regressor)
         found = cls(regressor, learned, np.zeros(n_modes), np.zeros(n_modes), **chain)
         for one in learned:
-            logs = np.log(ratios[np.ix_(one.rows, one.modes)])
-            level = np.average(logs, axis=0, weights=None if weights is None else weights[one.rows])
+            logs, level = ratios.logs(one), ratios.level(one)
             change = np.zeros_like(logs)
             for fold in np.unique(folds[one.rows]):
                 test = folds[one.rows] == fold
-                other = one.refitted(regressor, inputs, ratios, weights, one.rows[~test])
+                other = one.refitted(regressor, ratios, one.rows[~test])
                 if other.regressor is not None:
-                    change[test] = other.logs(inputs[one.rows[test]]) - level
+                    change[test] = other.logs(ratios.inputs[one.rows[test]]) - level
             slopes = (change * (logs - level)).sum(axis=0) / np.maximum((change**2).sum(axis=0), TINY)
             found.levels[one.modes], found.shares[one.modes] = level, np.clip(slopes, 0, 1)
         return found
 
-    def relearned(self, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.bool_]) -> Discrepancy:
-        """The same with regressors that have learned some of the rows only."""
-        some = (
-            ratios_of(self.regressor, inputs, np.where(rows[:, np.newaxis], ratios, np.nan), weights)
-            if self.learned
-            else ()
-        )
-        return replace(self, learned=some)
+    def relearned(self, ratios: Ratios) -> Discrepancy:
+        """The same with regressors that have learned other ratios."""
+        return replace(self, learned=ratios.learned_by(self.regressor) if self.learned else ())
 
-    def again(self, inputs: Array, ratios: Array, weights: Array | None, mapper: BaseEstimator) -> Discrepancy:
+    def again(self, ratios: Ratios, mapper: BaseEstimator) -> Discrepancy:
         """What the regressor learns of other ratios beside another mapper; changes count by the same shares."""
-        found = self.relearned(inputs, ratios, weights, np.ones(len(inputs), dtype=bool))
-        levels = self.levels.copy()
+        found, levels = self.relearned(ratios), self.levels.copy()
         for one in found.learned:
-            logs = np.log(ratios[np.ix_(one.rows, one.modes)])
-            levels[one.modes] = np.average(logs, axis=0, weights=None if weights is None else weights[one.rows])
+            levels[one.modes] = ratios.level(one)
         return replace(found, levels=levels, mapper=mapper)
 
     def __call__(self, X: Table) -> Array:
@@ -301,44 +285,61 @@ class Discrepancy:
 
 @dataclass(frozen=True, eq=False)
 class Ratios:
+    """Ratios of measured over modelled frequencies, (n_rows, n_modes), beside inputs of M2, and weights of the rows."""
+
+    inputs: Array
+    values: Array
+    weights: Array | None = None
+
+    def weights_of(self, rows: NDArray[np.intp]) -> Array | None:
+        return None if self.weights is None else self.weights[rows]
+
+    def logs(self, one: LearnedRatios) -> Array:
+        """Logarithms of what a regressor has learned."""
+        return np.log(self.values[np.ix_(one.rows, one.modes)])
+
+    def level(self, one: LearnedRatios) -> Array:
+        """Their means."""
+        return np.average(self.logs(one), axis=0, weights=self.weights_of(one.rows))
+
+    def learned_by(self, regressor: BaseEstimator) -> tuple[LearnedRatios, ...]:
+        """Regressors of the modes, of which those that are there in the same rows are learned together.
+
+        Rows in which a mode is far from its median are left out.
+        """
+        usable = ~np.isnan(self.inputs).any(axis=1) & (True if self.weights is None else self.weights > 0)
+        logs = np.log(np.where(usable[:, np.newaxis], self.values, np.nan))
+        with np.errstate(invalid="ignore"):
+            far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
+        present, of_mode = patterns(~np.isnan(logs).T)
+        learned = []
+        for number, mask in enumerate(present):
+            modes = np.flatnonzero(of_mode == number)
+            rows = spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
+            learned.append(LearnedRatios(modes, rows, None).refitted(regressor, self, rows))
+        return tuple(one for one in learned if one.regressor is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedRatios:
     """A regressor of ratios, fitted to some ``modes`` that are there in the same rows; None where these are too few."""
 
     modes: NDArray[np.intp]
     rows: NDArray[np.intp]
     regressor: BaseEstimator
 
-    def refitted(
-        self, regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None, rows: NDArray[np.intp]
-    ) -> Ratios:
+    def refitted(self, regressor: BaseEstimator, ratios: Ratios, rows: NDArray[np.intp]) -> LearnedRatios:
         """The same modes learned from other rows."""
-        if len(rows) < FEWEST or not np.ptp(inputs[rows], axis=0).all():
+        inputs = ratios.inputs[rows]
+        if len(rows) < FEWEST or not np.ptp(inputs, axis=0).all():
             return replace(self, rows=rows, regressor=None)
-        values = ratios[np.ix_(rows, self.modes)]
+        values = ratios.values[np.ix_(rows, self.modes)]
         values = values[:, 0] if len(self.modes) == 1 else values
-        fitted = fit_outputs(regressor, inputs[rows], values, None if weights is None else weights[rows])
-        return replace(self, rows=rows, regressor=fitted)
+        return replace(self, rows=rows, regressor=fit_outputs(regressor, inputs, values, ratios.weights_of(rows)))
 
     def logs(self, inputs: Array) -> Array:
         """Logarithms of the ratios at complete inputs, (n_samples, n_modes)."""
         return np.log(as_columns(self.regressor.predict(inputs)))
-
-
-def ratios_of(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> tuple[Ratios, ...]:
-    """Regressors of the modes, of which those that are there in the same rows are learned together.
-
-    Rows in which a mode is far from its median are left out.
-    """
-    usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
-    logs = np.log(np.where(usable[:, np.newaxis], ratios, np.nan))
-    with np.errstate(invalid="ignore"):
-        far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
-    present, of_mode = patterns(~np.isnan(logs).T)
-    learned = []
-    for number, mask in enumerate(present):
-        modes = np.flatnonzero(of_mode == number)
-        rows = spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
-        learned.append(Ratios(modes, rows, None).refitted(regressor, inputs, ratios, weights, rows))
-    return tuple(one for one in learned if one.regressor is not None)
 
 
 def ratio_regressor() -> TemperatureMapper:
@@ -394,10 +395,15 @@ class ThermalModel(SavesFrames):
     mode_names: Sequence[Any]
     n_jobs: int | None
 
+    def learned(self, temperatures: Table) -> Array:
+        """What the mapper gives, without its warning of the weather, of which the chain says more."""
+        with reported_by_caller({"implausible-temperatures"}):
+            return as_columns(self.mapper.predict(temperatures))
+
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
-        warn_each(self._warnings(weather))
-        theta, impossible = possible(self.mapper.predict(weather.filled))
+        self._warn_of(weather)
+        theta, impossible = possible(self.learned(weather.filled))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
             warn_user(
@@ -409,25 +415,18 @@ class ThermalModel(SavesFrames):
             )
         return theta
 
-    def _warnings(self, weather: Weather) -> Iterator[SkthermoWarning]:
-        """Warnings about what is unusual about weather."""
+    def _warn_of(self, weather: Weather) -> None:
+        """Say what is unusual about weather."""
         filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
         consequence = "Standard deviations and intervals of predictions include the error of that"
         message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
-        if message:
-            yield RecordsWarning(message, "filled-temperatures")
-        message = unpredicted_text(unknown, as_floats(filled))
-        if message:
-            yield UnevaluatedRowsWarning(message, "not-predicted")
+        warn_user(message, RecordsWarning, "filled-temperatures")
+        warn_user(unpredicted_text(unknown, as_floats(filled)), UnevaluatedRowsWarning, "not-predicted")
         learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
-        message = learned.warning(inputs)
-        if message:
-            yield WeatherWarning(message, "outside-training-weather")
+        warn_user(learned.warning(inputs), WeatherWarning, "outside-training-weather")
         consequence = "Standard deviations and intervals include that uncertainty"
         warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
-        message = self.sensors.warning(weather.given)
-        if message:
-            yield RecordsWarning(message, "sensor-disagrees")
+        warn_user(self.sensors.warning(weather.given), RecordsWarning, "sensor-disagrees")
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
@@ -435,7 +434,7 @@ class ThermalModel(SavesFrames):
 
     def predicted(self, weather: Weather) -> Array:
         """Frequencies of the healthy structure, without warnings."""
-        theta = as_columns(self.mapper.predict(weather.filled))
+        theta = self.learned(weather.filled)
         return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
 
     def simulated(self, weather: Weather, modes: Sequence[int] | None = None, **changes: Any) -> Array:
@@ -464,7 +463,7 @@ class ThermalModel(SavesFrames):
         n_parameters = len(self.parameter_names)
 
         def predict(filled: Table) -> Array:
-            return np.hstack([as_columns(self.mapper.predict(filled)), self.discrepancy(filled)])
+            return np.hstack([self.learned(filled), self.discrepancy(filled)])
 
         def log_frequencies(both: Array) -> Array:
             return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
@@ -476,7 +475,7 @@ class ThermalModel(SavesFrames):
         """Covariances of ln f as the mapper states them; zero where it does not."""
         if not offers(self.mapper, "predict_covariance"):
             return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
-        theta = as_columns(self.mapper.predict(weather.filled))
+        theta = self.learned(weather.filled)
         return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
 
 
@@ -540,7 +539,8 @@ class StructureInWeather:
 
 def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n_jobs: int | None) -> Array:
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
-    return as_floats(aligner.inverse_transform(simulator.frequencies(possible(theta)[0], n_jobs, warn=False)))
+    frequencies = simulator.frequencies(possible(theta)[0], n_jobs, warn=False, n_rows=len(theta))
+    return as_floats(aligner.inverse_transform(frequencies))
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:

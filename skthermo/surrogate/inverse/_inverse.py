@@ -49,52 +49,46 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     model : FE model, optional
         Needed unless `fit` gets frequencies and parameters.
     regressor : regressor, optional
-        Any regressor. It learns the standardised logarithms of the parameters from those of the frequencies, a nearly
-        linear relation. A regressor of a single output is fitted once for each parameter. By default a small
-        ``MLPRegressor``; see `paper_network` for the paper's.
+        Learns the standardised logarithms of the parameters from those of the frequencies, a nearly linear relation;
+        one of a single output is fitted once for each parameter. By default a small ``MLPRegressor``; see
+        `paper_network` for the paper's.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
-        Box of multipliers: a half-width, lowest and highest multiplier of each parameter, or a mapping from each
-        parameter to its half-width or to (lowest, highest).
+        Box of multipliers: a half-width, or lowest and highest multiplier of each parameter, or a mapping from each
+        parameter to either.
     n_samples : int, default=1000
         Number of simulations.
     narrow_bounds : bool, default=False
-        Whether to simulate as many samples again, and learn from them alone, within the part of the bounds where the
-        records that `fit` sees have their parameters, by the first regressor. An inverse that is not refined becomes
-        more accurate there.
+        Whether to simulate as many samples again within the part of the bounds where the records that `fit` sees have
+        their parameters, and to learn from them alone. An inverse that is not refined becomes more accurate there.
     noise : "auto", float or array-like of shape (n_modes,), default="auto"
-        Relative standard deviation of Gaussian noise added to the simulated frequencies. With the noise of the
-        measurement, the regressor learns the posterior mean of the parameters, and refining finds the posterior mode.
-        With 0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode is missing). "auto" is estimated: by
-        a `DataInformedFEM` from temperatures and frequencies; without temperatures, from what the model leaves
+        Relative standard deviation of Gaussian noise added to the simulated frequencies: that of the measurement. With
+        0, frequencies count as exact (to 1e-6; to 0.1 % in rows where a mode is missing). "auto" is estimated: by a
+        `DataInformedFEM` from temperatures and frequencies; without temperatures, from what the model leaves
         unexplained of the records that `fit` sees, if estimates are refined and there are more modes than parameters;
         otherwise it is 0.
     dofs : array-like of int of shape (n_sensors,), or list of (node, direction), optional
         Degrees of freedom of the model where mode shapes are measured, by position, the first being 0, or by label, as
-        in ``model.dofs``. Rows of X are then the frequencies followed by the shapes' components at the sensors, mode by
-        mode: n_modes * (1 + n_sensors) columns. Components are real, of any scale and sign;
-        `~skthermo.fem.shape_components` makes them of complex shapes.
+        in ``model.dofs``. Rows of X are then the frequencies followed by the shapes' real components at the sensors
+        (`~skthermo.fem.shape_components`), mode by mode: n_modes * (1 + n_sensors) columns.
     shape_noise : float or array-like of shape (n_modes,), default=0.01
         Standard deviation of the measured components of a shape as a share of their root mean square.
     refine : int, optional
-        Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row,
-        until the model has the measured frequencies (or, with ``noise`` or ``dofs``, until the posterior is largest).
-        Rows with some modes missing are estimated from the others. By default 100 for a model that gives exact
-        derivatives (``linearised`` or ``jacobian``; with ``dofs``, ``linearised_modes``), else 0. With a number above
-        0, other models are differentiated by central differences: 2 n_parameters + 1 solutions a step and row.
+        Largest number of Levenberg-Marquardt steps on the FE model that improve the regressor's estimate of each row
+        (:doc:`/guide/estimation`). By default 100 for a model that gives exact derivatives (``linearised`` or
+        ``jacobian``; with ``dofs``, ``linearised_modes``), else 0. With a number above 0, other models are
+        differentiated by central differences: 2 n_parameters + 1 solutions a step and row.
     prior : float, array-like of shape (n_parameters,) or mapping, optional
         Standard deviations of a Gaussian prior of ln theta about the middle of the bounds, for refining. By default
         that of values spread evenly over the box.
     reduce : "auto", bool or float, default="auto"
         Whether to simulate and refine with the reduced model ``model.reduced(bounds)``, much faster for large models.
         "auto" reduces where ``model.reduction_pays`` and a basis is accurate. True allows a relative error of 1e-5 in
-        the frequencies, as "auto" does; a number sets the error allowed. The box of the reduced model is widened to
-        hold the parameters of the records that `fit` sees (at most three times the half-width of the bounds, in ln
-        theta). Rows that end outside it are solved by the full model, with a warning that counts them.
+        the frequencies, as "auto" does; a number sets the error allowed. Rows that end outside its box are solved by
+        the full model, with a warning that counts them (:doc:`/guide/costs`).
     memory : str or joblib.Memory, optional
         Folder for simulations, reduced model, regressor and inversion of the records that `fit` saw, so that searches
-        and cross-validation make each only once. Processes that need the same wait for the one that makes it; warnings
-        come again with what is read. With ``random_state=None``, what is stored is always the same. Clear the memory
-        when the program behind a model or a regressor of your own changes. See Notes.
+        and cross-validation make each only once (:doc:`/guide/costs`). With ``random_state=None``, what is stored is
+        always the same. Clear the memory when the program behind a model or a regressor of your own changes.
     n_jobs : int, optional
         Number of parallel jobs for the simulations.
     random_state : int, RandomState or None, default=None
@@ -113,10 +107,10 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     columns_ : InverseColumns
         How columns are read, named and computed.
     shape_inputs_, scores_ : ShapeInputs, ShapeScores
-        With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors), and
-        linear estimates that the regressor sees in place of the components of shapes.
+        With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors), and the
+        linear estimates that the regressor sees in place of them.
     simulator_ : Simulator
-        If there is a model: it and, where it is reduced, the reduced model of the steps.
+        If there is a model: it and, where it is reduced, its reduced model.
     refinement_, inversions_ : Refinement, Inversions
         If estimates are refined: the model, the box and the prior of the steps, and the inversions of the records of
         `fit`.
@@ -127,9 +121,8 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
     n_steps_ : int
         Largest number of steps that refine an estimate; 0 if estimates are not refined.
     scatter_ : ndarray of shape (n_modes,)
-        Relative standard deviations of the frequencies that those of estimates are based on, where they are refined:
-        ``noise_`` or, where it is 0, what the model leaves unexplained of the records of `fit`; 0.001 where that cannot
-        be estimated.
+        Relative standard deviations of the frequencies that those of refined estimates are based on: ``noise_`` or,
+        where it is 0, what the model leaves unexplained of the records of `fit`, or 0.001.
     n_parameters_, parameter_names_ : int, list of str or None
         Number of parameters, and their names: the model's, or those of the frame that `fit` saw.
     y_is_vector_ : bool
@@ -618,5 +611,4 @@ class InverseSurrogate(CallbackSupport, TransformerMixin, MultiplierRegressor):
         message = "" if self.box_ is None else self.box_.warning(theta, far, tested)
         if message and self.prior is not None:
             message += ", or a wider prior"
-        if message:
-            warn_user(message, ModelWarning, "outside-prior")
+        warn_user(message, ModelWarning, "outside-prior")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import combinations_with_replacement
 from math import comb
 from typing import Any, Self
@@ -238,9 +238,11 @@ class Rows:
             else:
                 mine[rows] = theirs
 
-    def beside(self, other: Self) -> Self:
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return type(self)(*(a.beside(b) if isinstance(a, Rows) else np.concatenate([a, b]) for a, b in pairs))
+    @classmethod
+    def together(cls, parts: Sequence[Self]) -> Self:
+        """The rows of all parts, one after the other."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(type(c[0]).together(c) if isinstance(c[0], Rows) else np.concatenate(c) for c in columns))
 
 
 @dataclass
@@ -322,41 +324,44 @@ class Refined(Rows):
 def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
 
-    Rows that stall where a model that sorts its modes has kinks start again beyond; rows with a large misfit, where two
-    modes exchange their shapes, start again at the estimate from frequencies alone.
+    Rows that stall where a model that sorts its modes has kinks start again beyond, and so do those with a misfit, if
+    two modes are exchanged there; rows with a large misfit, where two modes exchange their shapes, start again at the
+    estimate from frequencies alone.
     """
     found = minimise(objective, start, n_steps)
 
-    def again(chosen: NDArray[np.bool_], start_of: Callable[[NDArray[np.intp]], Array]) -> None:
-        rows = np.flatnonzero(chosen)
-        if not rows.size:
-            return
-        there = minimise(objective.of(rows), start_of(rows), n_steps)
+    def again(rows: NDArray[np.intp], start: Array | Local) -> None:
+        there = minimise(objective.of(rows), start, n_steps)
         there.solves += found.solves[rows]
         better = there.local.value < found.local.value[rows]
         found.solves[rows] = there.solves
         found.put(rows[better], there.of(better))
 
-    def doubtful(misfit: float) -> NDArray[np.bool_]:
-        return ~found.converged | (normalised_misfit(objective, found.local) > misfit)
+    def doubtful(misfit: float) -> NDArray[np.intp]:
+        return np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > misfit))
 
     for lower in range(objective.log_measured.shape[1] - 1 if sorts else 0):
-        is_close = np.abs(gap(objective, found.local, lower)) < CLOSE
-        exchanged = partial(across, objective, found.local, lower)
-        again(doubtful(SOME_MISFIT) & is_close, exchanged)
-    if sorts:
-        again(doubtful(LARGE_MISFIT), lambda rows: np.tile(objective.prior.mean, (len(rows), 1)))
-    if objective.n_sensors:
-        frequencies = objective.without_shapes()
-        again(doubtful(LARGE_MISFIT), lambda rows: minimise(frequencies.of(rows), start[rows], n_steps).local.x)
+        rows = doubtful(SOME_MISFIT)
+        rows = rows[np.abs(gap(objective.of(rows), found.local.of(rows), lower)) < CLOSE]
+        if rows.size:
+            here, some = found.local.of(rows), objective.of(rows)
+            beyond = some.at(across(some, here, lower))
+            goes_on = ~found.converged[rows] | exchanged(here, beyond, lower)
+            found.solves[rows[~goes_on]] += 1
+            if goes_on.any():
+                again(rows[goes_on], beyond.of(goes_on))
+    if sorts and (rows := doubtful(LARGE_MISFIT)).size:
+        again(rows, np.tile(objective.prior.mean, (len(rows), 1)))
+    if objective.n_sensors and (rows := doubtful(LARGE_MISFIT)).size:
+        again(rows, minimise(objective.without_shapes().of(rows), start[rows], n_steps).local.x)
     return found
 
 
-def minimise(objective: Objective, start: Array, n_steps: int) -> Refined:
-    """Levenberg-Marquardt steps from each start."""
-    found = objective.at(start.copy())
-    converged, damping = np.zeros(len(start), dtype=bool), np.zeros(len(start))
-    solves = np.ones(len(start), dtype=np.intp)
+def minimise(objective: Objective, start: Array | Local, n_steps: int) -> Refined:
+    """Levenberg-Marquardt steps from each start, ln theta or the objective there."""
+    found = start if isinstance(start, Local) else objective.at(start.copy())
+    converged, damping = np.zeros(len(found.x), dtype=bool), np.zeros(len(found.x))
+    solves = np.ones(len(found.x), dtype=np.intp)
     active = np.flatnonzero(np.isfinite(found.value))
     for remaining in range(n_steps, -1, -1):
         here, problem = found.of(active), objective.of(active)
@@ -403,12 +408,22 @@ def gap(objective: Objective, found: Local, lower: int) -> Array:
     return fitted[:, 1] - fitted[:, 0]
 
 
-def across(objective: Objective, found: Local, lower: int, rows: NDArray) -> Array:
-    """One Gauss-Newton step of rows that aims at the modes ``lower`` and ``lower + 1`` in exchanged order."""
-    order = np.arange(objective.log_measured.shape[1])
+def across(objective: Objective, found: Local, lower: int) -> Array:
+    """One Gauss-Newton step that aims at the measured modes ``lower`` and ``lower + 1`` in exchanged order."""
+    n_modes = objective.log_measured.shape[1]
+    order = np.arange(n_modes)
     order[[lower, lower + 1]] = order[[lower + 1, lower]]
-    here = objective.with_modes(order).of(rows).at(found.x[rows])
+    fitted = np.exp(objective.log_measured - found.residual[:, :n_modes]), found.sensitivity[:, :n_modes]
+    here = replace(objective.without_shapes().with_modes(order), linearise=lambda theta: fitted).at(found.x)
     return here.x + here.step(objective.prior, np.zeros(len(here.x)))
+
+
+def exchanged(before: Local, after: Local, lower: int) -> NDArray[np.bool_]:
+    """Whether the modes ``lower`` and ``lower + 1`` have each other's derivatives afterwards, as beyond a crossing."""
+    pair = slice(lower, lower + 2)
+    mine, others = before.sensitivity[:, pair], before.sensitivity[:, pair][:, ::-1]
+    same, other = (((after.sensitivity[:, pair] - one) ** 2).sum(axis=(1, 2)) for one in (mine, others))
+    return other < same
 
 
 SAMPLES_PER_TERM = 2  # least number of samples for each term of the polynomial
@@ -621,7 +636,7 @@ class Refinement:
         new = np.flatnonzero(place < 0)
         if new.size:
             place[new] = len(known_inputs) + np.arange(new.size)
-            found = found.beside(self._refine(objective.of(new), start[new]))
+            found = Refined.together([found, self._refine(objective.of(new), start[new])])
         return found.of(place)
 
     def _refine(self, objective: Objective, start: Array) -> Refined:
@@ -630,7 +645,7 @@ class Refinement:
         blocks = np.split(np.arange(len(start)), range(size, len(start), size))
         refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
         parts = with_progress(refined, len(start), None, count=lambda part: len(part.converged), unit="records")
-        return reduce(Refined.beside, parts)
+        return Refined.together([*parts])
 
     def _refine_block(self, objective: Objective, start: Array) -> Refined:
         """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""

@@ -10,6 +10,8 @@ from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
+from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning
 from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.preprocessing import LagFeatures
 from tests.fleet.prior.fleets import LAW, records
@@ -249,6 +251,18 @@ def test_a_vector_with_a_name_belongs_to_its_family(prior):
 def test_what_is_no_fleet_is_refused(bridges, message):
     with pytest.raises(ValueError, match=message):
         FleetPrior().fit(bridges)
+
+
+def test_impossible_weather_is_warned_of_once_also_within_a_compensator(prior):
+    T, F, _ = records(50, 60)
+    kelvin = T.assign(**{T.columns[0]: T.iloc[:, 0] + 273.15})
+    mapper = prior.mapper().fit(T, F)
+    with pytest.warns(RecordsWarning, match="in 60 of 60 rows.*implausible-temperatures"):
+        mapper.predict(kelvin)
+    held = TemperatureCompensator(prior.mapper(), targets=list(F.columns), cv="contiguous").fit(T.join(F))
+    with pytest.warns() as warned:
+        held.transform(kelvin.join(F))
+    assert [one.message.kind for one in warned].count("implausible-temperatures") == 1
 
 
 def test_inputs_have_the_names_of_the_fleet(prior):
