@@ -238,7 +238,12 @@ class Donors:
 
     def __init__(self, values: Array):
         self.values = values
-        self.patterns = rows_by_pattern(np.isnan(values))
+        missing = np.isnan(values)
+        self.patterns = rows_by_pattern(missing)
+        self._known = np.ascontiguousarray(~missing.T, dtype=float)
+        filled = np.where(missing, 0.0, values)
+        self._centre = filled.sum(axis=0) / np.maximum(self._known.sum(axis=1), 1)
+        self._filled = np.ascontiguousarray(np.where(missing, 0.0, values - self._centre).T)
 
     def mean(self, column: int) -> float:
         """Mean of a column, NaN ignored."""
@@ -259,7 +264,7 @@ class Donors:
         distances = np.full((len(receivers), n_neighbors), np.inf)
         rows = np.zeros((len(receivers), n_neighbors), dtype=np.intp)
         others = []
-        for shared, members in self._pools(observed, column):
+        for shared, members in self._pools(observed, column, len(receivers)):
             if len(receivers) * len(members) < PAIRS_PER_TREE:
                 others.append(members)
                 continue
@@ -276,15 +281,20 @@ class Donors:
                 _merge(distances, rows, block, found * scale, members[np.where(np.isinf(found), 0, at)])
         if others:
             members = np.concatenate(others)
-            pool, scale = self.values[np.ix_(members, observed)], np.sqrt(len(observed))
-            size = math.ceil(PAIRS_AT_ONCE / len(members))
+            scale, size = np.sqrt(len(observed)), math.ceil(PAIRS_AT_ONCE / len(members))
             for block in np.split(np.arange(len(receivers)), range(size, len(receivers), size)):
-                found, at = _nearest_of_all(receivers[np.ix_(block, observed)], pool, n_neighbors)
-                _merge(distances, rows, block, found * scale, members[at])
+                found, at = self._nearest_of_all(receivers[block], observed, members, n_neighbors)
+                _merge(distances, rows, block, found * scale, at)
         return distances, rows
 
-    def _pools(self, observed: Mask, column: int) -> Iterator[tuple[Mask, Rows]]:
-        """Donors that share the same columns with the receivers, as (columns, rows); largest pool first."""
+    def _pools(self, observed: Mask, column: int, n_receivers: int) -> Iterator[tuple[Mask, Rows]]:
+        """Donors that share the same columns with the receivers, as (columns, rows); largest pool first.
+
+        For few receivers all donors that share any column are one pool.
+        """
+        if n_receivers * len(self.values) < PAIRS_PER_TREE:
+            yield observed, np.flatnonzero(self._known[column] * self._known[observed].any(axis=0))
+            return
         pools: dict[bytes, tuple[Mask, list[Rows]]] = {}
         for missing, rows in self.patterns:
             shared = observed & ~missing
@@ -293,18 +303,18 @@ class Donors:
         joined = [(shared, np.concatenate(rows)) for shared, rows in pools.values()]
         yield from sorted(joined, key=lambda pool: -len(pool[1]))
 
-
-def _nearest_of_all(points: Array, pool: Array, n_neighbors: int) -> tuple[Array, Rows]:
-    """Root mean squares of the differences from the nearest rows of a pool, in the columns that these have, and their
-    positions."""
-    center = points.mean(axis=0)
-    known = ~np.isnan(pool)
-    points, pool = points - center, np.where(known, pool - center, 0.0)
-    squares = points**2 @ known.T - 2 * points @ pool.T + (pool**2).sum(axis=1)  # it loses digits, and only chooses
-    k = min(n_neighbors, len(pool))
-    at = np.argpartition(squares / known.sum(axis=1), k - 1, axis=1)[:, :k]
-    differences = np.where(known[at], points[:, np.newaxis] - pool[at], 0.0)
-    return np.sqrt((differences**2).sum(axis=-1) / known[at].sum(axis=-1)), at
+    def _nearest_of_all(self, receivers: Array, observed: Mask, members: Rows, n_neighbors: int) -> tuple[Array, Rows]:
+        """Root mean squares of the differences from the nearest of some rows, in the columns that both have, and these
+        rows."""
+        places = np.ix_(np.flatnonzero(observed), members)
+        known, pool = self._known[places], self._filled[places]
+        points = (receivers - self._centre)[:, observed]
+        n_known = known.sum(axis=0)
+        squares = points**2 @ known - 2 * points @ pool + (pool**2).sum(axis=0)  # it loses digits, and only chooses
+        k = min(n_neighbors, len(members))
+        at = np.argpartition(squares / n_known, k - 1, axis=1)[:, :k]
+        differences = known[:, at] * (points.T[:, :, np.newaxis] - pool[:, at])
+        return np.sqrt((differences**2).sum(axis=0) / n_known[at]), members[at]
 
 
 def _merge(distances: Array, rows: Rows, block: Rows, found: Array, found_rows: Rows) -> None:

@@ -264,8 +264,10 @@ def fleet(n_bridges):
 
 
 def by_dask(way):
+    import dask
     from dask.distributed import Client
 
+    dask.config.set({"distributed.admin.low-level-log-length": 10})  # messages, in which monitors travel
     with Client(n_workers=2, threads_per_worker=1, dashboard_address=None), joblib.parallel_config("dask"):
         return way()
 

@@ -239,7 +239,9 @@ def realisation(kind, seed, options):
                     row = {"model": name, "calibrated": calibrated, "band": band, "detector": key[0], "state": key[1]}
                     predicted_rate, truth = rates["simulated"][key], rates["reference"][key]
                     rows.append(row | {"rate": predicted_rate, "low": lowest, "high": highest, "truth": truth})
-    print(f"  {kind.__name__}, seed {seed}: {time.process_time() - began:.0f} s of one core", flush=True)
+    coldest = [f"{one.min().mean():.1f}" for one in (T, years["healthy"][0])]
+    spent = f"{time.process_time() - began:.0f} s of one core"
+    print(f"  {kind.__name__}, seed {seed}: coldest {coldest[0]} C, {coldest[1]} C when measured; {spent}", flush=True)
     return pd.DataFrame(rows).assign(seed=seed)
 
 

@@ -22,9 +22,10 @@ from skthermo.fem.affine._core import AffineCore
 from skthermo.fem.modal import GuidedSolver, ShiftInvertSolver, factorise, may_be_missed, pair_modes
 
 FIRST_SNAPSHOTS = 16
-UNGUIDED = 3  # snapshots, beside which all others start from the modes of a basis
+UNGUIDED = 2  # snapshots, beside which all others start from the modes of a basis
 SNAPSHOT_SHARE = 10.0  # largest error of an eigenvalue of a snapshot, as a share of the basis's tolerance
 CHECK_SHARE = 1e-2  # the same at a check point
+NEAR = 10  # estimated errors, in units of ``tol``, up to which a step towards the modes replaces them
 SNAPSHOTS_PER_ROUND = 12
 CANDIDATES_PER_ROUND = 64
 CHECK_POINTS = 20
@@ -57,42 +58,51 @@ class Directions(NamedTuple):
 def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
-    """Add modes at the points of largest estimated error until estimate and true error at new points are small."""
+    """Add modes at the points of largest estimated error until estimate and true error at new points are small.
+
+    Once errors are small, the full model is not solved at such a point: instead of a mode, K_0^-1 r is added, the
+    direction in which a step of preconditioned conjugate gradients would correct it.
+    """
     own_seed = as_random_state(random_state).randint(2**32, size=8, dtype=np.uint32)
     random = np.random.RandomState(own_seed)  # other points than those of a sample with the same seed
     nominal = nominal_theta(len(bounds))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     factors = factorise(stiffness)
     if start is None:
-        points = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
-        used, snapshots, points = [points], snapshots_at(full, points[:UNGUIDED]), points[UNGUIDED:]
+        used = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
+        start, points = snapshots_at(full, used[:UNGUIDED]), used[UNGUIDED:]
     else:
-        used, snapshots, points = [nominal[:0]], start, nominal[:0]
-    directions = principal_directions(of_unit_energy(snapshots, stiffness), stiffness, LEAST_SHARE * tol)
+        used = points = nominal[:0]
+    directions = principal_directions(of_unit_energy(start, stiffness), stiffness, LEAST_SHARE * tol)
     vectors, core = basis_of(directions, full, tol)
+    new = of_unit_energy(snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points), stiffness)
     largest: list[float] = []
     for _ in range(MAX_ROUNDS):
-        if len(points):
-            snapshots = snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points)
+        if new.shape[1]:
             known = directions.vectors * np.sqrt(directions.energies)
-            known_and_new = np.hstack([known, of_unit_energy(snapshots, stiffness)])
-            directions = principal_directions(known_and_new, stiffness, LEAST_SHARE * tol)
+            directions = principal_directions(np.hstack([known, new]), stiffness, LEAST_SHARE * tol)
             vectors, core = basis_of(directions, full, tol)
         for candidates in drawn(bounds, random, CANDIDATES_PER_ROUND)[::-1]:  # errors are largest at corners
-            errors = estimated_errors(full, core, vectors, candidates, factors)
+            estimates, steps = estimated_errors(full, core, vectors, candidates, factors)
+            errors, is_near = estimates.max(axis=1), estimates.max() < NEAR * tol
             if errors.max() >= tol / 2:
                 break
         else:
-            candidates = without(np.vstack(drawn(bounds, random, CHECK_POINTS)), np.vstack(used))
+            candidates, is_near = without(np.vstack(drawn(bounds, random, CHECK_POINTS)), used), False
             errors = true_errors(guided(full, core, vectors, CHECK_SHARE * tol), core, candidates)
             if errors.max() < tol / 2:
-                return Basis(vectors, core, float(errors.max()), candidates, np.vstack(used))
+                return Basis(vectors, core, float(errors.max()), candidates, used)
         largest.append(float(errors.max()))
         before = largest[-1 - HOPELESS_ROUNDS] if len(largest) > HOPELESS_ROUNDS else np.inf
         if largest[-1] > max(before / 2, HOPELESS * tol):
             break
-        points = candidates[np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]]
-        used.append(points)
+        worst = np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]
+        used = np.vstack([used, candidates[worst]])
+        if is_near:
+            new = np.hstack([steps[row][:, estimates[row] >= tol / 4] for row in worst])
+        else:
+            snapshots = snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), candidates[worst])
+            new = of_unit_energy(snapshots, stiffness)
     raise RuntimeError(
         f"after {len(largest)} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
         "larger tol, or narrower bounds"
@@ -141,17 +151,20 @@ def snapshots_at(full: AffineCore, theta: Array) -> Array:
     return side_by_side[:, np.isfinite(side_by_side).all(axis=0)]
 
 
-def estimated_errors(full: AffineCore, core: AffineCore, vectors: Array, theta: Array, factors: SuperLU) -> Array:
-    """Largest r' K_0^-1 r / (2 lambda) over the modes of every row."""
-    errors = []
+def estimated_errors(
+    full: AffineCore, core: AffineCore, vectors: Array, theta: Array, factors: SuperLU
+) -> tuple[Array, list[Array]]:
+    """r' K_0^-1 r / (2 lambda) of the modes of every row, (n_samples, n_modes), and K_0^-1 r / sqrt(lambda)."""
+    errors, steps = [], []
     for rows in np.split(theta, range(full.rows_per_chunk, len(theta), full.rows_per_chunk)):
         frequencies, shapes = core.modes(rows)
         eigenvalues, phi = (2 * np.pi * frequencies) ** 2, vectors @ shapes
         inertia = eigenvalues[:, np.newaxis] * full.mass.product(rows, phi)
         residuals = full.stiffness.product(rows, phi) - inertia
-        norms = [np.einsum("im,im->m", residual, factors.solve(residual)) for residual in residuals]
-        errors.append((np.array(norms) / (2 * eigenvalues)).max(axis=1))
-    return np.nan_to_num(np.concatenate(errors))
+        parts = [factors.solve(residual) for residual in residuals]
+        errors.append(np.einsum("sim,sim->sm", residuals, parts) / (2 * eigenvalues))
+        steps += [part / np.sqrt(squares) for part, squares in zip(parts, eigenvalues, strict=True)]
+    return np.nan_to_num(np.concatenate(errors)), steps
 
 
 def true_errors(full: AffineCore, core: AffineCore, theta: Array) -> Array:
@@ -204,7 +217,7 @@ class ReducedModel(AffineBase):
         Theta at which the full model was solved to compute ``error_``: ten or more uniform in the box, and up to
         ten of its corners, none of them a snapshot point.
     snapshot_points_ : ndarray of shape (n_snapshots, n_parameters)
-        Theta whose modes span the basis.
+        Theta whose modes, or steps towards them, span the basis.
 
     Raises
     ------

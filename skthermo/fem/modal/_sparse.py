@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
 from skthermo.fem._factors import Factors
-from skthermo.fem._terms import SparseTerms, nominal_theta
+from skthermo.fem._terms import SparseTerms
 from skthermo.fem.modal._dense import EigenSolver
 
 MAX_STEPS = 6
-FURTHER, RANDOM_COLUMNS, RANDOM_STEPS = 2, 2, 3
+RANDOM_COLUMNS, RANDOM_STEPS = 2, 3
 CLUSTER = 0.01  # relative distance of eigenvalues that are evaluated together
 DEPENDENT = 1e-14  # share of modal mass below which a direction is rounding error
 
@@ -23,37 +23,34 @@ def modes_near(
     factors: Factors,
     mass: scipy.sparse.csc_array,
     guesses: Array,
-    reference: Array,
     n_modes: int,
     *,
     tol: float,
 ) -> tuple[Array, Array] | None:
     """Eigenvalues in ascending order and shapes of unit modal mass, or None where few steps do not find them.
 
-    Rayleigh-Ritz of A = K^-1 M, in the inner product of M, on the guesses, two more of the best directions that they
-    and the modes of a reference state span, two columns that a few steps of inverse iteration make of random ones, and
-    the images of all these by A. A mode that the guesses lack shows among the others. A residual r of unit modal mass
-    says that an eigenvalue of A lies within |r|, and bounds the error of a converged one by |r|^2 over the distance to
-    the next (Kato and Temple). The modes are found once this is below ``tol`` for all that may be among the lowest.
+    Rayleigh-Ritz of A = K^-1 M, in the inner product of M, on the guesses, two columns that a few steps of inverse
+    iteration make of random ones, and the images of all these by A. A mode that the guesses lack shows among the
+    others. A residual r of unit modal mass says that an eigenvalue of A lies within |r|, and bounds the error of a
+    converged one by |r|^2 over the distance to the next (Kato and Temple). The modes are found once this is below
+    ``tol`` for all that may be among the lowest.
     """
-    columns = np.hstack([guesses, reference])
-    if not np.isfinite(columns).all():
+    if not np.isfinite(guesses).all():
         return None
-    nothing = columns[:, :0]
-    known = orthonormal(columns, mass, nothing, nothing)[0]
-    lowest = known @ np.linalg.eigh(known.T @ (stiffness @ known))[1][:, : guesses.shape[1] + FURTHER]
+    nothing = guesses[:, :0]
+    known = orthonormal(guesses, mass, nothing, nothing)
     random = np.random.default_rng(0).standard_normal((len(guesses), RANDOM_COLUMNS))
     for _ in range(RANDOM_STEPS):  # towards the lowest modes beside those
-        random = factors.solve(orthonormal(random, mass, lowest, mass @ lowest)[1])
-    columns = np.hstack([lowest, random])
-    basis, weighted = orthonormal(columns, mass, nothing, nothing)
+        random = factors.solve(orthonormal(random, mass, *known)[1])
+    basis, weighted = (np.hstack(both) for both in zip(known, orthonormal(random, mass, *known), strict=True))
+    n_followed = basis.shape[1]
     images, block = nothing, weighted
     for _ in range(MAX_STEPS):
         if not block.shape[1] or basis.shape[1] < n_modes:
             return None
         images = np.hstack([images, factors.solve(block)])
         values, weights = np.linalg.eigh(weighted.T @ images)
-        values, weights = values[::-1][: columns.shape[1]], weights[:, ::-1][:, : columns.shape[1]]
+        values, weights = values[::-1][:n_followed], weights[:, ::-1][:, :n_followed]
         vectors = images @ weights
         residuals = vectors - basis @ (weights * values)
         distances = np.sqrt(np.einsum("im,im->m", residuals, mass @ residuals))
@@ -105,10 +102,6 @@ class ShiftInvertSolver:
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)
         self._factorise = stiffness.pattern.elimination.factorise
-        self._references: dict[int, Array] = {}
-
-    def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"_references": {}}  # what was solved before is no part of a model
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
         return self._each(theta, n_modes, with_shapes=False)[0]
@@ -122,8 +115,6 @@ class ShiftInvertSolver:
         Guesses (n_samples, n_dof, n_guesses) are for at least as many modes; rows that they do not help are solved as
         by ``modes``.
         """
-        if n_modes not in self._references:
-            self._references[n_modes] = self.modes(nominal_theta(theta.shape[1]), n_modes)[1][0]
         return self._each(theta, n_modes, with_shapes=True, guesses=guesses, tol=tol)
 
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
@@ -138,7 +129,7 @@ class ShiftInvertSolver:
         for row, (stiffness, mass) in enumerate(pairs):
             factors, found = self._factorise(stiffness), None
             if factors is not None and guesses is not None:
-                found = modes_near(stiffness, factors, mass, guesses[row], self._references[n_modes], n_modes, tol=tol)
+                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=tol)
             if found is None:
                 found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
             eigenvalues[row] = found[0]
@@ -166,7 +157,7 @@ class GuidedSolver:
         return self.modes(theta, n_modes)[0]
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        n_guesses = min(n_modes + GUARD_VECTORS, self._basis.shape[1])
+        n_guesses = min(n_modes + 2 * GUARD_VECTORS, self._basis.shape[1])
         if n_guesses < n_modes:
             return self._full.modes(theta, n_modes)
         guesses = self._basis @ self._reduced.modes(theta, n_guesses)[1]
