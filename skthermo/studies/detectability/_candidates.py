@@ -241,9 +241,12 @@ class Candidate:
         """Whether the last step evaluates each record by itself, as a `DamageDetector` without ``lookback_`` does."""
         return isinstance(self.last, DamageDetector) and self.memory == 1 and not hasattr(self.last, "lookback_")
 
-    def decisions(self, entering: Sequence[Table]) -> list[Array]:
+    def decisions(self, entering: Sequence[Table], indices: Sequence[pd.Series] | None = None) -> list[Array]:
         """Decision function of each of some tables, NaN where there is none; float32 is as much as alarms and intervals
-        need."""
+        need. They follow from known damage indices where the detector's decisions are those of `DamageDetector`."""
+        follow = getattr(type(self.last), "decision_function", None) is DamageDetector.decision_function
+        if indices is not None and follow:
+            return [np.asarray(-index.to_numpy() - self.last.offset_, dtype=np.float32) for index in indices]
         return self._each(self.last.decision_function, entering, np.float32)
 
     def damage_indices(self, entering: Sequence[Table], rows: Sequence[Table]) -> list[pd.Series]:

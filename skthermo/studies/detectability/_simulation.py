@@ -222,10 +222,15 @@ class Records:
         return self._known[candidate.head]
 
     def seen_by(self, candidate: Candidate) -> Table:
-        """The columns that a detector sees."""
-        if self.source == SIMULATED:
-            return candidate.view.table(self.T, self.values)
-        return candidate.view.reference(self.values, self.T, self.scenario.name)
+        """The columns that a detector sees, in one table for all that see the same."""
+        view = candidate.view
+        seen = (*view.positions, view.is_frame)
+        if seen not in self._known:
+            if self.source == SIMULATED:
+                self._known[seen] = view.table(self.T, self.values)
+            else:
+                self._known[seen] = view.reference(self.values, self.T, self.scenario.name)
+        return self._known[seen]
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,9 +404,9 @@ class Simulation:
                     if one.has_onsets:
                         seen = one.beginning(memory).entering(candidate)
                         during[number] = transitions_of(candidate.decisions([seen])[0], memory)
-        rows = [one.rows for one in records]
-        found = candidate.damage_indices(entering, rows) if with_indices else during
-        return list(zip(found, candidate.decisions(entering), during, strict=True))
+        found = candidate.damage_indices(entering, [one.rows for one in records]) if with_indices else None
+        decisions = candidate.decisions(entering, found)
+        return list(zip(found or during, decisions, during, strict=True))
 
     def _calibrated(self, found: Evaluation, repeats: Sequence[Repeat]) -> Evaluation:
         """The evaluation with decisions on healthy records with noise of other seeds."""
