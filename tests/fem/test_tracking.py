@@ -79,6 +79,21 @@ def test_following_a_mode_among_few_candidates_finds_the_same_as_among_all_modes
     np.testing.assert_allclose(followed.frequencies(theta), expected, rtol=1e-9)
 
 
+def test_a_mode_is_followed_among_few_candidates_where_the_mass_changes():
+    """With another mass, the MACs of a reference with all modes may add up to more than 1."""
+    random = np.random.default_rng(0)
+    roots = random.standard_normal((2, 8, 8))
+    stiffness = {("own",): np.diag(np.r_[1.0, np.zeros(7)]), ("others",): np.diag(2 * np.arange(8.0))}
+    mass = {("near",): roots[0] @ roots[0].T, ("far",): roots[1] @ roots[1].T}
+    theta = random.uniform([0.5, 0.8, 0.4, 0.4], [20, 1.25, 2.5, 2.5], (2000, 4))
+    frequencies, shapes = AffineModel(stiffness, mass, n_modes=8).modes(theta)
+    followed = AffineModel(stiffness, mass, n_modes=1, track=True)
+    macs = followed.nominal_mac(shapes)[:, 0]
+    assert (macs.sum(axis=1) > 1.2).any()
+    expected = np.take_along_axis(frequencies, macs.argmax(axis=1)[:, np.newaxis], axis=1)
+    np.testing.assert_allclose(followed.frequencies(theta), expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("repeated", [np.eye(3, dtype=bool), repeated_modes(np.array([1.0, 4.0, 4.0]))])
 def test_a_single_mode_beyond_the_candidates_is_missed_if_it_has_a_higher_mac_than_one_assigned(repeated):
     """Four orthogonal modes, three of them candidates: what is left of the MACs is the fourth mode's."""

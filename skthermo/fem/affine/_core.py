@@ -63,6 +63,12 @@ class NominalModes:
         masses = mass.quadratic_forms(shapes) @ self.mass_coefficients
         return (self.weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
+    def mass_spread(self, theta: Array, mass: AffineTerms) -> Array:
+        """Ratio of the largest to the smallest factor by which terms of the nominal mass are multiplied, (n_samples,)."""
+        kept = self.mass_coefficients != 0
+        factors = mass.coefficients(theta)[:, kept] / self.mass_coefficients[kept]
+        return factors.max(axis=1) / factors.min(axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class AffineCore:
@@ -264,6 +270,10 @@ class AffineCore:
         """Mass-weighted MAC of the nominal modes with shapes, (n_samples, n_modes, n_candidates)."""
         return self.nominal.mac(shapes, self.mass)
 
+    def may_be_missed(self, theta: Array, mac: Array, order: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Rows in which a mode beyond the candidates could be closer to a nominal mode than the one assigned."""
+        return may_be_missed(mac, order, self.nominal.repeated, self.nominal.mass_spread(theta, self.mass))
+
     def local_modes(self, row: Array, *, follow: bool, basis: Array | None = None) -> LocalModes:
         """The lowest modes at one row of theta; with ``follow``, enough of them to hold every nominal mode."""
         n_candidates = self.first_candidates
@@ -271,7 +281,7 @@ class AffineCore:
             eigenvalues, shapes, solve = self.solver.local_modes(row, n_candidates)
             mac = self.nominal_mac(shapes[np.newaxis])
             ranks = pair_modes(mac, self.nominal.repeated)
-            doubtful = follow and may_be_missed(mac, ranks, self.nominal.repeated)[0]
+            doubtful = follow and self.may_be_missed(row, mac, ranks)[0]
             if not doubtful or n_candidates == self.max_candidates:
                 break
             n_candidates = min(2 * n_candidates, self.max_candidates)
@@ -291,13 +301,13 @@ class AffineCore:
         """Nominal modes found among the lowest candidates, or among more candidates where the match is uncertain."""
         eigenvalues, candidates = self.solver.modes(theta, n_candidates)
         mac = self.nominal_mac(candidates)
-        order = pair_modes(mac, self.nominal.repeated)
+        order, spread = pair_modes(mac, self.nominal.repeated), self.nominal.mass_spread(theta, self.mass)
         frequencies = np.take_along_axis(hertz(eigenvalues), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
         if n_candidates < self.first_candidates:
-            doubtful, more = may_differ(mac, order, self.nominal.repeated), self.first_candidates
+            doubtful, more = may_differ(mac, order, self.nominal.repeated, spread), self.first_candidates
         else:
-            doubtful, more = may_be_missed(mac, order, self.nominal.repeated), 2 * n_candidates
+            doubtful, more = may_be_missed(mac, order, self.nominal.repeated, spread), 2 * n_candidates
         if n_candidates < self.max_candidates and doubtful.any():
             more = min(more, self.max_candidates)
             frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], more)

@@ -19,7 +19,7 @@ from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import nominal_theta
 from skthermo.fem.affine._base import AffineBase, Change, Groups, Names
 from skthermo.fem.affine._core import AffineCore
-from skthermo.fem.modal import GuidedSolver, ShiftInvertSolver, factorise, may_be_missed, pair_modes
+from skthermo.fem.modal import GuidedSolver, ShiftInvertSolver, factorise, pair_modes
 
 FIRST_SNAPSHOTS = 16
 UNGUIDED = 2  # snapshots, beside which all others start from the modes of a basis
@@ -145,7 +145,7 @@ def snapshots_at(full: AffineCore, theta: Array) -> Array:
         if not full.track or n_candidates == full.max_candidates:
             break
         mac = full.nominal_mac(candidates)
-        rows = rows[may_be_missed(mac, pair_modes(mac, full.nominal.repeated), full.nominal.repeated)]
+        rows = rows[full.may_be_missed(rows, mac, pair_modes(mac, full.nominal.repeated))]
         n_candidates = min(2 * n_candidates, full.max_candidates)
     side_by_side = np.hstack(shapes)
     return side_by_side[:, np.isfinite(side_by_side).all(axis=0)]

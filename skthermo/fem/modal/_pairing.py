@@ -107,26 +107,32 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
     return best
 
 
-def may_be_missed(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def may_be_missed(
+    mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_], spread: ArrayLike = 1.0
+) -> NDArray[np.bool_]:
     """Samples in which a mode beyond the candidates could have a higher MAC with a reference than the one assigned.
 
     Modes are orthogonal, so the MACs of a reference with all modes add up to 1 (with repeated references, to their
-    number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum.
+    number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum. Where the
+    mass M is not the M_0 of the references, but a M_0 <= M <= b M_0, the sum is at most the ``spread`` b / a: squares
+    (phi_0' M_0 phi)^2 add up to phi_0' M_0 M^-1 M_0 phi_0 <= 1 / a, and phi' M_0 phi >= 1 / b.
     """
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
-    left = repeated.sum(axis=1) - spans.sum(axis=2)
+    left = np.multiply.outer(spread, repeated.sum(axis=1)) - spans.sum(axis=2)
     return (assigned < left).any(axis=1)
 
 
-def may_differ(mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def may_differ(
+    mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_], spread: ArrayLike = 1.0
+) -> NDArray[np.bool_]:
     """Samples in which the assignment could be another one if more candidates were examined.
 
     It is final where every reference is assigned its best candidate, which no mode beyond these can surpass.
     """
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
-    return (assigned < spans.max(axis=2)).any(axis=1) | may_be_missed(mac, order, repeated)
+    return (assigned < spans.max(axis=2)).any(axis=1) | may_be_missed(mac, order, repeated, spread)
 
 
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -136,7 +142,7 @@ def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 SAME_MODE = 0.5
-"""MAC above which no other mode can have a higher one with the same reference: its MACs with all modes add up to 1."""
+"""MAC above which no other mode has a higher one with the same reference: with the nominal mass, its MACs add up to 1."""
 
 ROWS_AT_ONCE = 64  # samples whose shapes, at all degrees of freedom, are held at once
 
