@@ -64,7 +64,7 @@ class NominalModes:
         return (self.weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
     def mass_spread(self, theta: Array, mass: AffineTerms) -> Array:
-        """Ratio of the largest to the smallest factor by which terms of the nominal mass are multiplied, (n_samples,)."""
+        """Ratio of the largest to the smallest factor of the terms of the nominal mass, (n_samples,)."""
         kept = self.mass_coefficients != 0
         factors = mass.coefficients(theta)[:, kept] / self.mass_coefficients[kept]
         return factors.max(axis=1) / factors.min(axis=1)

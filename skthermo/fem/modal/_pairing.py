@@ -142,7 +142,7 @@ def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 SAME_MODE = 0.5
-"""MAC above which no other mode has a higher one with the same reference: with the nominal mass, its MACs add up to 1."""
+"""MAC above which no other mode has a higher one with the same reference: its MACs add up to 1 with its mass."""
 
 ROWS_AT_ONCE = 64  # samples whose shapes, at all degrees of freedom, are held at once
 
