@@ -1701,7 +1701,7 @@ WARNED_OF = [
     ),
     ("WindowedAlarm", "few windows", lambda: WindowedAlarm(2).fit(F[:40]), "49"),
     ("TemperatureCompensator", "kelvin", lambda: LINES.fit((T + 273.15).join(F)), "kelvin"),
-    ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "above 150"),
+    ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "implausible"),
     ("TemperatureCompensator", "hot", lambda: WHITENER.transform((T + 60).join(F)), "outside-training-weather"),
     ("ModelUpdater", "rad/s", lambda: updated(NOMINAL * 2 * np.pi), "rad/s"),
     ("ModelUpdater", "far off", lambda: updated(NOMINAL * 1.5), "15 %"),

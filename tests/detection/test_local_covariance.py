@@ -105,7 +105,7 @@ def test_what_is_kept_of_searches_is_bounded(monkeypatch):
         wanted = places[:8] + first
         for _ in range(2):
             np.testing.assert_array_equal(searched.of(wanted)[1], nearest(places, wanted, 5)[1])
-    assert searched._kept.near.size == 40
+    assert searched._kept[1].size == 40
 
 
 @pytest.mark.parametrize("number", [1, 7, 200])

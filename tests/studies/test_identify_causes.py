@@ -147,7 +147,7 @@ def test_factors_and_their_slopes():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"stiffening": ["deck"]}, r"stiffening names the groups \['deck'\]; expected some of"),
+        ({"stiffening": ["deck"]}, r"stiffening names \['deck'\]; expected some of"),
         ({"parameters": ["E_deck"]}, r"parameters names \['E_deck'\]; expected some of"),
         ({"parameters": True}, "parameters is True; expected a list of names"),
         ({"added_mass": ASPHALT}, "expected a mapping of name to masses in kg"),

@@ -11,7 +11,7 @@ from scipy import stats
 from skthermo._effects import healthy_frequencies
 from skthermo._tables.arrays import Array, check_noise, means_of_known, median, robust_deviation
 from skthermo._tables.frames import has_stamps, row_times
-from skthermo.residuals.scatter import PSEUDO_RECORDS
+from skthermo.residuals.scatter import PSEUDO_RECORDS, Scatter
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it
@@ -93,7 +93,7 @@ def stated_deviations(noise: Any, n_modes: int, *, what: str, **options: Any) ->
     """Standard deviations above 0 as they are stated; None where they are fitted."""
     if isinstance(noise, str):
         if noise != "fitted":
-            raise ValueError(f'{what} is {noise!r}; expected "fitted" or standard deviations')
+            raise ValueError(f'{what} is {noise!r}; expected "fitted" or relative standard deviations')
         return None
     deviations = check_noise(noise, n_modes, what=what, **options)
     if (deviations == 0).any():
@@ -103,9 +103,9 @@ def stated_deviations(noise: Any, n_modes: int, *, what: str, **options: Any) ->
 
 def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
     """How records scatter: as in training, or as stated."""
-    names = fem.mode_names_
+    names, residuals = fem.mode_names_, fem.residuals()
     deviations = stated_deviations(noise, len(names), what="noise", mode_names=names)
-    return fem.residuals().scatter if deviations is None else fem.residuals().independent_scatter(deviations)
+    return residuals.scatter if deviations is None else Scatter.independent(deviations, len(residuals.values))
 
 
 def _places(trained: Any, T: Any) -> tuple[NDArray[np.intp], Array]:
