@@ -55,7 +55,7 @@ class WeatherCovariance:
     def at(self, weather: Array, overall: Array) -> Array:
         """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
         distances, near = self._searched.of(self.coordinates.transform(weather))
-        return self.floored(self.covariances[near[:, 0]], weather, distances.mean(axis=1), overall)
+        return self.floored(self.covariances[near[:, 0]], weather, distances, overall)
 
     @cached_property
     def _searched(self) -> NearestPlaces:

@@ -26,7 +26,7 @@ EXPLAINED = 0.99  # share of the variance of the weather that its coordinates ke
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
 SPARE = 1.25  # so many times as many places are searched at once for all columns with gaps
 LEAST_SHARE = 1 / 3  # of the places, for which a column with gaps is searched with the others
-MOST_KEPT = 4_000_000  # distances to nearest places that are kept, and as many positions
+MOST_KEPT = 16_000_000  # positions of nearest places that are kept, of 4 bytes
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
 MOST_LEARNED = 20_000  # records that show how sensors go together as well as more of them would
@@ -386,7 +386,7 @@ def weather_coordinates(weather: Array) -> Pipeline:
 class NearestPlaces:
     """Places, of which a number is nearest to each wanted one; no wanted place is searched for twice.
 
-    Results are kept up to `MOST_KEPT` numbers, those asked for first. Copies, saved ones too, begin with none.
+    Results are kept up to `MOST_KEPT` positions, those asked for first. Copies, saved ones too, begin with none.
     """
 
     def __init__(self, places: Array, number: int) -> None:
@@ -398,29 +398,33 @@ class NearestPlaces:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        empty = np.empty((0, self.number))
-        self._kept = _row_keys(self.places[:0]), empty, empty.astype(np.intp)  # in order; distances and positions
+        nowhere = np.empty((0, self.number), dtype=np.int32)
+        self._kept = _row_keys(self.places[:0]), np.empty(0), nowhere  # in order; mean distances and positions
 
     @cached_property
     def _tree(self) -> NearestNeighbors:
         return NearestNeighbors(n_neighbors=self.number).fit(self.places)
 
-    def of(self, wanted: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
+    def of(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
+        """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
+        (n_wanted, number)."""
         keys, found = _row_keys(wanted), self._kept
         at = np.searchsorted(found[0], keys)
         new = np.append(found[0], keys[:1])[at] != keys
         new |= at == len(found[0])
         if new.any():
-            rows = wanted[new]
-            searched = zip(*(self._tree.kneighbors(rows[part]) for part in parts(len(rows), self.number)), strict=True)
+            searched = zip(*(self._searched(wanted[new][part]) for part in parts(new.sum(), self.number)), strict=True)
             both = zip(found, ([keys[new]], *searched), strict=True)
             joined = [np.concatenate([before, *more]) for before, more in both]
             first = np.unique(joined[0], return_index=True)[1]
             found = tuple(part[first] for part in joined)
             at = np.searchsorted(found[0], keys)
-            self._kept = found if found[1].size <= MOST_KEPT else self._kept
+            self._kept = found if found[2].size <= MOST_KEPT else self._kept
         return found[1][at], found[2][at]
+
+    def _searched(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
+        distances, near = self._tree.kneighbors(wanted)
+        return distances.mean(axis=1), near.astype(np.int32)
 
 
 def _row_keys(rows: Array) -> NDArray[np.void]:
@@ -429,8 +433,13 @@ def _row_keys(rows: Array) -> NDArray[np.void]:
 
 
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
-    """Distances and positions of the places nearest to each wanted one."""
-    return NearestPlaces(places, number).of(wanted)
+    """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
+    none = np.empty((0, min(number, len(places))))
+    found = [part[1:] for part in nearest_in_parts(places, wanted, number)]
+    distances, near = (
+        np.concatenate(all_parts) for all_parts in zip((none, none.astype(np.intp)), *found, strict=True)
+    )
+    return distances, near
 
 
 def nearest_in_parts(
