@@ -49,8 +49,9 @@ paper = pd.DataFrame(PAPER_A3, index=MODES).T
 both = pd.concat({"paper, Table A.3": paper, "here": found["exact"]}, axis=1).swaplevel(axis=1)
 fig, axes = plt.subplots(1, len(MODES), figsize=(12, 7), sharex=True, sharey=True, layout="constrained")
 for ax, mode in zip(axes, MODES, strict=True):
-    both[mode].plot.barh(ax=ax, title=mode, legend=mode == MODES[0], xlabel="sensitivity, eq. (A.1)")
+    both[mode].plot.barh(ax=ax, title=mode, legend=False, xlabel="sensitivity, eq. (A.1)")
 axes[0].invert_yaxis()
+fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
 
 # %%
 # Three fits
