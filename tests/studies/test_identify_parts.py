@@ -6,7 +6,9 @@ import pytest
 from skthermo._effects import read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.residuals.weather import WeatherFunctions
+from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._curves import Part, ShiftComparison
+from skthermo.studies.identification._posterior import Explanation, Posterior
 from skthermo.studies.identification._separability import cosines, errors_alone, indistinguishable_groups
 from skthermo.studies.identification._shift import measured_shift, outlying, record_shifts
 
@@ -118,3 +120,13 @@ def test_records_far_from_the_others():
     shifts[::2, 0] += 0.5  # two states: neither is an outlier
     assert not outlying(shifts[:, :1], deviations[:1]).any()
     np.testing.assert_array_equal(outlying(shifts[::-1], deviations)[::-1], outlying(shifts, deviations))
+
+
+def test_no_probability_is_above_1():
+    random = np.random.default_rng(0)
+    for n_draws in range(1, 200):
+        shares = random.dirichlet(np.ones(5))
+        draws = random.random((n_draws, 1))
+        found = Posterior([Explanation(("a",), float(share), draws, np.zeros(1), 0.0) for share in shares])
+        assert found.table([Cause("a")])["probability"].item() == pytest.approx(1)
+        assert max(found.table([Cause("a")])["probability"].item(), found.probability_of("a")) <= 1

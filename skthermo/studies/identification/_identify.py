@@ -261,7 +261,7 @@ def findings(
         shifts=_shift_table(shift, posterior.explained(), factor),
         rest=max(1 - sum(one.probability for one in listed), 0.0),
         most_probable=best.causes,
-        probability_of_damage=1 - sum(one.probability for one in posterior.explanations if not one.causes),
+        probability_of_damage=1 - min(sum(one.probability for one in posterior.explanations if not one.causes), 1.0),
         probability_other=posterior.probability_of(SOMETHING_ELSE),
         probability_even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
         similarity=pd.DataFrame(cosines(at_nominal), names, names),

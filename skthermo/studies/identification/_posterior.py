@@ -63,7 +63,7 @@ class Posterior:
         for place, (weight, term) in enumerate(zip(weights, terms, strict=True)):
             for errors, more in ((alone, ()), (beside, (SOMETHING_ELSE,))):
                 logs = term[errors] - everything
-                probability = float(np.exp(logsumexp(logs)))
+                probability = min(float(np.exp(logsumexp(logs))), 1.0)
                 if probability > KEPT or (place in best_of_causes and probability > 0):
                     found.append(_explanation(scale, weight, logs, errors, more, random))
         return cls(sorted(found, key=lambda one: -one.probability))
@@ -80,7 +80,7 @@ class Posterior:
         )
 
     def probability_of(self, cause: str) -> float:
-        return sum(one.probability for one in self.explanations if cause in one.causes)
+        return min(sum(one.probability for one in self.explanations if cause in one.causes), 1.0)
 
     def table(self, causes: Sequence[Cause]) -> pd.DataFrame:
         """Average amount of each cause over all explanations, where those without it count as 0.
@@ -128,7 +128,7 @@ class Posterior:
                 weights.append(np.full(len(values[-1]), one.probability / len(values[-1])))
         inside, weight = np.concatenate([*values, np.zeros(0)]), np.concatenate([*weights, np.zeros(0)])
         everything = sum(one.probability for one in self.explanations)
-        probability = weight.sum() / everything
+        probability = min(weight.sum() / everything, 1.0)
         present = (
             _summary(inside, weight) if weight.sum() > 0 else dict.fromkeys(("severity", "ci_low", "ci_high"), np.nan)
         )
