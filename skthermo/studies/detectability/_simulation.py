@@ -440,8 +440,12 @@ def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
 
 def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
     """Which records are damaged, a window after each of these onsets."""
-    after = np.arange(n_records)[:, np.newaxis] - onsets_of(n_records, n_window)
-    return ((after >= 0) & (after < n_window)).any(axis=1)
+    damaged, places = (
+        np.zeros(n_records, dtype=bool),
+        onsets_of(n_records, n_window)[:, np.newaxis] + np.arange(n_window),
+    )
+    damaged[places[places < n_records]] = True
+    return damaged
 
 
 def transitions_of(decisions: Array, n_window: int) -> Array:
