@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import ProgressiveDamage, Scenario
-from skthermo.studies.detectability._simulation import EvaluatedRecords
+from skthermo.studies.detectability._simulation import EvaluatedRecords, damaged_rows, onsets_of
 from skthermo.studies.detectability._waits import Waits
 from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper
@@ -219,3 +219,10 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
 def test_what_is_no_time_is_refused(study, options, message):
     with pytest.raises(ValueError, match=message):
         study.time_to_detection(**options)
+
+
+@pytest.mark.parametrize(("n_records", "n_window"), [(1, 3), (7, 4), (12, 3), (13, 3), (50, 7), (8, 8)])
+def test_damage_lasts_a_window_after_each_onset(n_records, n_window):
+    onsets = onsets_of(n_records, n_window)
+    expected = [any(0 <= row - onset < n_window for onset in onsets) for row in range(n_records)]
+    np.testing.assert_array_equal(damaged_rows(n_records, n_window), expected)

@@ -440,10 +440,8 @@ def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
 
 def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
     """Which records are damaged, a window after each of these onsets."""
-    damaged, places = (
-        np.zeros(n_records, dtype=bool),
-        onsets_of(n_records, n_window)[:, np.newaxis] + np.arange(n_window),
-    )
+    damaged = np.zeros(n_records, dtype=bool)
+    places = onsets_of(n_records, n_window)[:, np.newaxis] + np.arange(n_window)
     damaged[places[places < n_records]] = True
     return damaged
 
