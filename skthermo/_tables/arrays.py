@@ -111,6 +111,7 @@ def as_columns(values: ArrayLike) -> Array:
 
 
 def as_dense(matrix: Matrix) -> Array:
+    """A matrix as an array."""
     return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
@@ -504,6 +505,7 @@ def integer_row(values: Any, what: str, expected: str = "integers in one row") -
 
 
 def check_path(path: Any, what: str = "path") -> Path:
+    """A path, given as text or as a path."""
     if not isinstance(path, str | PathLike) or not str(path):
         raise ValueError(f"{what} is {path!r:.200}; expected a path, as text or a pathlib.Path")
     return Path(path)

@@ -43,6 +43,7 @@ def significant(value: float, digits: int = 2) -> str:
 
 
 def probability_text(value: float) -> str:
+    """A probability as a number."""
     if not np.isfinite(value):
         return UNKNOWN
     return "less than 0.001" if value < 0.001 else f"{value:.2g}"
@@ -56,6 +57,7 @@ def chance_text(probability: float) -> str:
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
+    """A number with its noun."""
     return f"{number:,}{SPACE}{one if number == 1 else many or one + 's'}"
 
 

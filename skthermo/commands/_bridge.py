@@ -199,6 +199,7 @@ def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done,
 
 
 def fit(bridge: Bridge, done: Done) -> None:
+    """Fit a monitor to its baseline, and save it."""
     settings = _of_file(bridge)
     files = [settings.path(name) for name in settings.records.baseline]
     records, layouts = read_baseline(files, settings.csv, settings.records)
@@ -383,6 +384,7 @@ def status(bridge: Bridge, done: Done) -> None:
 
 
 def report(bridge: Bridge, done: Done) -> None:
+    """Write the page for the owner."""
     monitor = bridge.load()
     bridge.described(monitor, done)
     bridge.write_page(monitor, done)
@@ -391,6 +393,7 @@ def report(bridge: Bridge, done: Done) -> None:
 
 
 def acknowledge(bridge: Bridge, done: Done) -> None:
+    """Say what an event was, and save the monitor."""
     options = bridge.options
 
     def said(monitor: Monitor) -> list[str]:

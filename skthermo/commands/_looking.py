@@ -58,6 +58,7 @@ class Look:
 
 
 def look_at(file: Path, zone: str | None = None) -> Look:
+    """Find the form of a file and read it."""
     if not file.is_file():
         raise FileNotFoundError(f"there is no file {str(file)!r}; expected a CSV or parquet file with records")
     if file.suffix.lower() in PARQUET:
@@ -219,4 +220,5 @@ def _no_measurements(records: pd.DataFrame) -> Iterator[tuple[str, str]]:
 
 
 def is_in_kelvin(column: pd.Series) -> bool:
+    """Whether values can only be temperatures in kelvin."""
     return bool(column.between(*KELVIN).mean() > MOSTLY)

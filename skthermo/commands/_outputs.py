@@ -35,6 +35,7 @@ KINDS = ("damage", "watch", "stiffening", "measurement or structure")
 
 
 def as_json(facts: Mapping[str, Any]) -> str:
+    """Facts as text of JSON."""
     return json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False)
 
 

@@ -321,6 +321,7 @@ def _comment(text: str, sign: str = "# ") -> str:
 
 
 def toml(value: Any) -> str:
+    """A value as TOML has it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, Mapping):

@@ -232,6 +232,7 @@ def _model(path: Path, settings: Path) -> Any:
 
 
 def read_settings(file: Path) -> Settings:
+    """Read and check a file of settings; errors name the line."""
     return _Reader.of(file).settings()
 
 

@@ -67,6 +67,7 @@ class Spoken(logging.Formatter):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; its exit code."""
     options = _parser().parse_args(arguments)
     facts: dict[str, Any] = {"skthermo": skthermo.__version__, "command": options.name, "exit_code": FAILED}
     facts |= {"time": pd.Timestamp.now("UTC"), "bridges": [], "fleet": None, "findings": None, "settings": None}

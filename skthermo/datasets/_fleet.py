@@ -273,6 +273,7 @@ def relative_error(name: str, of_stiffness: float) -> float:
 
 
 def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:
+    """Times of the records."""
     days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
     if HOURS_A_DAY % samples_per_day:
         raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
@@ -287,6 +288,7 @@ def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.D
 
 
 def check_share(value: float, what: str) -> float:
+    """A share of records."""
     if not is_real(value) or not 0 <= value <= MOST:
         raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")
     return float(value)

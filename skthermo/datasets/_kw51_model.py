@@ -132,6 +132,7 @@ def kw51_structure() -> Structure:
 
 
 def place(node: Node) -> np.ndarray:
+    """Coordinates of a node."""
     if node[0] == "joint":
         _, foot, head, line, end = node
         start, other = place(("deck", foot, line)), place(on_arch(head, line))
@@ -149,6 +150,7 @@ def on_arch(station: float, line: int) -> Node:
 
 
 def along_deck(line: int) -> list[Node]:
+    """Nodes of one line of the deck."""
     return [("deck", station, line) for station in STATIONS]
 
 

@@ -39,6 +39,7 @@ def rectangle(depth: float, width: float) -> Section:
 
 
 def pipe(diameter: float, thickness: float) -> Section:
+    """Round pipe."""
     outer, inner = diameter / 2, diameter / 2 - thickness
     inertia = math.pi * (outer**4 - inner**4) / 4
     return {"A": math.pi * (outer**2 - inner**2), "I_yy": inertia, "I_zz": inertia, "J": 2 * inertia}

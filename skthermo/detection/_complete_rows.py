@@ -221,6 +221,7 @@ def has_lags_behind(estimator: BaseEstimator) -> bool:
 
 
 def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
+    """A fitted pipeline of its fitted parts."""
     tail = rest.steps if isinstance(rest, Pipeline) else [(pipeline.steps[-1][0], rest)]
     return Pipeline([*head.steps, *tail], memory=pipeline.memory, verbose=pipeline.verbose)
 

@@ -238,6 +238,7 @@ def call(given: Any) -> Any:
 
 
 def pair(records: Any, name: Hashable) -> tuple[Table, Table]:
+    """Temperatures and frequencies."""
     if not isinstance(records, tuple | list) or len(records) != 2:
         raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
     shapes = [np.shape(table) for table in records]
@@ -278,11 +279,13 @@ def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
 
 
 def known_of(monitor: Monitor) -> dict[str, Any]:
+    """What an outcome holds of a monitor."""
     status = monitor.status(monitor.last_)
     return {"standing": standing_of(monitor), "events": monitor.events_, "status": status}
 
 
 def standing_of(monitor: Monitor) -> dict[str, Any]:
+    """What a monitor says of its bridge."""
     days, events, drift = monitor.days_, monitor.events_, monitor.drift_
     damage = events[events["kind"] == "damage"]
     n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
@@ -331,6 +334,7 @@ def pickled(fitted: Any) -> bytes:
 
 
 def unpickled(content: bytes) -> Any:
+    """Fitted objects from bytes."""
     return pickle.loads(zlib.decompress(content))
 
 

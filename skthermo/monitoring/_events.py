@@ -117,6 +117,7 @@ class Acknowledgement:
 
 
 def event_table(events: Sequence[Event], said: Sequence[Acknowledgement], zone: Any) -> pd.DataFrame:
+    """Events as a frame, with what the owner says of them."""
     by_event: list[Acknowledgement | None] = [
         next((a for a in reversed(said) if a.kind == e.kind and e.start <= a.peak_time < (e.end or np.inf)), None)
         for e in events

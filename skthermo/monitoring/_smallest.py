@@ -38,6 +38,7 @@ def whole_weeks(records: pd.DataFrame, most: int) -> pd.DataFrame:
 
 
 def lowered(records: pd.DataFrame, falls: Mapping[Any, Any]) -> pd.DataFrame:
+    """Records of which some responses are lower."""
     changed = records.copy()
     for name, fall in falls.items():
         changed[name] -= fall

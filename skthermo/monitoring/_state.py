@@ -368,6 +368,7 @@ def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Chec
 
 
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
+    """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
     modes, is_held = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=bool)
     return _answers(stamps, nothing, threshold, modes, list(reasons), {DAMAGE: number}, is_held)

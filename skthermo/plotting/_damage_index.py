@@ -222,6 +222,7 @@ class DamageIndexDisplay(Display):
 
 
 def columns_of(by_label: Mapping[str, ArrayLike]) -> dict[str, pd.DataFrame]:
+    """Damage indices of one panel as frames of one column."""
     if not isinstance(by_label, Mapping) or not by_label:
         raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
     tables = {str(label): as_table(values, f"damage index {label!r}", "index") for label, values in by_label.items()}
@@ -240,6 +241,7 @@ def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:
 
 
 def as_threshold(value: object, title: str) -> float:
+    """A threshold as a number."""
     threshold = float(value) if is_real(value) else np.nan
     if not np.isfinite(threshold):
         raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")

@@ -53,6 +53,7 @@ def drawing(module: str) -> ModuleType:
 
 
 def pyplot() -> ModuleType:
+    """Matplotlib's pyplot."""
     return drawing("matplotlib.pyplot")
 
 
@@ -87,6 +88,7 @@ def label_of(name: Hashable) -> str:
 
 
 def with_unit(quantity: str, unit: str) -> str:
+    """Label of an axis."""
     return plain(f"{quantity} ({unit})" if unit else quantity)
 
 

@@ -161,6 +161,7 @@ def fill_place(ax: Axes, points: Array) -> None:
 
 
 def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[Hashable], ...]:
+    """Names of members that are points, lines and surfaces."""
     elements = structure.members
     points: list[Hashable] = []
     lines: list[Hashable] = []

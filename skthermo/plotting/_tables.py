@@ -32,6 +32,7 @@ def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
 
 
 def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
+    """Raise an error if two tables differ in shape or index."""
     check_same_rows(first, other, names)
     if np.shape(as_columns(first)) != np.shape(as_columns(other)):
         raise ValueError(
@@ -63,6 +64,7 @@ def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def check_study(study: DetectabilityStudy) -> None:
+    """Raise an error for what is no study, or one without results."""
     if not hasattr(study, "scenarios"):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
     if not hasattr(study, "results_"):

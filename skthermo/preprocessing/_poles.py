@@ -208,6 +208,7 @@ class ReferenceModes(NamedTuple):
 
 
 def read_reference(reference: Any) -> ReferenceModes:
+    """The reference modes, checked."""
     if isinstance(reference, Mapping):
         missing = [name for name in ("frequencies", "shapes") if name not in reference]
         if missing:

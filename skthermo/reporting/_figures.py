@@ -145,6 +145,7 @@ def draw_modes(
 
 
 def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
+    """Probability of detection of one family of scenarios."""
     is_curve = bool(np.isfinite(fitted.slope))
     rates = ", ".join(
         f"{share_text(rate)} at {percent(abs(severity))}"
@@ -190,6 +191,7 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
 
 
 def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
+    """Where the damage groups are."""
     known = [family for family in families if family in structure.groups]
     alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
 
@@ -202,6 +204,7 @@ def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
 
 
 def draw_identified_damage(identified: IdentifiedDamage) -> Html:
+    """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
 

@@ -39,6 +39,7 @@ def element(tag: str, *content: object, **attributes: object) -> Html:
 
 
 def joined(parts: Iterable[Html]) -> Html:
+    """Elements one after the other."""
     return Html("\n".join(parts))
 
 
@@ -78,6 +79,7 @@ def bar(share: float, text: str) -> Html:
 
 
 def image(svg: bytes, alt: str) -> Html:
+    """A drawing within the page."""
     return element("img", src=f"data:image/svg+xml;base64,{b64encode(svg).decode()}", alt=alt)
 
 
@@ -104,6 +106,7 @@ def section(anchor: str, title: str, *content: Html | None, link: str = "") -> S
 
 
 def page(title: str, introduction: Html, sections: Sequence[Section], ending: Html) -> str:
+    """The whole document, with links to the sections."""
     links = [element("li", element("a", one.link, href=f"#{one.anchor}")) for one in sections]
     head = (
         element("meta", charset="utf-8"),

@@ -435,10 +435,8 @@ def _row_keys(rows: Array) -> NDArray[np.void]:
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
     """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
     none = np.empty((0, min(number, len(places))))
-    found = [part[1:] for part in nearest_in_parts(places, wanted, number)]
-    distances, near = (
-        np.concatenate(all_parts) for all_parts in zip((none, none.astype(np.intp)), *found, strict=True)
-    )
+    found = [(none, none.astype(np.intp)), *(part[1:] for part in nearest_in_parts(places, wanted, number))]
+    distances, near = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
     return distances, near
 
 

@@ -118,6 +118,7 @@ def doubtful_parameters(
 
 
 def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
+    """Which parameters are at their bounds."""
     return np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
 
 

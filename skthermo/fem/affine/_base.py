@@ -126,6 +126,7 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
 
 
 def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
+    """Names of parameters, all different."""
     if not isinstance(parameter_names, Iterable) or isinstance(parameter_names, bytes | type):
         raise ValueError(f"parameter_names is {parameter_names!r}; expected one or more different names")
     names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)

@@ -315,6 +315,7 @@ class AffineCore:
 
 
 def nominal_modes(solver: EigenSolver, mass: AffineTerms, ranks: NDArray[np.intp]) -> NominalModes:
+    """The modes of some ranks at theta = 1."""
     nominal = nominal_theta(mass.exponents.shape[1])
     eigenvalues, shapes = solver.modes(nominal, int(ranks.max()) + 1)
     return NominalModes(

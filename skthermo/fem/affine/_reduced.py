@@ -133,6 +133,7 @@ def drawn(bounds: Array, random: np.random.RandomState, n_points: int) -> tuple[
 
 
 def without(points: Array, others: Array) -> Array:
+    """The points that are not among others."""
     return points[~(points[:, np.newaxis] == others).all(axis=2).any(axis=1)]
 
 

@@ -120,6 +120,7 @@ def days_of(table: ArrayLike) -> Array | None:
 
 
 def usable_rows(inputs: Array, values: Array, weights: Array | None) -> Array:
+    """Rows with all inputs, at least one value and a weight."""
     usable = ~(np.isnan(inputs).any(axis=1) | np.isnan(values).all(axis=1))
     return usable if weights is None else usable & (weights > 0)
 
@@ -154,6 +155,7 @@ def errors_of(name: Hashable) -> Iterator[None]:
 
 
 def bridges_of(bridges: Any) -> dict[Hashable, Any]:
+    """Bridges by name."""
     bridges = getattr(bridges, "chains", bridges)
     if isinstance(bridges, Mapping):
         found = dict(bridges)
@@ -188,6 +190,7 @@ def read_bridge(name: Hashable, bridge: Any) -> ReadBridge:
 
 
 def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
+    """Two tables, checked."""
     options = {"dtype": np.float64}
     T = T.to_frame() if isinstance(T, pd.Series) else T
     inputs = check_array(T, ensure_2d=False, **options)

@@ -71,6 +71,7 @@ class DailySteps:
 
 
 def absorb(state: State, day: DayShown) -> State:
+    """The state once a day is known."""
     if not len(day.values):
         return state
     shown = state.covariance @ day.design.T

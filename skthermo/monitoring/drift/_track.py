@@ -121,6 +121,7 @@ def track_parameters(
 
 
 def with_enough_days(daily: DailyMeans, modes: Sequence[Any]) -> DailyMeans:
+    """Daily means without modes that were measured on too few days."""
     needed = FEWEST * (daily.basis.shape[2] + N_SHAPES)
     n_days = daily.known.sum(axis=0)
     if (n_days < needed).all():
@@ -212,6 +213,7 @@ def history_of(
     significance: float,
     random: np.random.RandomState,
 ) -> ParameterHistory:
+    """What was found, by the names of groups and modes."""
     found, names = followed.found, effects.names
     has_drift, trends = found.p_value <= significance, followed.trends
     best, walk = (found.sets[0], float(found.walk[0])) if has_drift else ((), 0.0)

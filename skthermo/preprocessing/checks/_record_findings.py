@@ -109,6 +109,7 @@ class RecordFindings(SavesFrames):
 
 
 def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
+    """Findings one by one as a table."""
     rows = [[*found, found.severity, found.consequence, found.action] for found in findings]
     return pd.DataFrame(rows, columns=COLUMNS)
 

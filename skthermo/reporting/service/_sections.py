@@ -188,6 +188,7 @@ def _what_to_do(standing: Standing) -> list[str]:
 
 
 def events(standing: Standing) -> Section:
+    """All events, the newest first."""
     known = standing.events
     if not len(known):
         text = "There has been no event." if standing.has_records else "No record has come yet, and so no event."
@@ -340,6 +341,7 @@ def _signed(value: float, error: float) -> str:
 
 
 def sensor_sentences(standing: Standing) -> list[str]:
+    """What does not work at present."""
     if not standing.monitor.sensors:
         return ["Sensors are not watched."]
     if not len(standing.failed):
@@ -354,6 +356,7 @@ def sensor_sentences(standing: Standing) -> list[str]:
 
 
 def sensors(standing: Standing) -> Section:
+    """Faults that last, and those that are over."""
     known = standing.monitor.faults_
     parts = [bullets(sensor_sentences(standing))]
     if standing.monitor.sensors:
@@ -383,6 +386,7 @@ def sensors(standing: Standing) -> Section:
 
 
 def not_evaluated(standing: Standing) -> Section:
+    """How many records were not evaluated, and why."""
     counts, evaluated, days = standing.monitor.counts_, standing.evaluations, standing.monitor.days_
     title = "What was not evaluated"
     if not standing.has_records:

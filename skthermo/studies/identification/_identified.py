@@ -183,12 +183,14 @@ def _joined(
 
 
 def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
+    """The causes of an explanation by its name."""
     amounts = found.estimates.index
     named = [str(cause) for explanation, cause in amounts if explanation == name]
     return (*named, SOMETHING_ELSE) if name.endswith(SOMETHING_ELSE) else tuple(named)
 
 
 def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
+    """How much of a cause there is within an explanation."""
     row = found.estimates.loc[(" + ".join(causes), cause)]
     values = [float(row[name]) for name in ("severity", "ci_low", "ci_high")]
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)

@@ -187,6 +187,7 @@ def identify_damage(
 
 
 def check_visible(slopes: Array, causes: Sequence[Cause]) -> None:
+    """Raise an error if the modes show no group that was asked for."""
     alone = errors_alone(slopes)
     asked = [place for place, cause in enumerate(causes) if not cause.is_even]
     if alone[asked].min() > VISIBLE:

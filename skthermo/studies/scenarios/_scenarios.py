@@ -75,23 +75,27 @@ class BaseScenario(ABC):
 
 
 def check_chain(fem: FittedChain) -> None:
+    """Raise an error for what is not a fitted chain."""
     if isinstance(fem, type) or not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
 
 
 def check_groups(groups: Sequence[str], known: Any) -> None:
+    """Raise an error for damage groups that the model does not have."""
     unknown = [group for group in groups if group not in known]
     if unknown:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
 
 
 def check_name(name: Any) -> None:
+    """Raise an error if a scenario's name is not a text."""
     if not isinstance(name, str) or not name:
         raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
 
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
+    """Severity by group as floats."""
     damage = mapping_of(damage, f"damage of scenario {name!r}", "{group: severity}")
     for group, severity in damage.items():
         if not isinstance(group, str):
@@ -106,6 +110,7 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
 
 
 def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
+    """Raise an error for severities that no structure can have."""
     values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
     wrong = values[~(np.isfinite(values) & (values < 1) & (values >= LOWEST_SEVERITY))]
     if wrong.size:

@@ -400,6 +400,7 @@ class FitReport(SavesFrames):
 
 
 def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
+    """The report of a chain of which all else is fitted."""
     records, box, theta = chain.records_, chain.box_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     measured, of_model, predicted = _in_sample(chain)
