@@ -157,6 +157,9 @@ draw_curves(plt.subplots(1, 3, figsize=(11, 4), layout="constrained", sharey=Tru
 # All detectors evaluate the same simulated records: some see frequencies only, others remove the effect of temperature
 # by a regression before. On a real structure there are no damaged records to choose by. Here the true ones are
 # evaluated, too (dots), with damage of 10 %: the detectors that find most in simulation find most in truth.
+#
+# The bars are of campaigns that differ by noise alone, ``uncertainty="noise"``, which is fast. By default, a study adds
+# other weather and other training records, which make them wider.
 
 several = field_detectors(list(year.frequencies))
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "piecewise-linear"]
