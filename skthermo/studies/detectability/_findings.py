@@ -355,7 +355,32 @@ class StudyFindings:
         Notes
         -----
         Differences are paired, as all detectors evaluate the same records. Their bounds include noise alone
-        (:ref:`how-detectors-are-ranked`). An example, and limits of a ranking: :doc:`/guide/rank_detectors`.
+        (:ref:`how-detectors-are-ranked`). Limits of a ranking: :doc:`/guide/rank_detectors`.
+
+        Examples
+        --------
+        >>> from sklearn.ensemble import IsolationForest
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.detection import MahalanobisDetector, OutlierDetector
+        >>> from skthermo.studies import DetectabilityStudy
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> detectors = {"forest": OutlierDetector(IsolationForest()), "Mahalanobis": MahalanobisDetector()}
+        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
+        >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
+        >>> results = study.run(weather)
+        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
+        detector
+        Mahalanobis          0.02  0.22              0.21                False
+        forest               0.02  0.18              0.17                False
+        >>> print(study.summary())
+        'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.6%.
+        Not significantly worse at 95% confidence: 'forest' (17.8% at 1.6%).
+        These comparisons include noise only: another year, baseline or FE model may change the order.
+        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 10 within 7 days, 37 within 30 days.
+        'bottom 10 %' is detected within 13 days in 95 of 100 cases; false alarms in that time: 18 of 100.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
