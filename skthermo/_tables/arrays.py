@@ -654,7 +654,7 @@ def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
 
     "auto" reduces models that state by ``reduction_pays`` that it saves time for a number of solves.
     """
-    if isinstance(reduce, str):
+    if is_auto(reduce):
         pays = hasattr(model, "reduced") and hasattr(model, "reduction_pays") and model.reduction_pays(n_solves)
         return DEFAULT_TOLERANCE if pays else None
     if not reduce:
@@ -667,6 +667,6 @@ def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
     return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
 
 
-def is_auto(reduce: Reduce) -> bool:
-    """Whether the model decides whether it is reduced."""
-    return isinstance(reduce, str)
+def is_auto(value: Any) -> bool:
+    """Whether a parameter is "auto"; it may be an array, or anything else."""
+    return isinstance(value, str) and value == "auto"

@@ -328,8 +328,7 @@ class DetectabilityStudy(BaseEstimator):
         """
         check_chain(self.fem)
         detectors = self._checked_detectors()
-        is_open = is_auto(self.n_repeats) and self.n_repeats == "auto"
-        most_repeats = MOST_REPEATS if is_open else positive_integer(self.n_repeats, "n_repeats")
+        most_repeats = MOST_REPEATS if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
         tol = check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
