@@ -5,9 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, Matrix, as_floats, check_names
+from skthermo._tables.arrays import Array, Matrix, as_floats, check_names, is_model
+from skthermo._validation import check_is_fitted
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 NEAR = 1 / 3  # share of the bounds up to which amounts have a reduced model; one for all of them would be large
@@ -17,6 +19,7 @@ MOST_AXES = 6  # largest number of directions in which parameters vary with the 
 SMALLEST = 3e-4  # standard deviation of ln theta along a direction, below which it does not count
 MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
 STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
+UNMOVED = 1e-9  # relative change by a whole loss below which a group moves no frequency
 ALL_GROUPS = "all groups"  # the name of an even change of all of them
 
 
@@ -285,3 +288,37 @@ def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
         if not smaller or set().union(*smaller) != own:
             kept.append(name)
     return kept
+
+
+def damage_directions(fem: Any) -> pd.DataFrame:
+    """Relative change of each frequency for a loss of stiffness of each damage group, at its beginning.
+
+    Of a model, at its nominal state. Of a fitted chain, at the mean of its parameters, in the measured domain and with
+    the names of its modes. Groups that are made of others are left out, and those that move no frequency.
+    """
+    model, is_chain = getattr(fem, "model", fem), not is_model(fem)
+    groups = list(read_groups(model, None))
+    if is_chain:
+        check_is_fitted(fem)
+        theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+        structure = ChangedStructure(fem, StructuralChanges.of_damage(model, groups))
+        effects = FrequencyEffects.at(structure, theta, np.ones((1, len(fem.mode_names_))))
+        values, names = effects(np.zeros(len(groups)))[1].T, list(fem.mode_names_)
+    else:
+        nominal = np.ones((1, len(model.parameter_names)))
+        names = list(range(model.n_modes))
+        if hasattr(model, "with_damage_parameters"):
+            changed = model.with_damage_parameters(groups)
+            theta = np.ones((1, len(changed.parameter_names)))
+            values = -changed.jacobian(theta)[0][:, -len(groups) :].T / changed.frequencies(theta)[0]
+        else:
+
+            def logarithms(amounts: Array) -> Array:
+                damage = {name: float(loss) for name, loss in zip(groups, amounts, strict=True) if loss}
+                return np.log(as_floats((model.damaged(damage) if damage else model).frequencies(nominal)))[0]
+
+            values = central_differences(logarithms, np.zeros(len(groups))).T
+    moved = (np.abs(values) > UNMOVED).any(axis=1)
+    if not moved.any():
+        raise ValueError(f"no loss of stiffness of the groups {groups} moves a frequency; expected one that does")
+    return pd.DataFrame(values[moved], [name for name, is_so in zip(groups, moved, strict=True) if is_so], names)

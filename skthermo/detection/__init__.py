@@ -2,6 +2,7 @@
 
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._compensator import TemperatureCompensator
+from skthermo.detection._directional import DirectionalDetector
 from skthermo.detection._fused import FusedDetector
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
@@ -9,6 +10,7 @@ from skthermo.detection._windowed_alarm import WindowedAlarm
 
 __all__ = [
     "DamageDetector",
+    "DirectionalDetector",
     "FusedDetector",
     "MahalanobisDetector",
     "OutlierDetector",

@@ -16,7 +16,7 @@ from skthermo._estimators.warnings import explain_rows, explained_rows, warn_eac
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import Table, frame_like, row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
-from skthermo.detection._likelihood import log_volumes, mean_log_density
+from skthermo.detection._origin import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.preprocessing import gross_errors

@@ -22,7 +22,7 @@ from skthermo._estimators.warnings import (
     warn_user,
     warnings_once,
 )
-from skthermo._tables.arrays import Array, as_floats
+from skthermo._tables.arrays import Array, as_floats, means_of_known
 from skthermo._tables.frames import (
     check_positions_are_names,
     column_names,
@@ -44,7 +44,7 @@ from skthermo._validation import (
     warn_of_fleet,
 )
 from skthermo.detection._complete_rows import Regression, has_lags_behind
-from skthermo.detection._likelihood import mean_log_density, with_log_volumes
+from skthermo.detection._origin import Changes, Origin, mean_log_density, with_origin
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records, gross_errors
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
@@ -108,6 +108,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         records it is taken (None: all), ``spread_.deviations(T)`` gives standard deviations in Hz.
     training_range_ : object
         Lowest and highest values of the other columns.
+    levels_ : ndarray of shape (n_targets,)
+        Means of the targets, in Hz: a residual changes by them for a relative change of 1.
     targets_ : ndarray of int
         Positions of the targets.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -232,7 +234,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             In Hz, or dimensionless if whitened; each row predicted by a clone that was not fitted on its fold.
         """
         temperatures, frequencies, findings = self._read_baseline(X)
-        return frame_like(frequencies, self._learn(temperatures, frequencies, findings))
+        residuals = self._learn(temperatures, frequencies, findings)
+        weather = self.sensors_.fill(as_floats(temperatures))[0]
+        changes = partial(self._changes, weather, ~np.isnan(residuals), PredictionError.none())
+        return frame_like(frequencies, with_origin(residuals, Origin(partial(np.zeros, len(residuals)), changes)))
 
     @overload
     def transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -270,7 +275,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         else:
             scaled = self.spread_.whiten(weather, residuals, errors)
             volumes = partial(self.spread_.log_volumes, weather, residuals, errors)
-        return explain_rows(frame_like(frequencies, with_log_volumes(scaled, volumes)), unknown)
+        origin = Origin(volumes, partial(self._changes, weather, ~np.isnan(scaled), errors))
+        return explain_rows(frame_like(frequencies, with_origin(scaled, origin)), unknown)
 
     def score(self, X: ArrayLike, y: None = None) -> float:
         """Mean log-likelihood of healthy records that `fit` has not seen, per value.
@@ -393,6 +399,13 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Residuals without those of targets that had none in the baseline."""
         return np.where(np.diag(self.spread_.overall.covariance) > 0, residuals, np.nan)
 
+    def _changes(self, weather: Array, present: NDArray[np.bool_], errors: PredictionError) -> Changes:
+        """What relative changes of the frequencies make of residuals."""
+        if self.whiten is None:
+            return Changes.of_all(np.diag(self.levels_), len(present))
+        roots, which = self.spread_.roots(weather, present, errors)
+        return Changes(roots * self.levels_, which)
+
     def _log_volumes_shrunk(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
         """As `Spread.log_volumes`, of residuals in Hz that are shrunk where predictions are uncertain."""
         known = self._with_spread(residuals)
@@ -417,6 +430,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
         folds = Folds.of(self._wanted_folds(filled), filled)
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
+        self.levels_ = means_of_known(measured)
         with warnings_once():
             learn = partial(LearnedRegression.of, self.estimator, filled, frequencies, findings, folds)
             learned = answer_once(type(self), (self.estimator, filled, frequencies, folds), measured.size, learn)

@@ -158,6 +158,17 @@ class Spread:
             volumes[rows] = -0.5 * roots.log_determinants
         return volumes
 
+    def roots(
+        self, weather: Array, present: NDArray[np.bool_], errors: PredictionError
+    ) -> tuple[Array, NDArray[np.intp]]:
+        """What `whiten` multiplies rows by, (n_roots, n_modes, n_modes), and which of them is that of each row."""
+        found, which, n_roots = [np.empty((0, *self.overall.covariance.shape))], np.empty(len(weather), np.intp), 0
+        for rows, some in self._in_parts(weather, present, errors):
+            found.append(some.roots)
+            which[rows] = some.pair + n_roots
+            n_roots += len(some.roots)
+        return np.concatenate(found), which
+
     def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
         """Residuals with the overall covariance also where errors of predictions add to it; NaN without any."""
         covariance, again = self.overall.covariance, residuals.copy()

@@ -1,0 +1,469 @@
+"""Damage index and alarm by the directions in which damage moves frequencies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
+
+from skthermo._effects import damage_directions
+from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, patterns, real_array
+from skthermo._tables.frames import Table, column_names
+from skthermo._validation import Interval, StrOptions, check_is_fitted
+from skthermo.detection._cone import Cones
+from skthermo.detection._mahalanobis import N_FOLDS, ROWS_AT_ONCE, MahalanobisDetector
+from skthermo.detection._origin import Changes, origin_of
+from skthermo.detection._patterns import PatternScale, as_if_complete
+from skthermo.detection._thresholds import factor_of_few
+from skthermo.residuals.gaussian import Gaussian, precisions, whitenings
+from skthermo.residuals.neighbourhoods import Neighbourhoods
+
+N_DRAWS = 2000  # normal records, by which rates of detection are estimated
+N_DRAWS_OF_PATTERN = 400  # by which the mean squared index of a pattern of missing modes is
+TAIL, FEWEST_IN_TAIL = 0.1, 20  # share of the baseline that shows how rare large indices are, and least number of it
+UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
+ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be told apart
+STEPS = np.linspace(0.0, 1.0, 21)  # losses between which the smallest one that is found is interpolated
+
+
+@dataclass(frozen=True)
+class Records:
+    """Rows of values, and what relative changes of the frequencies make of them."""
+
+    values: Array
+    changes: Changes
+
+    def of(self, rows: Any) -> Records:
+        return Records(self.values[rows], self.changes.of(rows))
+
+
+@dataclass(frozen=True)
+class Tail:
+    """Squared indices of a baseline above a level, which a share of them exceeds, and by how much on average."""
+
+    level: float
+    excess: float
+
+    @classmethod
+    def of(cls, index: Array) -> Tail:
+        squares = index[np.isfinite(index)] ** 2
+        share = min(max(TAIL, FEWEST_IN_TAIL / max(len(squares), 1)), 0.5)
+        level = float(np.quantile(squares, 1 - share))
+        return cls(
+            level, max(float((squares[squares > level] - level).mean()) if (squares > level).any() else 0.0, 0.0)
+        )
+
+
+@dataclass(frozen=True)
+class JoinedTests:
+    """The index of the cone and that of the omnibus, joined so that the latter gives a share of the false alarms.
+
+    Squares of either index exceed their tails exponentially. The omnibus index is expressed as the index of the cone
+    that is exceeded as often, times what the shares of both are to each other; the larger of the two counts.
+    """
+
+    cone: Tail
+    omnibus: Tail
+    share: float
+
+    def __call__(self, cone: Array, omnibus: Array) -> Array:
+        if self.share in (0, 1):
+            return omnibus if self.share else cone
+        ratio = self.cone.excess / self.omnibus.excess if self.omnibus.excess > 0 else 1.0
+        rarer = np.log((1 - self.share) / self.share)
+        squared = self.cone.level + ratio * (omnibus**2 - self.omnibus.level) - self.cone.excess * rarer
+        return np.maximum(cone, np.sqrt(np.maximum(squared, 0.0)))
+
+
+class DirectionalDetector(MahalanobisDetector):
+    """Alarm where frequencies, or their residuals, have moved in the directions in which damage moves them.
+
+    The one-sided likelihood-ratio test against the cone of all non-negative combinations of the directions [Kud63]_,
+    [Per69]_. The damage index is the length of the projection of a whitened record on that cone, in standard
+    deviations, or an *unsquared* Mahalanobis distance (omnibus) that is as rare.
+
+    Parameters
+    ----------
+    directions : "softening", FE model, fitted chain, DataFrame or array, default="softening"
+        Relative changes of the frequencies:
+
+        - ``"softening"``: each frequency can only fall.
+        - An FE model, or a fitted `~skthermo.surrogate.DataInformedFEM`: those by a loss of stiffness of each of its
+          damage groups.
+        - (n_directions, n_modes): relative changes by one unit of each direction. The columns of a frame are matched by
+          name where both have names, and its index names the directions.
+    contamination : float, default=0.02
+        Share of healthy records above the threshold.
+    omnibus : float, default=0.2
+        Share of the false alarms that goes to the Mahalanobis distance, for what lies outside the cone, such as a
+        gain of stiffness: from 0 (none of it) to 1 (nothing else).
+    covariance : covariance estimator, optional
+        As in `MahalanobisDetector`.
+    threshold : {"conformal", "quantile"}, default="conformal"
+        As in `MahalanobisDetector`. The conformal one takes the index of the cone from ten folds of blocks of time.
+
+    Attributes
+    ----------
+    directions_ : DataFrame of shape (n_directions, n_modes)
+        Relative changes of the frequencies, by name of the direction and of the mode.
+    indistinguishable_ : list of tuple of str
+        Pairs of directions that move the frequencies alike, with a cosine of more than 0.95 in standard deviations: an
+        alarm by one may be by the other.
+    covariance_ : estimator
+        Fitted: mean (``location_``) and covariance of the baseline.
+    tests_ : object
+        How the cone's index and the Mahalanobis distance are joined.
+    pattern_scale_, cone_scale_ : object
+        Factors for patterns of missing modes, of the Mahalanobis distance and of the cone's index.
+    levels_ : ndarray of shape (n_columns,)
+        Mean frequencies, or ones; only where no step before says what it has made of frequencies.
+    typical_changes_ : ndarray of shape (n_columns, n_modes)
+        What relative changes of the frequencies make of the columns, on average over the baseline.
+    baseline_index_ : ndarray of shape (n_samples,)
+        Damage index of the baseline; with the conformal threshold, by other records.
+    n_independent_ : float
+        How many independent records the baseline counts as.
+    threshold_, offset_ : float
+        A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of modes and, where `fit` saw a frame with such, their names.
+
+    See Also
+    --------
+    MahalanobisDetector : Finds changes in any direction alike.
+
+    Notes
+    -----
+    Records are frequencies, all of them positive, or residuals of a `TemperatureCompensator` directly before, which
+    says what it makes of a relative change: residuals in Hz or whitened, also by weather. Other steps in between do not
+    say so. Behind them, "softening" takes the columns as frequencies less something, refuses columns that are
+    components (exactly uncorrelated), and other directions are refused.
+
+    The test is one-sided: a change outside the cone is left to the omnibus. A cone that spans nearly everything gains
+    nothing. :doc:`/guide/detectors_theory` has the joint calibration and records with missing modes.
+
+    References
+    ----------
+    .. [Kud63] A. Kudo, "A multivariate analogue of the one-sided test", *Biometrika* 50 (1963) 403-418.
+    .. [Per69] M. D. Perlman, "One-sided testing problems in multivariate analysis", *Annals of Mathematical
+       Statistics* 40 (1969) 549-567.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
+    >>> from skthermo.surrogate import TemperatureMapper
+    >>> from sklearn.pipeline import make_pipeline
+    >>> healthy, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.08}))
+    >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (healthy, damaged))
+    >>> regression = TemperatureCompensator(TemperatureMapper(), targets=list(healthy.frequencies))
+    >>> for detector in (MahalanobisDetector(), DirectionalDetector(), DirectionalDetector(make_truss())):
+    ...     detector = make_pipeline(regression, detector).fit(baseline)
+    ...     print(f"{(detector.predict(later) == -1).mean():.0%}")
+    47%
+    69%
+    86%
+    >>> detector[-1].minimum_detectable_damage().round(2)
+    direction
+    bottom      0.10
+    top         0.12
+    diagonal    0.06
+    vertical     inf
+    dtype: float64
+    """
+
+    _parameter_constraints: dict = {
+        **MahalanobisDetector._parameter_constraints,
+        "directions": "no_validation",
+        "omnibus": [Interval(Real, 0, 1, closed="both")],
+        "threshold": [StrOptions({"quantile", "conformal"})],
+    }
+
+    def __init__(
+        self,
+        directions: Any = "softening",
+        *,
+        contamination: float = 0.02,
+        omnibus: float = 0.2,
+        covariance: BaseEstimator | None = None,
+        threshold: Literal["quantile", "conformal"] = "conformal",
+    ):
+        self.directions = directions
+        self.contamination = contamination
+        self.omnibus = omnibus
+        self.covariance = covariance
+        self.threshold = threshold
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters; those of a chain that gives the directions are its own."""
+        return {name: value for name, value in super().get_params(deep).items() if not name.startswith("directions__")}
+
+    def __sklearn_clone__(self) -> DirectionalDetector:
+        own = self.get_params(deep=False)
+        return type(self)(**own | {"covariance": clone(self.covariance, safe=False)})  # a fitted chain is shared
+
+    def _check_baseline(self, F: Table) -> None:
+        super()._check_baseline(F)
+        vars(self).pop("levels_", None)  # of an earlier fit
+
+    def _records(self, X: Any, F: Array) -> Records:
+        origin = origin_of(X)
+        if origin is not None:
+            return Records(F, origin.changes())
+        if not hasattr(self, "levels_"):
+            self.levels_ = self._levels(F)
+        return Records(F, Changes.of_all(np.diag(self.levels_), len(F)))
+
+    def _learn(self, records: Records, times: Array) -> Array:
+        names = getattr(self, "feature_names_in_", None)
+        n_modes = records.changes.matrices.shape[2]
+        self.directions_ = read_directions(self.directions, names, n_modes)
+        omnibus = super()._learn(records.values, times)
+        self.typical_changes_ = records.changes.typical()
+        self.indistinguishable_ = self._alike()
+        present = ~np.isnan(records.values)
+        cone = self._of_baseline(records, times)
+        self.cone_scale_ = PatternScale.of(np.maximum(cone, np.finfo(float).tiny), present, self.contamination)
+        cone = cone * self.cone_scale_(present)
+        self.tests_ = JoinedTests(Tail.of(cone), Tail.of(omnibus), self.omnibus)
+        return self.tests_(cone, omnibus)
+
+    def _index(self, records: Records) -> Array:
+        return np.concatenate([self._joined(part) for part in _parts(records)])
+
+    def _joined(self, records: Records) -> Array:
+        omnibus, present = super()._index(records.values), ~np.isnan(records.values)
+        cone = self._projected(self._normal, records)[1]
+        return self.tests_(cone if present.all() else cone * self.cone_scale_(present), omnibus)
+
+    def _seen_at(self, threshold: float) -> str:
+        smallest = self._smallest(threshold, 0.5)
+        sizes = ", ".join(f"{name} {loss:.2g}" for name, loss in smallest.items())
+        return f". Half of the records raise an alarm at these losses: {sizes}"
+
+    def severities(self, X: ArrayLike) -> pd.DataFrame:
+        """Losses by which the test explains each record.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz, or residuals, in the columns of `fit`.
+
+        Returns
+        -------
+        DataFrame of shape (n_samples, n_directions)
+            The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
+            stiffness of each group, from 0 to 1, by effects in proportion to the loss. NaN where a record has no
+            mode. Directions of ``indistinguishable_`` share what either could explain.
+        """
+        check_is_fitted(self)
+        F = self._validated(X, reset=False, order="C")
+        amounts = [self._projected(self._normal, part)[0] for part in _parts(self._records(X, F))]
+        index = X.index if isinstance(X, pd.DataFrame) else None
+        return pd.DataFrame(np.minimum(np.concatenate(amounts), 1.0), index, self.directions_.index)
+
+    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+        """Probability of detection of single records, by drawing normal ones from the learned covariance.
+
+        Parameters
+        ----------
+        severities : array-like of shape (n_severities,)
+            Amounts of each direction: losses of stiffness of each group, from 0 to 1.
+
+        Returns
+        -------
+        DataFrame of shape (n_severities, n_directions)
+            Share of such records above the threshold; at 0 the false alarms.
+        """
+        check_is_fitted(self)
+        losses = np.ravel(real_array(severities, "severities"))
+        if not ((losses >= 0) & (losses <= 1)).all():
+            raise ValueError(f"severities is {severities!r:.200}; expected losses from 0 to 1")
+        found = self._rates(losses, self.threshold_)
+        return pd.DataFrame(found, pd.Index(losses, name="severity"), self.directions_.index)
+
+    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+        """Smallest amount of each direction alone that is found in a share of the records.
+
+        Parameters
+        ----------
+        level : float, default=0.9
+            That share, between 0 and 1.
+
+        Returns
+        -------
+        Series of shape (n_directions,)
+            Loss of stiffness by group, infinite where not even a whole loss is found.
+        """
+        check_is_fitted(self)
+        return self._smallest(self.threshold_, check_probability(level, "level"))
+
+    def _smallest(self, threshold: float, level: float) -> pd.Series:
+        """Between steps of losses, the first of which is found often enough, and again between finer ones."""
+        smallest = {}
+        for place, name in enumerate(self.directions_.index):
+            low, high = 0.0, 1.0
+            for _ in range(2):
+                steps = low + STEPS * (high - low)
+                rates = self._rates(steps, threshold, [place])[:, 0]
+                reached = np.flatnonzero(rates >= level)
+                if not len(reached):
+                    low = high = np.inf
+                    break
+                last = max(reached[0], 1)
+                low, high = float(steps[last - 1]), float(steps[last])
+            smallest[name] = high
+        return pd.Series(smallest, pd.Index(self.directions_.index, name="direction"), dtype=float)
+
+    def _rates(self, losses: Array, threshold: float, places: Any = slice(None)) -> Array:
+        """Shares of normal records above a threshold, (n_losses, n_directions), each direction by itself."""
+        effects = self.directions_.to_numpy()[places] @ self.typical_changes_.T
+        normal = self._normal
+        draws = np.random.RandomState(0).standard_normal((N_DRAWS, len(normal.mean)))
+        rows = normal.mean + draws @ np.linalg.cholesky(normal.covariance).T
+        changes = Changes.of_all(self.typical_changes_, N_DRAWS)
+        rates = np.empty((len(losses), len(effects)))
+        for n, loss in enumerate(losses):
+            for direction, effect in enumerate(effects):
+                rates[n, direction] = (self._joined(Records(rows + loss * effect, changes)) > threshold).mean()
+        return rates
+
+    def _levels(self, F: Array) -> Array:
+        """What a relative change of each frequency makes of its column, in records of which no step says it."""
+        if (F[~np.isnan(F)] > 0).all():
+            return np.nanmean(F, axis=0)
+        softens = isinstance(self.directions, str)
+        complete = F[~np.isnan(F).any(axis=1)]
+        spread = complete.std(axis=0) if len(complete) > F.shape[1] else np.zeros(F.shape[1])
+        if F.shape[1] > 1 and (spread > 0).all():
+            correlation = np.corrcoef(complete.T) - np.eye(F.shape[1])
+            softens &= not (np.abs(correlation) < UNCORRELATED).all()
+        if not softens:
+            raise ValueError(
+                "the records are neither frequencies (some are not positive) nor residuals of a TemperatureCompensator "
+                "directly before, so that it is not known by how much a relative change of a frequency moves each "
+                "column; expected frequencies in Hz, or a pipeline in which the detector follows the compensator"
+            )
+        return np.ones(F.shape[1])
+
+    def _of_baseline(self, records: Records, times: Array) -> Array:
+        """Index of the cone of baseline records, as large as those of new ones."""
+        own = self._projected(self._normal, records)[1]
+        if self.threshold == "quantile":
+            return own
+        known = np.flatnonzero(~np.isnan(records.values).all(axis=1))
+        some = records.of(known)
+        baseline = Neighbourhoods(times[known], some.values)
+        if baseline.is_short:
+            time = round(baseline.correlation_time, 2)
+            return own * factor_of_few(*some.values.shape, time, self.contamination)
+        for rest, fold in baseline.folds(N_FOLDS):
+            learned = self._learned_from(some.values[rest])
+            own[known[fold]] = self._projected(learned, some.of(fold))[1]
+        return own
+
+    def _learned_from(self, rows: Array) -> Gaussian:
+        """Normal distribution of a part of the baseline; that of all where the part does not determine one."""
+        if self.covariance is not None:
+            rows = rows[~np.isnan(rows).any(axis=1)]
+            fitted = clone(self.covariance).fit(rows)
+            return Gaussian(fitted.location_, fitted.covariance_)
+        if np.isnan(rows).all(axis=0).any() or len(rows) <= 2 * rows.shape[1]:
+            return self._normal
+        return Gaussian.of(rows)
+
+    def _projected(self, normal: Gaussian, records: Records) -> tuple[Array, Array]:
+        """Amounts of the directions, and length of the projection on their cone as if no mode were missing."""
+        scale = np.sqrt(np.diag(normal.covariance))
+        present = ~np.isnan(records.values)
+        masks, pattern = patterns(present)
+        correlation = normal.covariance / np.outer(scale, scale)
+        weights = precisions(correlation, masks)
+        matrices = records.changes.matrices / scale[:, np.newaxis]
+        effects = matrices @ self.directions_.to_numpy().T
+        cases, case = np.unique(records.changes.which * len(masks) + pattern, return_inverse=True)
+        of_case, mask_of_case = effects[cases // len(masks)], cases % len(masks)
+        weighted = weights[mask_of_case] @ of_case
+        cones = Cones(of_case.swapaxes(1, 2) @ weighted)
+        standard = normal.centred(records.values) / scale
+        along = standard @ weighted[0] if len(cases) == 1 else np.einsum("ij,ijk->ik", standard, weighted[case])
+        amounts, lengths = cones.project(along, case)
+        amounts[~present.any(axis=1)] = np.nan
+        if present.all():
+            return amounts, lengths
+        size = self._mean_squares(correlation, masks, scale)
+        whole = self._mean_squares(correlation, np.ones((1, len(scale)), dtype=bool), scale)[0]
+        nothing = size <= 0
+        mapped = as_if_complete(lengths, np.where(nothing, whole, size)[pattern], whole)
+        mapped = np.where(nothing[pattern], 0.0, np.nan_to_num(mapped))
+        return amounts, np.where(present.any(axis=1), mapped, np.nan)
+
+    def _mean_squares(self, correlation: Array, masks: NDArray[np.bool_], scale: Array) -> Array:
+        """Mean squared length of the projection of normal records that have the modes of each mask."""
+        effects = self.typical_changes_ / scale[:, np.newaxis] @ self.directions_.to_numpy().T
+        roots = whitenings(correlation, masks)[0]
+        draws = np.random.RandomState(0).standard_normal((N_DRAWS_OF_PATTERN, len(scale)))
+        white = roots @ effects
+        which = np.repeat(np.arange(len(masks)), N_DRAWS_OF_PATTERN)
+        lengths = Cones.of(white).project((draws @ white).reshape(len(which), -1), which)[1]
+        return (lengths.reshape(len(masks), -1) ** 2).mean(axis=1)
+
+    def _alike(self) -> list[tuple[str, str]]:
+        """Pairs of directions with nearly the same whitened effects."""
+        normal = self._normal
+        root = whitenings(normal.covariance[np.newaxis], np.ones((1, len(normal.mean)), dtype=bool))[0][0]
+        white = root @ self.typical_changes_ @ self.directions_.to_numpy().T
+        unit = white / np.maximum(np.linalg.norm(white, axis=0), np.finfo(float).tiny)
+        first, second = np.triu_indices(unit.shape[1], 1)
+        alike = (unit.T @ unit)[first, second] > ALIKE
+        names = self.directions_.index
+        return [(names[i], names[k]) for i, k in zip(first[alike], second[alike], strict=True)]
+
+
+def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
+    """Relative changes of the frequencies by direction, in the order of the modes, which may have names."""
+    modes = [f"mode {n + 1}" for n in range(n_modes)] if names is None or len(names) != n_modes else list(names)
+    if isinstance(directions, str):
+        if directions != "softening":
+            raise ValueError(
+                f"directions is {directions!r}; expected 'softening', an FE model, a fitted DataInformedFEM, or "
+                "relative changes (n_directions, n_modes)"
+            )
+        return pd.DataFrame(-np.eye(n_modes), modes, modes)
+    if is_model(directions) or is_model(getattr(directions, "model", None)):
+        directions = damage_directions(directions)
+    table = directions if isinstance(directions, pd.DataFrame) else pd.DataFrame(real_array(directions, "directions"))
+    labels = list(table.columns)
+    if (
+        isinstance(directions, pd.DataFrame)
+        and all(isinstance(one, str) for one in [*labels, *modes])
+        and names is not None
+    ):
+        if set(labels) != set(modes):
+            raise ValueError(f"directions have the columns {labels}; expected the modes {modes}")
+        table = table[modes]
+    values = as_floats(table)
+    if values.ndim != 2 or values.shape[1] != n_modes or not len(values):
+        raise ValueError(
+            f"directions have the shape {values.shape}; expected (n_directions, {n_modes}): a relative change of each "
+            f"of the modes {modes}"
+        )
+    if not np.isfinite(values).all() or not values.any(axis=1).all():
+        row = column_names(table.T, "direction ")[
+            int((~np.isfinite(values).all(axis=1) | ~values.any(axis=1)).argmax())
+        ]
+        raise ValueError(
+            f"direction {row!r} is zero or not finite; expected finite relative changes, one of them not 0"
+        )
+    own = table.index if isinstance(directions, pd.DataFrame) else [f"direction {n + 1}" for n in range(len(values))]
+    return pd.DataFrame(values, pd.Index(list(map(str, own))), modes)
+
+
+def _parts(records: Records) -> list[Records]:
+    """Some records after others, which bounds memory."""
+    return [records.of(slice(i, i + ROWS_AT_ONCE)) for i in range(0, len(records.values), ROWS_AT_ONCE)]
