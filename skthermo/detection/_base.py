@@ -84,6 +84,10 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """Hook: preprocess validated rows."""
         return F
 
+    def _baseline(self, X: Any, F: Array) -> Any:
+        """Hook: preprocess validated rows of a baseline; by default as any others."""
+        return self._records(X, F)
+
     @abstractmethod
     def _learn(self, F: Any, times: Array) -> Array:
         """Fit on records at some times; return calibration scores."""
@@ -148,7 +152,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """
         F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
         self._check_baseline(frame_like(X, F))
-        records = self._records(X, F)
+        records = self._baseline(X, F)
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_

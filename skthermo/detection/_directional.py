@@ -8,25 +8,22 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._effects import damage_directions
 from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, patterns, real_array
-from skthermo._tables.frames import Table, column_names
+from skthermo._tables.frames import column_names
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._cone import Cones
+from skthermo.detection._cone_test import Detectability, JoinedTests, mean_squares
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector
 from skthermo.detection._origin import Changes, origin_of
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.residuals.gaussian import Gaussian, precisions, whitenings
 
-N_DRAWS = 2000  # normal records, by which rates of detection are estimated
-N_DRAWS_OF_PATTERN = 400  # by which the mean squared index of a pattern of missing modes is
-TAIL, FEWEST_IN_TAIL = 0.1, 20  # share of the baseline that shows how rare large indices are, and least number of it
 UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
 ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be told apart
-STEPS = np.linspace(0.0, 1.0, 21)  # losses between which the smallest one that is found is interpolated
 
 
 @dataclass(frozen=True)
@@ -38,44 +35,6 @@ class Records:
 
     def of(self, rows: Any) -> Records:
         return Records(self.values[rows], self.changes.of(rows))
-
-
-@dataclass(frozen=True)
-class Tail:
-    """Squared indices of a baseline above a level, which a share of them exceeds, and by how much on average."""
-
-    level: float
-    excess: float
-
-    @classmethod
-    def of(cls, index: Array) -> Tail:
-        squares = index[np.isfinite(index)] ** 2
-        share = min(max(TAIL, FEWEST_IN_TAIL / max(len(squares), 1)), 0.5)
-        level = float(np.quantile(squares, 1 - share))
-        return cls(
-            level, max(float((squares[squares > level] - level).mean()) if (squares > level).any() else 0.0, 0.0)
-        )
-
-
-@dataclass(frozen=True)
-class JoinedTests:
-    """The index of the cone and that of the omnibus, joined so that the latter gives a share of the false alarms.
-
-    Squares of either index exceed their tails exponentially. The omnibus index is expressed as the index of the cone
-    that is exceeded as often, times what the shares of both are to each other; the larger of the two counts.
-    """
-
-    cone: Tail
-    omnibus: Tail
-    share: float
-
-    def __call__(self, cone: Array, omnibus: Array) -> Array:
-        if self.share in (0, 1):
-            return omnibus if self.share else cone
-        ratio = self.cone.excess / self.omnibus.excess if self.omnibus.excess > 0 else 1.0
-        rarer = np.log((1 - self.share) / self.share)
-        squared = self.cone.level + ratio * (omnibus**2 - self.omnibus.level) - self.cone.excess * rarer
-        return np.maximum(cone, np.sqrt(np.maximum(squared, 0.0)))
 
 
 class DirectionalDetector(MahalanobisDetector):
@@ -206,17 +165,18 @@ class DirectionalDetector(MahalanobisDetector):
         own = self.get_params(deep=False)
         return type(self)(**own | {"covariance": clone(self.covariance, safe=False)})  # a fitted chain is shared
 
-    def _check_baseline(self, F: Table) -> None:
-        super()._check_baseline(F)
+    def _baseline(self, X: Any, F: Array) -> Records:
         vars(self).pop("levels_", None)  # of an earlier fit
+        if origin_of(X) is None:
+            self.levels_ = self._levels(F)
+        return self._records(X, F)
 
     def _records(self, X: Any, F: Array) -> Records:
         origin = origin_of(X)
         if origin is not None:
             return Records(F, origin.changes())
-        if not hasattr(self, "levels_"):
-            self.levels_ = self._levels(F)
-        return Records(F, Changes.of_all(np.diag(self.levels_), len(F)))
+        matrix = np.diag(self.levels_) if hasattr(self, "levels_") else self.typical_changes_
+        return Records(F, Changes.of_all(matrix, len(F)))
 
     def _learn(self, records: Records, times: Array) -> Array:
         names = getattr(self, "feature_names_in_", None)
@@ -232,7 +192,7 @@ class DirectionalDetector(MahalanobisDetector):
             cone = cone * np.divide(omnibus, own, out=np.ones_like(own), where=own > 0)
         self.cone_scale_ = PatternScale.of(np.maximum(cone, np.finfo(float).tiny), present, self.contamination)
         cone = cone * self.cone_scale_(present)
-        self.tests_ = JoinedTests(Tail.of(cone), Tail.of(omnibus), self.omnibus)
+        self.tests_ = JoinedTests.of(cone, omnibus, self.omnibus)
         return self.tests_(cone, omnibus)
 
     def _index(self, records: Records) -> Array:
@@ -244,7 +204,7 @@ class DirectionalDetector(MahalanobisDetector):
         return self.tests_(cone if present.all() else cone * self.cone_scale_(present), omnibus)
 
     def _seen_at(self, threshold: float) -> str:
-        smallest = self._smallest(threshold, 0.5)
+        smallest = self._detectability(threshold).smallest(0.5)
         sizes = ", ".join(f"{name} {loss:.2g}" for name, loss in smallest.items())
         return f". Half of the records raise an alarm at these losses: {sizes}"
 
@@ -283,11 +243,7 @@ class DirectionalDetector(MahalanobisDetector):
             Share of such records above the threshold; at 0 the false alarms.
         """
         check_is_fitted(self)
-        losses = np.ravel(real_array(severities, "severities"))
-        if not ((losses >= 0) & (losses <= 1)).all():
-            raise ValueError(f"severities is {severities!r:.200}; expected losses from 0 to 1")
-        found = self._rates(losses, self.threshold_)
-        return pd.DataFrame(found, pd.Index(losses, name="severity"), self.directions_.index)
+        return self._detectability(self.threshold_).pod(severities)
 
     def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records.
@@ -303,37 +259,16 @@ class DirectionalDetector(MahalanobisDetector):
             Loss of stiffness by group, infinite where not even a whole loss is found.
         """
         check_is_fitted(self)
-        return self._smallest(self.threshold_, check_probability(level, "level"))
+        return self._detectability(self.threshold_).smallest(check_probability(level, "level"))
 
-    def _smallest(self, threshold: float, level: float) -> pd.Series:
-        """Between steps of losses, the first of which is found often enough, and again between finer ones."""
-        smallest = {}
-        for place, name in enumerate(self.directions_.index):
-            low, high = 0.0, 1.0
-            for _ in range(2):
-                steps = low + STEPS * (high - low)
-                rates = self._rates(steps, threshold, [place])[:, 0]
-                reached = np.flatnonzero(rates >= level)
-                if not len(reached):
-                    low = high = np.inf
-                    break
-                last = max(reached[0], 1)
-                low, high = float(steps[last - 1]), float(steps[last])
-            smallest[name] = high
-        return pd.Series(smallest, pd.Index(self.directions_.index, name="direction"), dtype=float)
+    def _detectability(self, threshold: float) -> Detectability:
+        return Detectability(self.tests_, self._white_effects(), list(self.directions_.index), threshold)
 
-    def _rates(self, losses: Array, threshold: float, places: Any = slice(None)) -> Array:
-        """Shares of normal records above a threshold, (n_losses, n_directions), each direction by itself."""
-        effects = self.directions_.to_numpy()[places] @ self.typical_changes_.T
+    def _white_effects(self) -> Array:
+        """What a unit of each direction makes of whitened columns, (n_columns, n_directions)."""
         normal = self._normal
-        draws = np.random.RandomState(0).standard_normal((N_DRAWS, len(normal.mean)))
-        rows = normal.mean + draws @ np.linalg.cholesky(normal.covariance).T
-        changes = Changes.of_all(self.typical_changes_, N_DRAWS)
-        rates = np.empty((len(losses), len(effects)))
-        for n, loss in enumerate(losses):
-            for direction, effect in enumerate(effects):
-                rates[n, direction] = (self._joined(Records(rows + loss * effect, changes)) > threshold).mean()
-        return rates
+        root = whitenings(normal.covariance[np.newaxis], np.ones((1, len(normal.mean)), dtype=bool))[0][0]
+        return root @ self.typical_changes_ @ self.directions_.to_numpy().T
 
     def _levels(self, F: Array) -> Array:
         """What a relative change of each frequency makes of its column, in records of which no step says it."""
@@ -372,28 +307,19 @@ class DirectionalDetector(MahalanobisDetector):
         amounts[~present.any(axis=1)] = np.nan
         if present.all():
             return amounts, lengths
-        size = self._mean_squares(correlation, masks, scale)
-        whole = self._mean_squares(correlation, np.ones((1, len(scale)), dtype=bool), scale)[0]
+        effects = self.typical_changes_ / scale[:, np.newaxis] @ self.directions_.to_numpy().T
+        whole, *sizes = mean_squares(
+            whitenings(correlation, np.vstack([np.ones(len(scale), bool), masks]))[0] @ effects
+        )
+        size = np.array(sizes)
         nothing = size <= 0
         mapped = as_if_complete(lengths, np.where(nothing, whole, size)[pattern], whole)
         mapped = np.where(nothing[pattern], 0.0, np.nan_to_num(mapped))
         return amounts, np.where(present.any(axis=1), mapped, np.nan)
 
-    def _mean_squares(self, correlation: Array, masks: NDArray[np.bool_], scale: Array) -> Array:
-        """Mean squared length of the projection of normal records that have the modes of each mask."""
-        effects = self.typical_changes_ / scale[:, np.newaxis] @ self.directions_.to_numpy().T
-        roots = whitenings(correlation, masks)[0]
-        draws = np.random.RandomState(0).standard_normal((N_DRAWS_OF_PATTERN, len(scale)))
-        white = roots @ effects
-        which = np.repeat(np.arange(len(masks)), N_DRAWS_OF_PATTERN)
-        lengths = Cones.of(white).project((draws @ white).reshape(len(which), -1), which)[1]
-        return (lengths.reshape(len(masks), -1) ** 2).mean(axis=1)
-
     def _alike(self) -> list[tuple[str, str]]:
         """Pairs of directions with nearly the same whitened effects."""
-        normal = self._normal
-        root = whitenings(normal.covariance[np.newaxis], np.ones((1, len(normal.mean)), dtype=bool))[0][0]
-        white = root @ self.typical_changes_ @ self.directions_.to_numpy().T
+        white = self._white_effects()
         unit = white / np.maximum(np.linalg.norm(white, axis=0), np.finfo(float).tiny)
         first, second = np.triu_indices(unit.shape[1], 1)
         alike = (unit.T @ unit)[first, second] > ALIKE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +11,19 @@ from scipy.special import betainc, betaincinv
 from scipy.stats import chi
 
 from skthermo._estimators.warnings import reported_by_caller, without_warnings
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, patterns
+from skthermo.detection._cone import Cones
+from skthermo.detection._cone_test import mean_squares
 from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.detection._origin import Changes, Origin, with_origin
 from skthermo.detection._patterns import as_if_complete
 from skthermo.detection._windows import Windows
-from skthermo.residuals.gaussian import Gaussian, check_invertible
+from skthermo.residuals.gaussian import Gaussian, check_invertible, whitenings
 
 CLIPPED = 1.5  # standard deviations within a window beyond which a record moves the mean of the window no more
 TOGETHER = 512  # windows whose values a processor keeps at hand
 OF_COLUMNS = "implausible-values", "isolated-level", "equal-columns", "few-values"  # kinds of findings
+SMALLEST_SIZE = 0.1  # mean square of a projection on a cone that hardly any mode shows
 SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in proportion to those of their records
 
 
@@ -26,14 +31,16 @@ SMALLEST_CHANCE = 1e-50  # indices of windows that are less likely grow in propo
 class MeanLaw:
     """Length of the robust mean of whitened records, over the standard deviation of their mean.
 
-    This grows with the mean ``correlation`` of two whitened records in one window, mode by mode.
+    This grows with the mean ``correlation`` of two whitened records in one window, mode by mode. With ``effects`` of
+    some directions on the columns, (n_columns, n_directions), there is also the length of its projection on their cone.
     """
 
     records: Gaussian
     correlation: Array
+    effects: Array | None = None
 
     @classmethod
-    def of(cls, windows: Windows, rows: NDArray[np.intp]) -> MeanLaw:
+    def of(cls, windows: Windows, rows: NDArray[np.intp], effects: Array | None = None) -> MeanLaw:
         """Learned from the records in some rows, and from the windows that end there."""
         records = Gaussian.of(windows.rows[rows])
         check_invertible(records.covariance, windows.rows[rows])
@@ -41,18 +48,39 @@ class MeanLaw:
         sums, counts = windows.sums(np.nan_to_num(white)), windows.sums((~np.isnan(white)).astype(float))
         squares = windows.sums(np.nan_to_num(white) ** 2)
         excess, pairs = (sums**2 - squares)[rows].sum(axis=0), (counts**2 - counts)[rows].sum(axis=0)
-        return cls(records, np.clip(excess / np.maximum(pairs, 1), 0.0, 1.0))
+        return cls(records, np.clip(excess / np.maximum(pairs, 1), 0.0, 1.0), effects)
 
-    def index(self, windows: Windows) -> Array:
-        """Damage index of every window; NaN where no record has a mode."""
+    def indices(self, windows: Windows) -> Array:
+        """Damage indices of every window, (n_tests, n_windows), the omnibus first; NaN where no record has a mode."""
         white = self.records.whiten(windows.rows)
         counts, limits = windows.sums((~np.isnan(white)).astype(float)), CLIPPED * np.sqrt(1 - self.correlation)
         columns = zip(white.T, limits, strict=True)
         means = np.column_stack([robust_means(windows.inside(column), limit) for column, limit in columns])
-        known = counts > 0
-        variances = self.correlation + (1 - self.correlation) / np.where(known, counts, 1.0)
-        squared = np.where(known, means**2, 0.0) / variances
-        return as_if_complete(np.sqrt(squared.sum(axis=1)), known.sum(axis=1), means.shape[1])
+        deviations = self.deviations(counts)
+        standard = np.where(counts > 0, means / deviations, 0.0)
+        known, n_modes = (counts > 0).sum(axis=1), means.shape[1]
+        omnibus = as_if_complete(np.linalg.norm(standard, axis=1), known, n_modes)
+        if self.effects is None:
+            return omnibus[np.newaxis]
+        cases, case = np.unique(np.where(counts > 0, 1 / deviations, 0.0), axis=0, return_inverse=True)
+        effects = cases[:, :, np.newaxis] * self.white_effects
+        along = np.einsum("ij,ijk->ik", standard, effects[case])
+        lengths = Cones.of(effects).project(along, case)[1]
+        masks, mask = patterns(counts > 0)
+        if not masks.all():
+            whole, *sizes = mean_squares(np.vstack([np.ones(n_modes), masks])[:, :, np.newaxis] * self.white_effects)
+            lengths = as_if_complete(lengths, np.maximum(sizes, SMALLEST_SIZE)[mask], whole)
+        return np.stack([omnibus, np.where(known > 0, lengths, np.nan)])
+
+    def deviations(self, counts: Array) -> Array:
+        """Standard deviations of the means of so many whitened records of each mode."""
+        return np.sqrt(self.correlation + (1 - self.correlation) / np.maximum(counts, 1))
+
+    @property
+    def white_effects(self) -> Array:
+        """Whitened effects of the directions, (n_modes, n_directions)."""
+        complete = np.ones((1, len(self.correlation)), dtype=bool)
+        return whitenings(self.records.covariance[np.newaxis], complete)[0][0] @ self.effects
 
 
 def robust_means(rows: Array, limit: float) -> Array:
@@ -84,23 +112,31 @@ class CountLaw:
     detector: MahalanobisDetector
     n: int
     m: int
+    changes: Array | None = None
 
     @classmethod
-    def of(cls, windows: Windows, rows: NDArray[np.intp], contamination: float, m: int | None) -> CountLaw:
-        """Learned from the records in some rows."""
-        detector = MahalanobisDetector(contamination, threshold="quantile")
+    def of(
+        cls,
+        windows: Windows,
+        rows: NDArray[np.intp],
+        detector: MahalanobisDetector,
+        m: int | None,
+        changes: Array | None = None,
+    ) -> CountLaw:
+        """Learned from the records in some rows by an unfitted detector, which may need to know what changes make of
+        them."""
         with reported_by_caller(OF_COLUMNS):  # the whole baseline has been checked
-            detector.fit(windows.rows[rows])
+            detector.set_params(threshold="quantile").fit(_known(windows.rows[rows], changes))
         n = int(np.median(windows.sizes))
         if m is not None and m > n:
             raise ValueError(f"m is {m}, but windows hold {n} records; expected at most as many")
-        return cls(detector, n, (n + 1) // 2 if m is None else m)
+        return cls(detector, n, (n + 1) // 2 if m is None else m, changes)
 
-    def index(self, windows: Windows) -> Array:
-        """Damage index of every window; NaN where no record has a mode."""
+    def indices(self, windows: Windows) -> Array:
+        """Damage index of every window, (1, n_windows); NaN where no record has a mode."""
         with without_warnings():  # the alarm counts windows that are not evaluated
-            single = self.detector.damage_index(windows.rows)
-        return self._as_if_full(windows.inside(single), windows.rows.shape[1])
+            single = self.detector.damage_index(_known(windows.rows, self.changes))
+        return self._as_if_full(windows.inside(single), windows.rows.shape[1])[np.newaxis]
 
     def _as_if_full(self, single: Array, n_modes: int) -> Array:
         """The m-th largest index of each row, m in proportion to the records that are there."""
@@ -117,3 +153,11 @@ class CountLaw:
         chance = betainc(m, count - m + 1, chi.sf(np.minimum(value, farthest), n_modes))
         full = chi.isf(betaincinv(self.m, self.n - self.m + 1, np.maximum(chance, SMALLEST_CHANCE)), n_modes)
         return np.maximum(value / farthest, 1.0) * full
+
+
+def _known(rows: Array, matrix: Array | None) -> Array:
+    """A copy of some rows, of which a detector knows what relative changes of the frequencies make of them."""
+    rows = rows.copy()
+    if matrix is None:
+        return rows
+    return with_origin(rows, Origin(partial(np.zeros, len(rows)), partial(Changes.of_all, matrix, len(rows))))

@@ -7,20 +7,31 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
 from sklearn.model_selection import KFold
+from sklearn.utils.metaestimators import available_if
 
-from skthermo._tables.arrays import Array
+from skthermo._estimators.warnings import without_warnings
+from skthermo._tables.arrays import Array, check_probability
 from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._cone_test import Detectability, JoinedTests
+from skthermo.detection._directional import DirectionalDetector
 from skthermo.detection._laws import CountLaw, MeanLaw
+from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._thresholds import conformal_threshold
 from skthermo.detection._windows import Windows
 from skthermo.residuals.gaussian import check_not_empty
 from skthermo.residuals.neighbourhoods import Neighbourhoods
 
 MOST_PERIODS = 50  # into which the baseline is divided; the windows of each are evaluated by the others
+
+
+def _tests_directions(alarm: WindowedAlarm) -> bool:
+    """Whether means of windows are tested against directions."""
+    return alarm.rule == "mean" and isinstance(alarm.detector, DirectionalDetector)
 
 
 class WindowedAlarm(DamageDetector):
@@ -41,6 +52,9 @@ class WindowedAlarm(DamageDetector):
           lasting changes.
         - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that there
           is an alarm where m of them exceed the threshold. Not misled by a few implausible records.
+    detector : MahalanobisDetector or DirectionalDetector, optional
+        Unfitted; by default a `MahalanobisDetector`. With a `DirectionalDetector`, the mean of a window is tested
+        against the cone of its directions, and for "m-of-n" the index of each record is its index.
     m : int, optional
         Number of records of a full window that have to exceed the threshold; by default half of them. For
         ``rule="m-of-n"``.
@@ -49,11 +63,17 @@ class WindowedAlarm(DamageDetector):
 
     Attributes
     ----------
+    detector_ : DirectionalDetector or None
+        Fitted to the records of the baseline; None without directions.
+    tests_ : object or None
+        How the test against the cone and that in any direction are joined; None without directions.
     law_ : object
         Distribution of the records, learned from the baseline, by which windows are evaluated.
     width_, fewest_ : int
         Largest number of records in a window, and fewest with a value that a window is evaluated by: half as many as a
         window of the baseline has (median).
+    usual_counts_ : ndarray of shape (n_modes,)
+        Mean number of records in a window that have each mode.
     lookback_ : int or numpy.timedelta64
         How far back a window looks: a number of rows before its last one, or a time.
     baseline_index_ : ndarray of shape (n_samples,)
@@ -96,6 +116,7 @@ class WindowedAlarm(DamageDetector):
         "window": [Interval(Integral, 1, None, closed="left"), str],
         "rule": [StrOptions({"mean", "m-of-n"})],
         "m": [Interval(Integral, 1, None, closed="left"), None],
+        "detector": [MahalanobisDetector, None],
     }
 
     def __init__(
@@ -104,11 +125,13 @@ class WindowedAlarm(DamageDetector):
         *,
         rule: Literal["mean", "m-of-n"] = "mean",
         m: int | None = None,
+        detector: MahalanobisDetector | None = None,
         contamination: float = 0.02,
     ):
         self.window = window
         self.rule = rule
         self.m = m
+        self.detector = detector
         self.contamination = contamination
 
     @property
@@ -122,6 +145,14 @@ class WindowedAlarm(DamageDetector):
             raise ValueError(f"m is {self.m}, but rule is {self.rule!r}; expected m only with the rule 'm-of-n'")
         return Windows.of(X, F, self.window)
 
+    def _baseline(self, X: Any, F: Array) -> Windows:
+        windows, self.detector_ = self._records(X, F), None
+        if isinstance(self.detector, DirectionalDetector):
+            check_not_empty(F)
+            with without_warnings():  # of single records
+                self.detector_ = clone(self.detector).set_params(contamination=self.contamination).fit(X)
+        return windows
+
     def _learn(self, windows: Windows, times: Array) -> Array:
         check_not_empty(windows.rows)
         n_rows, width = len(windows.rows), windows.longest
@@ -131,19 +162,30 @@ class WindowedAlarm(DamageDetector):
                 "many rows"
             )
         n_periods = int(np.clip(n_rows // (2 * width), 2, MOST_PERIODS))
-        baseline, index = Neighbourhoods(times, windows.rows), np.empty(n_rows)
+        baseline, runs = Neighbourhoods(times, windows.rows), []
         for _, fold in KFold(n_periods).split(windows.rows):
             law = self._law(windows, baseline.away_from(np.isin(np.arange(n_rows), fold)))
-            index[fold] = _index_of_run(law, windows, fold[0], fold[-1] + 1)
+            runs.append(_indices_of_run(law, windows, fold[0], fold[-1] + 1))
         self.law_, self.width_ = self._law(windows, np.arange(n_rows)), width
         self.fewest_ = int(np.ceil(np.median(windows.n_known) / 2))
-        return np.where(windows.n_known < self.fewest_, np.nan, index)
+        self.usual_counts_ = windows.sums((~np.isnan(windows.rows)).astype(float))[width - 1 :].mean(axis=0)
+        indices = np.where(windows.n_known < self.fewest_, np.nan, np.concatenate(runs, axis=1))
+        self.tests_ = JoinedTests.of(indices[1], indices[0], self.detector_.omnibus) if len(indices) > 1 else None
+        return self._joined(indices)
+
+    def _joined(self, indices: Array) -> Array:
+        return indices[0] if self.tests_ is None else self.tests_(indices[1], indices[0])
 
     def _law(self, windows: Windows, rows: NDArray[np.intp]) -> MeanLaw | CountLaw:
         """The distribution learned from the records in some rows."""
+        directional, effects, changes = self.detector_, None, None
+        if directional is not None:
+            changes = directional.typical_changes_
+            effects = changes @ directional.directions_.to_numpy().T
         if self.rule == "mean":
-            return MeanLaw.of(windows, rows)
-        return CountLaw.of(windows, rows, self.contamination, self.m)
+            return MeanLaw.of(windows, rows, effects)
+        detector = MahalanobisDetector() if self.detector is None else clone(self.detector)
+        return CountLaw.of(windows, rows, detector.set_params(contamination=self.contamination), self.m, changes)
 
     def _limit(self, index: Array) -> float:
         is_high = np.where(np.isnan(index), np.nan, index > np.nanquantile(index, 1 - self.contamination))
@@ -152,14 +194,52 @@ class WindowedAlarm(DamageDetector):
         return conformal_threshold(index, self.contamination, 1 / time, "windows")
 
     def _index(self, windows: Windows) -> Array:
-        index = np.concatenate([_index_of_run(self.law_, windows, run.start, run.stop) for run in windows.runs()])
-        return np.where(windows.n_known < self.fewest_, np.nan, index)
+        runs = [_indices_of_run(self.law_, windows, run.start, run.stop) for run in windows.runs()]
+        return self._joined(np.where(windows.n_known < self.fewest_, np.nan, np.concatenate(runs, axis=1)))
 
     def _own_index(self, windows: Windows) -> Array:
         return self._index(windows)
 
     def _seen_at(self, threshold: float) -> str:
         return f". It sees shifts of the mean of a window of {threshold:.2g} of its standard deviations"
+
+    @available_if(_tests_directions)
+    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+        """Probability of detection of full windows by the rule "mean", as `DirectionalDetector.pod` of records.
+
+        Parameters
+        ----------
+        severities : array-like of shape (n_severities,)
+            Amounts of each direction: losses of stiffness of each group, from 0 to 1.
+
+        Returns
+        -------
+        DataFrame of shape (n_severities, n_directions)
+            Share of windows above the threshold, all of whose records have the loss.
+        """
+        return self._detectability().pod(severities)
+
+    @available_if(_tests_directions)
+    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+        """Smallest amount of each direction that a share of full windows finds, by the rule "mean".
+
+        Parameters
+        ----------
+        level : float, default=0.9
+            That share, between 0 and 1.
+
+        Returns
+        -------
+        Series of shape (n_directions,)
+            Loss of stiffness by group, infinite where not even a whole loss is found.
+        """
+        return self._detectability().smallest(check_probability(level, "level"))
+
+    def _detectability(self) -> Detectability:
+        check_is_fitted(self)
+        deviations = self.law_.deviations(self.usual_counts_)
+        white = self.law_.white_effects / deviations[:, np.newaxis]
+        return Detectability(self.tests_, white, list(self.detector_.directions_.index), self.threshold_)
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return (
@@ -168,6 +248,6 @@ class WindowedAlarm(DamageDetector):
         )
 
 
-def _index_of_run(law: MeanLaw | CountLaw, windows: Windows, start: int, stop: int) -> Array:
-    """Damage index of the windows that end in a run of records."""
-    return law.index(windows.ending_in(start, stop))[start - stop :]
+def _indices_of_run(law: MeanLaw | CountLaw, windows: Windows, start: int, stop: int) -> Array:
+    """Damage indices of the windows that end in a run of records, (n_tests, n_windows)."""
+    return law.indices(windows.ending_in(start, stop))[:, start - stop :]
