@@ -34,6 +34,7 @@ from skthermo.commands._settings import (
     read_settings,
     settings_of,
 )
+from skthermo.detection import DirectionalDetector
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
 
@@ -49,6 +50,13 @@ FEATURES = {
 DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day can be evaluated together
 SINGLE = ("MahalanobisDetector", {}, "each record for itself")
 DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
+FALLS = {"class": "DirectionalDetector"}  # of natural frequencies, as damage has it
+SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, and falls of frequencies before all")
+DAY_FALLS = (
+    "WindowedAlarm",
+    {"window": "1D", "detector": FALLS},
+    "the records of a day together, and falls of frequencies before all",
+)
 WIDTH = 110  # of comments
 OTHERS = """
 # An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives one,
@@ -81,10 +89,17 @@ class Candidate:
 
 
 def candidates(
-    step: pd.Timedelta, baseline: pd.DataFrame, monitor: Callable[[str, Mapping[str, Any]], Monitor]
+    step: pd.Timedelta,
+    baseline: pd.DataFrame,
+    monitor: Callable[[str, Mapping[str, Any]], Monitor],
+    are_frequencies: bool,
 ) -> list[Candidate]:
-    """Detectors that are possible, the best first; the single record where nothing speaks for another."""
-    kinds = [SINGLE, DAY] if step <= DENSE else [SINGLE]
+    """Detectors that are possible, the best first; the single record where nothing speaks for another.
+
+    Of natural frequencies, those that know in which direction damage moves them.
+    """
+    single, day = (SINGLE_FALLS, DAY_FALLS) if are_frequencies else (SINGLE, DAY)
+    kinds = [single, day] if step <= DENSE else [single]
     tried = []
     for kind, chosen, text in kinds:
         try:
@@ -183,11 +198,12 @@ class Proposal:
         options = {"compensator": {}, "monitor": self.monitor_options}
 
         def monitor(kind: str, chosen: Mapping[str, Any]) -> Monitor:
-            detector = class_named(kind, CLASSES["detector"])(**chosen)
+            inner = {key: DirectionalDetector() for key, one in chosen.items() if one is FALLS}
+            detector = class_named(kind, CLASSES["detector"])(**{**chosen, **inner})
             found = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
             return found.monitor()
 
-        return candidates(self.step, self.baseline, monitor)
+        return candidates(self.step, self.baseline, monitor, set(self.units.values()) == {HZ})
 
     @property
     def features(self) -> list[tuple[str, dict[str, Any]]]:

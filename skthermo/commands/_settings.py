@@ -21,10 +21,11 @@ from typing import Any, NamedTuple, Union, get_args, get_origin, get_type_hints
 from zoneinfo import ZoneInfo
 
 import pandas as pd
+from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 
 from skthermo.commands._record_files import CsvFormat
-from skthermo.detection import TemperatureCompensator
+from skthermo.detection import DirectionalDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 
 NONE = "none"  # in a file, where a parameter may be None and is not by default
@@ -203,7 +204,7 @@ class Settings:
         regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
         targets, reference = list(self.records.responses), list(self.records.reference) or None
         compensator = TemperatureCompensator(regression, targets=targets, **self.options["compensator"])
-        detector = make_pipeline(compensator, self.parts["detector"])
+        detector = make_pipeline(compensator, with_directions_of(fem, self.parts["detector"]))
         return Monitor(detector, reference=reference, fem=fem, **self.options["monitor"])
 
     def fem(self, T: pd.DataFrame, F: pd.DataFrame) -> Any:
@@ -212,6 +213,16 @@ class Settings:
         if not options:
             return None
         return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+
+
+def with_directions_of(fem: Any, detector: Any) -> Any:
+    """The detector, which takes the directions of damage from a fitted chain where it knows none but "softening"."""
+    inner = getattr(detector, "detector", None)
+    one = inner if isinstance(inner, DirectionalDetector) else detector
+    if fem is None or not isinstance(one, DirectionalDetector) or not isinstance(one.directions, str):
+        return detector
+    own = clone(one).set_params(directions=fem)
+    return own if one is detector else clone(detector).set_params(detector=own)
 
 
 def _model(path: Path, settings: Path) -> Any:
@@ -317,7 +328,11 @@ class _Reader:
             maker = class_named(values.pop("class", None), CLASSES[name])
         except ValueError as error:
             raise self.error(name, number, "class", f"[{name}] class {error}") from error
-        estimator = maker(**self._known(name, number, values, settings_of(maker)))
+        known = self._known(name, number, values, settings_of(maker))
+        parts = {
+            key: self._made(name, number, one) for key, one in known.items() if isinstance(one, dict) and "class" in one
+        }
+        estimator = maker(**known | parts)
         self._validate(name, number, estimator)
         return estimator
 

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
+from sklearn.pipeline import make_pipeline
 
 from skthermo._tables.arrays import robust_deviation
 from skthermo._tables.frames import positions_of
 from skthermo._validation import check_is_fitted
-from skthermo.detection import TemperatureCompensator
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing.checks import gross_errors
+from skthermo.surrogate import TemperatureMapper
 
 TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
 
@@ -41,6 +43,19 @@ class Columns:
         own = [inputs[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
         targets = _responses(monitor, inputs, own)
         return cls(inputs, reference, targets, inputs if compensators else targets, _units(monitor, columns, targets))
+
+
+def default_detector(monitor: Any, columns: list[Any]) -> BaseEstimator:
+    """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
+    reference = _among(monitor.reference or [], columns, "reference")
+    inputs = [name for name in columns if name not in reference]
+    targets = _responses(monitor, inputs, None)
+    directions = "softening" if monitor.fem is None else monitor.fem
+    in_hertz = {_units(monitor, columns, targets)[name] for name in targets} == {"Hz"}
+    last = DirectionalDetector(directions) if in_hertz else MahalanobisDetector()
+    if len(targets) == len(inputs):
+        return last
+    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=targets), last)
 
 
 def _responses(monitor: Any, columns: list[Any], own: list[Any] | None) -> list[Any]:

@@ -30,7 +30,7 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._columns import Columns, refuse_meaningless
+from skthermo.monitoring._columns import Columns, default_detector, refuse_meaningless
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
@@ -51,10 +51,13 @@ class Monitor(SavesFrames, Estimator):
 
     Parameters
     ----------
-    detector : detector or Pipeline
+    detector : detector or Pipeline, optional
         Any detector of ``skthermo.detection``, or a pipeline that ends with one, such as
         ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
-        frequencies only.
+        frequencies only. By default a `~skthermo.surrogate.TemperatureMapper` predicts the ``targets`` from the other
+        columns, if there are any. Then a `~skthermo.detection.DirectionalDetector` evaluates responses in Hz, with the
+        directions of ``fem`` if there is one, and a `~skthermo.detection.MahalanobisDetector` any others: only
+        frequencies have a side on which damage lies.
     targets : sequence of str, optional
         Names of the responses: natural frequencies, or any others of any sign and unit. By default those of the
         compensator, else those that ``fem`` was fitted on; with a compensator, they have to be its own.
@@ -184,7 +187,7 @@ class Monitor(SavesFrames, Estimator):
     """
 
     _parameter_constraints: dict = {
-        "detector": [HasMethods(["fit", "score_samples"])],
+        "detector": [HasMethods(["fit", "score_samples"]), None],
         "targets": ["array-like", None],
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
@@ -203,7 +206,7 @@ class Monitor(SavesFrames, Estimator):
 
     def __init__(
         self,
-        detector: Any,
+        detector: Any = None,
         *,
         targets: Sequence[Hashable] | None = None,
         reference: Sequence[Hashable] | None = None,
@@ -270,7 +273,9 @@ class Monitor(SavesFrames, Estimator):
         return self.active_.corrections.drifts(self.status_.corrections)
 
     def __sklearn_clone__(self) -> Monitor:
-        return type(self)(**self.get_params(deep=False) | {"detector": clone(self.detector)})  # the chain is shared
+        return type(self)(
+            **self.get_params(deep=False) | {"detector": clone(self.detector, safe=False)}
+        )  # the chain is shared
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
@@ -316,7 +321,7 @@ class Monitor(SavesFrames, Estimator):
         """
         max_delay, max_jump, retention = self._checked_times()
         baseline = _read_baseline(X)
-        detector = clone(self.detector)
+        detector = default_detector(self, list(baseline.columns)) if self.detector is None else clone(self.detector)
         seed_parts(detector, seeded(self.random_state))
         columns = Columns.of(self, detector, list(baseline.columns))
         self.targets_, self.units_ = columns.targets, columns.units

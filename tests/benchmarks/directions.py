@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/directions.py [--parts truss fleet footbridge z24 ...] [--first-seed 100]
 
-- truss, fleet, footbridge: a year learned; another healthy year and damaged ones evaluated. Fleet: two-hourly records of
-  bridges with models that are a little wrong. Footbridge: `blind_bridge.py`, with frost, gaps and outliers.
+- truss, fleet, footbridge: a year learned; another healthy year and damaged ones evaluated. Fleet: six-hourly records
+  of bridges with models that are a little wrong. Footbridge: `blind_bridge.py`, with frost, gaps and outliers.
 - z24: four folds, in each of which a quarter of the healthy records, a contiguous one, is held back.
 - wrong: the truss with directions that are off at random, lack a group, or are another structure's.
 - promised: rates by ``pod`` beside those of true records of the truss and of the fleet.
@@ -193,7 +193,9 @@ def z24(options):
             if hasattr(detector, "steps"):
                 limit = detector[-1].threshold_
                 own.setdefault(what, []).append([(found[one] > limit).mean() for one in ("healthy", "damaged")])
-    print("Z24, four held-back quarters together: damage found at 0.5, 1, 2 % false alarms; own threshold: false, found")
+    print(
+        "Z24, four held-back quarters together: damage found at 0.5, 1, 2 % false alarms; own threshold: false, found"
+    )
     for what, folds in rows.items():
         healthy = np.concatenate([one["healthy"] for one in folds])
         damaged = np.concatenate([one["damaged"] for one in folds])
@@ -238,7 +240,7 @@ def promised(options):
         last = detector[-1]
         for damage, index in indices(detector, tables).items():
             true = (index[~np.isnan(index)] > last.threshold_).mean()
-            group, loss = (damage.rsplit(" ", 1) if damage != "healthy" else (last.directions_.index[0], "0%"))
+            group, loss = damage.rsplit(" ", 1) if damage != "healthy" else (last.directions_.index[0], "0%")
             if group in last.directions_.index:
                 said = last.pod([float(loss.strip("%")) / 100])[group].iloc[0]
                 what = "damaged" if damage != "healthy" else "healthy"
@@ -249,7 +251,7 @@ def promised(options):
 
 
 def whiten(options):
-    options = argparse.Namespace(**vars(options) | {"parts": [p for p in ("truss", "fleet", "footbridge")]})
+    options = argparse.Namespace(**vars(options) | {"parts": ["truss", "fleet", "footbridge"]})
     rows = {}
     for name, model, baseline, tables, _ in structures(options):
         targets = [column for column in baseline if str(column).startswith("f")]
@@ -276,7 +278,10 @@ def timed(options):
     print("A year of hourly records, fit and predict: seconds, and times those of MahalanobisDetector")
     for what, table in (("complete", F), ("10 % gaps", gaps)):
         seconds = {}
-        for name, detector in (("Mahalanobis", MahalanobisDetector()), ("directional", DirectionalDetector(make_truss()))):
+        for name, detector in (
+            ("Mahalanobis", MahalanobisDetector()),
+            ("directional", DirectionalDetector(make_truss())),
+        ):
             best = []
             for _ in range(3):
                 begun = time.perf_counter()

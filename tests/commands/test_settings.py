@@ -14,9 +14,11 @@ from sklearn.pipeline import make_pipeline
 import skthermo.detection
 from skthermo.commands._proposal import toml
 from skthermo.commands._settings import CLASSES, SECTIONS, class_named, read_settings, settings_of
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import ExponentialMeans, HingeFeatures
+from skthermo.surrogate import DataInformedFEM
 from tests.commands.folders import run
 
 MODES = ["f1", "f2", "f3", "f4", "f5", "f6"]
@@ -68,20 +70,38 @@ def test_each_section_describes_all_of_its_parameters():
 
 
 def test_the_file_makes_what_python_makes(read):
-    assert repr(read().monitor()) == repr(by_python(MahalanobisDetector(), HingeFeatures(), Ridge()))
-    windowed = read('class = "MahalanobisDetector"', 'class = "WindowedAlarm"\nwindow = "5D"').monitor()
-    assert repr(windowed) == repr(by_python(WindowedAlarm("5D"), HingeFeatures(), Ridge()))
+    assert repr(read().monitor()) == repr(by_python(DirectionalDetector(), HingeFeatures(), Ridge()))
+    paper = read('class = "DirectionalDetector"', 'class = "MahalanobisDetector"').monitor()
+    assert repr(paper) == repr(by_python(MahalanobisDetector(), HingeFeatures(), Ridge()))
+    window = 'class = "WindowedAlarm"\nwindow = "5D"\ndetector = {class = "DirectionalDetector", omnibus = 0.1}'
+    windowed = read('class = "DirectionalDetector"', window).monitor()
+    inner = DirectionalDetector(omnibus=0.1)
+    assert repr(windowed) == repr(by_python(WindowedAlarm("5D", detector=inner), HingeFeatures(), Ridge()))
     means = '[[features]]\nclass = "ExponentialMeans"\ntime_constants = ["2D", "20D"]\n\n[[features]]\nclass = "H'
     two = read('[[features]]\nclass = "H', means).monitor()
     assert repr(two) == repr(
-        by_python(MahalanobisDetector(), ExponentialMeans(["2D", "20D"]), HingeFeatures(), Ridge())
+        by_python(DirectionalDetector(), ExponentialMeans(["2D", "20D"]), HingeFeatures(), Ridge())
     )
     others = read('# whiten = "auto"', 'whiten = "none"').monitor()
     assert others.detector[0].whiten is None
     softening = read('# direction = "both"', 'direction = "softening"\nmax_jump = "30D"').monitor()
-    expected = by_python(MahalanobisDetector(), HingeFeatures(), Ridge(), direction="softening", max_jump="30D")
+    expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), direction="softening", max_jump="30D")
     assert repr(softening) == repr(expected)
     assert clone(softening).get_params(deep=False).keys() == softening.get_params(deep=False).keys()
+
+
+def test_directions_are_those_of_the_chain_where_there_is_one(read):
+    year = make_truss_campaign(random_state=0)
+    fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    inner = 'class = "WindowedAlarm"\nwindow = "5D"\ndetector = {class = "DirectionalDetector"}'
+    window = read('class = "DirectionalDetector"', inner)
+    assert read().monitor(fem).detector[-1].directions is fem
+    assert window.monitor(fem).detector[-1].detector.directions is fem
+    assert read('# directions = "softening"', "directions = [[-1, 0, 0, 0, 0, 0]]").monitor(fem).detector[
+        -1
+    ].directions == [[-1, 0, 0, 0, 0, 0]]
+    paper = read('class = "DirectionalDetector"', 'class = "MahalanobisDetector"')
+    assert isinstance(paper.monitor(fem).detector[-1], MahalanobisDetector)
 
 
 def test_defaults_that_the_file_shows_are_those_that_hold(proposed, read, tmp_path):
@@ -104,7 +124,7 @@ def test_defaults_that_the_file_shows_are_those_that_hold(proposed, read, tmp_pa
         ("# persistence = 3", 'persistence = "three"', "persistence"),
         ('# direction = "both"', 'direction = "down"', "softening"),
         ("false_alarms_per_year = 1.0", "false_alarms_per_year = -1", "false_alarms_per_year"),
-        ('class = "MahalanobisDetector"', 'class = "MahalanobisDetecter"', "did you mean 'MahalanobisDetector'"),
+        ('class = "DirectionalDetector"', 'class = "MahalanobisDetecter"', "did you mean 'MahalanobisDetector'"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "sklearn.linear_model.Rigde"', "scikit-learn"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "os.system"', "scikit-learn"),
         ('class = "sklearn.linear_model.Ridge"', "alpha = 2", "class"),

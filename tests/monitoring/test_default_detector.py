@@ -1,0 +1,55 @@
+"""The detector of a monitor to which none is given."""
+
+import warnings
+
+import pandas as pd
+import pytest
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring import Monitor
+from skthermo.surrogate import DataInformedFEM
+
+MODES = [f"f{mode}" for mode in range(1, 7)]
+
+
+def records(damage=None, seed=0, start="2025-01-01"):
+    campaign = make_truss_campaign(damage=damage, random_state=seed)
+    table = campaign.temperatures.join(campaign.frequencies)
+    return table.set_index(pd.date_range(start, periods=len(table), freq="1D"))
+
+
+def fitted(**options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a year in which one event is expected
+        return Monitor(**options).fit(records())
+
+
+def test_frequencies_have_directions_and_other_responses_have_none():
+    by_unit = {unit: fitted(targets=MODES, units=unit).detector_ for unit in ("Hz", "mm")}
+    assert all(isinstance(one[0], TemperatureCompensator) for one in by_unit.values())
+    assert by_unit["Hz"][-1].directions == "softening"
+    assert type(by_unit["mm"][-1]) is MahalanobisDetector
+    mixed = fitted(targets=MODES, units=dict.fromkeys(MODES, "Hz") | {"f6": "mm"}).detector_
+    assert type(mixed[-1]) is MahalanobisDetector
+
+
+def test_a_chain_gives_the_directions_of_its_groups():
+    T, F = records().drop(columns=MODES), records()[MODES]
+    fem = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
+    monitor = fitted(fem=fem)
+    last = monitor.detector_[-1]
+    assert isinstance(last, DirectionalDetector)
+    assert last.directions is fem
+    assert list(last.directions_.index) == ["bottom", "top", "diagonal", "vertical"]
+    monitor.update(records({"bottom": 0.08}, 1, "2026-01-01")[:14])
+    assert monitor.state() == "alarm"
+
+
+def test_without_temperatures_the_detector_sees_the_responses_alone():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        monitor = Monitor(units="Hz", targets=MODES).fit(records()[MODES])
+    assert isinstance(monitor.detector_, DirectionalDetector)
+    with pytest.raises(ValueError, match="targets"):
+        Monitor().fit(records())
