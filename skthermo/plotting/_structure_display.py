@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._tables.arrays import Array, real_array
+from skthermo._validation import last_step
 from skthermo.fem import Structure
 from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_columns, plain, pyplot, shortened
 from skthermo.plotting._structures import (
@@ -121,6 +122,54 @@ class StructureDisplay(Display):
             raise ValueError("values and groups are both given; expected one of them to colour the members")
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
+
+    @classmethod
+    def from_estimator(
+        cls, detector: Any, structure: Structure, *, level: float = 0.9, **options: object
+    ) -> StructureDisplay:
+        """Draw which damage a fitted detector finds: the smallest loss of stiffness of each member's group.
+
+        Members of groups of which not even a whole loss is found are grey, as are those of no group.
+
+        Parameters
+        ----------
+        detector : DirectionalDetector, WindowedAlarm of one, or Pipeline
+            Fitted, with directions of the structure's damage groups.
+        structure : Structure
+            Nodes, members, groups and supports.
+        level : float, default=0.9
+            Share of the records that has to raise an alarm.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        StructureDisplay
+
+        Raises
+        ------
+        ValueError
+            If the detector has no directions, or the structure lacks groups of these.
+
+        Examples
+        --------
+        >>> import matplotlib.pyplot as plt
+        >>> from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
+        >>> from skthermo.detection import DirectionalDetector
+        >>> from skthermo.plotting import StructureDisplay
+        >>> detector = DirectionalDetector(make_truss()).fit(make_truss_campaign(random_state=0).frequencies)
+        >>> display = StructureDisplay.from_estimator(detector, truss_structure())
+        >>> display.colorbar_.ax.get_ylabel()
+        'smallest loss found (%)'
+        >>> plt.close(display.figure_)
+        """
+        last = last_step(detector)
+        if not hasattr(last, "minimum_detectable_damage"):
+            raise ValueError(
+                f"detector is {detector!r:.200}; expected a fitted DirectionalDetector, or a pipeline with one last"
+            )
+        found = 100 * last.minimum_detectable_damage(level)
+        return cls.from_structure(structure, found, label="smallest loss found (%)", **options)
 
     def plot(
         self,

@@ -33,7 +33,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._false_alarms import estimate_false_alarms, find_events
 from skthermo.preprocessing import HampelFilter
@@ -101,7 +101,7 @@ def series(monitor, records):
     return pd.Series(values, records.index).round(6)
 
 
-def rows_of(name, law, is_cleaned, seed, also_by_update):
+def rows_of(name, law, is_cleaned, seed, also_by_update, last):
     """A row for each persistence."""
     T, clean, noise = STRUCTURES[name]()
     z = drawn(law, clean[0.0].shape, np.random.default_rng(seed))
@@ -110,7 +110,7 @@ def rows_of(name, law, is_cleaned, seed, also_by_update):
     F = {s: pd.DataFrame(one * (1 + noise * z), STAMPS, modes) for s, one in clean.items()}
     baseline = F[0.0][:YEAR]
     baseline = T[:YEAR].join(cleaned(T[:YEAR], baseline) if is_cleaned else baseline)
-    detector = make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=modes), MahalanobisDetector())
+    detector = make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=modes), last)
     monitor = Monitor(detector, sensors=False).fit(baseline)
     index = {s: series(monitor, T[YEAR:].join(one[YEAR:])) for s, one in F.items()}
     for persistence in PERSISTENCE:
@@ -147,14 +147,16 @@ def main():
     parser.add_argument("--baselines", type=int, default=30, help="of each law, divided among the structures")
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--quick", action="store_true", help="six baselines of each law")
+    parser.add_argument("--omnibus", action="store_true", help="by the Mahalanobis distance, not by falls")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     start, rows = time.perf_counter(), []
+    last = MahalanobisDetector() if options.omnibus else DirectionalDetector()
     for law in options.laws:
         for is_cleaned in (False, True):
             for n in range(6 if options.quick else options.baselines):
                 name = options.structures[n % len(options.structures)]
-                rows += rows_of(name, law, is_cleaned, options.seed + n, n == 0)
+                rows += rows_of(name, law, is_cleaned, options.seed + n, n == 0, last)
     table = pd.DataFrame(rows)
     by = ["persistence", "cleaned", "law"]
     days = {column: (column, median) for column in table if column.startswith("days")}
