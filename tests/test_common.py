@@ -24,6 +24,7 @@ from sklearn.utils.estimator_checks import check_estimator
 import skthermo
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import (
+    DirectionalDetector,
     FusedDetector,
     MahalanobisDetector,
     OutlierDetector,
@@ -89,6 +90,7 @@ EXPECTED_FAILURES = {  # by estimator; docs/reference/scikit_learn.rst lists the
     FleetMapper: PRECISIONS_OF_POSITIVE_NUMBERS,
     TemperatureCompensator: OUT_OF_FOLD,
     MahalanobisDetector: RATE_OF_NEW_RECORDS,
+    DirectionalDetector: RATE_OF_NEW_RECORDS,
     OutlierDetector: RATE_OF_NEW_RECORDS,
     FusedDetector: RATE_OF_NEW_RECORDS,
     WindowedAlarm: ROWS_ARE_ORDERED | RATE_OF_NEW_RECORDS,
@@ -114,6 +116,7 @@ ESTIMATORS = [
     TemperatureMapper(),
     FleetMapper(),
     MahalanobisDetector(),
+    DirectionalDetector(),
     FusedDetector([("paper", MahalanobisDetector(threshold="quantile")), ("default", MahalanobisDetector())]),
     WindowedAlarm(3),
     OutlierDetector(OneClassSVM()),
@@ -124,7 +127,9 @@ OTHER_SETTINGS = [
     BiasAligner(method="scale"),
     MahalanobisDetector(threshold="quantile"),
     MahalanobisDetector(threshold="chi2"),
+    DirectionalDetector(omnibus=0.0),
     WindowedAlarm(3, rule="m-of-n"),
+    WindowedAlarm(3, detector=DirectionalDetector()),
     OutlierDetector(IsolationForest(n_estimators=5, random_state=0)),
     OutlierDetector(LocalOutlierFactor(5, novelty=True)),
     TemperatureCompensator(Ridge(), targets=[1], whiten="global"),
@@ -175,6 +180,7 @@ TRANSFORMERS_AND_DETECTORS = [
     KNNGapImputer(),
     BiasAligner(),
     MahalanobisDetector(),
+    DirectionalDetector(),
     FusedDetector([("plain", MahalanobisDetector())]),
     WindowedAlarm("6h"),
     WindowedAlarm(6, rule="m-of-n"),

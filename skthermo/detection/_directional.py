@@ -13,17 +13,15 @@ from sklearn.base import BaseEstimator, clone
 
 from skthermo._effects import damage_directions
 from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, patterns, real_array
-from skthermo._tables.frames import column_names
 from skthermo._validation import Interval, StrOptions, check_is_fitted
-from skthermo.detection._cone import Cones
-from skthermo.detection._cone_test import Detectability, JoinedTests, mean_squares
+from skthermo.detection._cone import Cones, Detectability, JoinedTests, mean_squares
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector
 from skthermo.detection._origin import Changes, origin_of
 from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.residuals.gaussian import Gaussian, precisions, whitenings
 
 UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
-ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be told apart
+ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be distinguished
 
 
 @dataclass(frozen=True)
@@ -105,12 +103,6 @@ class DirectionalDetector(MahalanobisDetector):
     The test is one-sided: a change outside the cone is left to the omnibus. A cone that spans nearly everything gains
     nothing. :doc:`/guide/detectors_theory` has the joint calibration and records with missing modes.
 
-    References
-    ----------
-    .. [Kud63] A. Kudo, "A multivariate analogue of the one-sided test", *Biometrika* 50 (1963) 403-418.
-    .. [Per69] M. D. Perlman, "One-sided testing problems in multivariate analysis", *Annals of Mathematical
-       Statistics* 40 (1969) 549-567.
-
     Examples
     --------
     >>> from skthermo.datasets import make_truss, make_truss_campaign
@@ -158,7 +150,7 @@ class DirectionalDetector(MahalanobisDetector):
         self.threshold = threshold
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Parameters; those of a chain that gives the directions are its own."""
+        # those of a chain that gives the directions are its own
         return {name: value for name, value in super().get_params(deep).items() if not name.startswith("directions__")}
 
     def __sklearn_clone__(self) -> DirectionalDetector:
@@ -355,15 +347,14 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
             f"directions have the shape {values.shape}; expected (n_directions, {n_modes}): a relative change of each "
             f"of the modes {modes}"
         )
-    if not np.isfinite(values).all() or not values.any(axis=1).all():
-        row = column_names(table.T, "direction ")[
-            int((~np.isfinite(values).all(axis=1) | ~values.any(axis=1)).argmax())
-        ]
+    is_frame = isinstance(directions, pd.DataFrame)
+    own = list(map(str, table.index)) if is_frame else [f"direction {n + 1}" for n in range(len(values))]
+    wrong = ~np.isfinite(values).all(axis=1) | ~values.any(axis=1)
+    if wrong.any():
         raise ValueError(
-            f"direction {row!r} is zero or not finite; expected finite relative changes, one of them not 0"
+            f"{own[wrong.argmax()]!r} is zero or not finite; expected finite relative changes, one of them not 0"
         )
-    own = table.index if isinstance(directions, pd.DataFrame) else [f"direction {n + 1}" for n in range(len(values))]
-    return pd.DataFrame(values, pd.Index(list(map(str, own))), modes)
+    return pd.DataFrame(values, own, modes)
 
 
 def _parts(records: Records) -> list[Records]:

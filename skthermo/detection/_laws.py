@@ -12,8 +12,7 @@ from scipy.stats import chi
 
 from skthermo._estimators.warnings import reported_by_caller, without_warnings
 from skthermo._tables.arrays import Array, patterns
-from skthermo.detection._cone import Cones
-from skthermo.detection._cone_test import mean_squares
+from skthermo.detection._cone import Cones, mean_squares
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._origin import Changes, Origin, with_origin
 from skthermo.detection._patterns import as_if_complete

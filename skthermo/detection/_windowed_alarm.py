@@ -17,7 +17,7 @@ from skthermo._tables.arrays import Array, check_probability
 from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._cone_test import Detectability, JoinedTests
+from skthermo.detection._cone import Detectability, JoinedTests
 from skthermo.detection._directional import DirectionalDetector
 from skthermo.detection._laws import CountLaw, MeanLaw
 from skthermo.detection._mahalanobis import MahalanobisDetector
@@ -52,12 +52,12 @@ class WindowedAlarm(DamageDetector):
           lasting changes.
         - ``"m-of-n"``: the m-th largest damage index of the n records (unsquared Mahalanobis distances), so that there
           is an alarm where m of them exceed the threshold. Not misled by a few implausible records.
-    detector : MahalanobisDetector or DirectionalDetector, optional
-        Unfitted; by default a `MahalanobisDetector`. With a `DirectionalDetector`, the mean of a window is tested
-        against the cone of its directions, and for "m-of-n" the index of each record is its index.
     m : int, optional
         Number of records of a full window that have to exceed the threshold; by default half of them. For
         ``rule="m-of-n"``.
+    detector : MahalanobisDetector or DirectionalDetector, optional
+        Unfitted; by default a `MahalanobisDetector`. With a `DirectionalDetector`, the mean of a window is tested
+        against the cone of its directions, and for "m-of-n" the index of each record is its index.
     contamination : float, default=0.02
         Share of healthy windows above the threshold. Windows of later records overlap: alarms come in runs.
 

@@ -16,7 +16,6 @@ from skthermo._tables.frames import positions_of
 from skthermo._validation import check_is_fitted
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing.checks import gross_errors
-from skthermo.surrogate import TemperatureMapper
 
 TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
 
@@ -47,6 +46,8 @@ class Columns:
 
 def default_detector(monitor: Any, columns: list[Any]) -> BaseEstimator:
     """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
+    from skthermo.surrogate import TemperatureMapper  # a monitor with a detector of its own needs no surrogate
+
     reference = _among(monitor.reference or [], columns, "reference")
     inputs = [name for name in columns if name not in reference]
     targets = _responses(monitor, inputs, None)

@@ -6,7 +6,7 @@
   of bridges with models that are a little wrong. Footbridge: `blind_bridge.py`, with frost, gaps and outliers.
 - z24: four folds, in each of which a quarter of the healthy records, a contiguous one, is held back.
 - wrong: the truss with directions that are off at random, lack a group, or are another structure's.
-- promised: rates by ``pod`` beside those of true records of the truss and of the fleet.
+- expected: rates by ``pod`` beside those of true records of the truss and of the fleet.
 - whiten: the directional detector behind each ``whiten`` of the compensator, its own threshold.
 - time: fit and predict of a year of hourly records, over those of MahalanobisDetector.
 
@@ -231,7 +231,7 @@ def wrong(options):
         print(f"{name:24s}", "  ".join(f"{100 * rate:5.1f}" for rate in np.mean(rates, axis=0)))
 
 
-def promised(options):
+def expected(options):
     options = argparse.Namespace(**vars(options) | {"parts": ["truss", "fleet"]})
     rows = {}
     for name, model, baseline, tables, _ in structures(options):
@@ -245,7 +245,7 @@ def promised(options):
                 said = last.pod([float(loss.strip("%")) / 100])[group].iloc[0]
                 what = "damaged" if damage != "healthy" else "healthy"
                 rows.setdefault((name.split()[0], what), []).append(said - true)
-    print("Promised by pod less true rate, points: mean, mean of magnitudes, number")
+    print("Rates by pod less true rate, points: mean, mean of magnitudes, number")
     for (kind, what), off in rows.items():
         print(f"{kind:8s} {what:8s} {100 * np.mean(off):6.1f} {100 * np.abs(off).mean():6.1f} {len(off):4d}")
 
@@ -291,7 +291,7 @@ def timed(options):
         print(f"{what}: {seconds['directional']:.2f} s, {seconds['directional'] / seconds['Mahalanobis']:.1f} times")
 
 
-PARTS = {"z24": z24, "wrong": wrong, "promised": promised, "whiten": whiten, "time": timed}
+PARTS = {"z24": z24, "wrong": wrong, "expected": expected, "whiten": whiten, "time": timed}
 
 
 def main():
