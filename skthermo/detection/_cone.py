@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from skthermo._tables.arrays import Array, real_array
 
-RIDGE = 1e-8  # added to the squared length of each direction, so that equal ones share an effect evenly
+RIDGE = 1e-10  # added to the squared length of each direction, so that equal ones share an effect evenly
 SMALLEST = 1e-9  # share of the length of a row below which a direction explains nothing more of it
 MOST_STEPS = 3  # for each direction; rows that have not ended then are solved one by one
 N_DRAWS = 2000  # normal records, by which rates of detection are estimated
@@ -48,8 +48,7 @@ class Cones:
         scale = np.where(lengths > 0, lengths, 1.0)
         products = self.products / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
         along = np.where(lengths[which] > 0, along, 0.0) / scale[which]
-        products = products + RIDGE * np.eye(products.shape[1])
-        amounts = _amounts(products, along, which)
+        amounts = _amounts(products + RIDGE * np.eye(products.shape[1]), along, which)
         squared = 2 * (amounts * along).sum(axis=1) - _squares(products, amounts, which)
         return amounts / scale[which], np.sqrt(np.maximum(squared, 0.0))
 
