@@ -234,9 +234,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             In Hz, or dimensionless if whitened; each row predicted by a clone that was not fitted on its fold.
         """
         temperatures, frequencies, findings = self._read_baseline(X)
-        residuals = self._learn(temperatures, frequencies, findings)
+        residuals, errors = self._learn(temperatures, frequencies, findings)
         weather = self.sensors_.fill(as_floats(temperatures))[0]
-        changes = partial(self._changes, weather, ~np.isnan(residuals), PredictionError.none())
+        changes = partial(self._changes, weather, ~np.isnan(residuals), errors)
         return frame_like(frequencies, with_origin(residuals, Origin(partial(np.zeros, len(residuals)), changes)))
 
     @overload
@@ -402,7 +402,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _changes(self, weather: Array, present: NDArray[np.bool_], errors: PredictionError) -> Changes:
         """What relative changes of the frequencies make of residuals."""
         if self.whiten is None:
-            return Changes.of_all(np.diag(self.levels_), len(present))
+            shrinkages = self.spread_.shrinkages(present, errors)
+            which = np.zeros(len(present), dtype=np.intp)
+            which[errors.rows] = 1 + np.arange(len(shrinkages))
+            roots = np.concatenate([np.eye(len(self.levels_))[np.newaxis], shrinkages.swapaxes(1, 2)])
+            return Changes(roots * self.levels_, which)
         roots, which = self.spread_.roots(weather, present, errors)
         return Changes(roots * self.levels_, which)
 
@@ -424,8 +428,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         findings = findings_of(partial(check_records, unit=""), T, F)
         return *split_columns(X, values, self.targets_), findings
 
-    def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> Array:
-        """Learn from all rows; residuals of each from a clone fitted on the other folds."""
+    def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> tuple[Array, PredictionError]:
+        """Learn from all rows; residuals of each from a clone fitted on the other folds, and the errors of those."""
         self.sensors_ = SensorRegression.of(temperatures)
         filled, measured = fill_temperatures(self.sensors_, temperatures), as_floats(frequencies)
         folds = Folds.of(self._wanted_folds(filled), filled)
@@ -452,7 +456,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             taught[fills.rows] = np.nan
         if self.whiten is None:
             self.spread_ = Spread.of_all(taught, stated)
-            return self.spread_.shrunk(residuals, errors)
+            return self.spread_.shrunk(residuals, errors), errors
         empty = np.isnan(taught).all(axis=0)
         if empty.any():
             name = self.get_feature_names_out()[empty][0]
@@ -466,9 +470,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             followed, white = self.spread_.followed(weather, taught, stated, floor=floor, near=near)
             self.spread_ = replace(followed, extrapolation=extrapolation)
         if not len(fills.rows):
-            return white
+            return white, errors
         untaught = np.isnan(taught).all(axis=1)
-        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white)
+        return np.where(untaught[:, np.newaxis], self.spread_.whiten(weather, residuals, errors), white), errors
 
     def _extrapolation(self, temperatures: Any, frequencies: Any) -> Extrapolation | None:
         """How predictions err beyond the baseline's weather; None where the estimator states it, or too few show it."""

@@ -171,19 +171,27 @@ class Spread:
 
     def shrunk(self, residuals: Array, errors: PredictionError) -> Array:
         """Residuals with the overall covariance also where errors of predictions add to it; NaN without any."""
-        covariance, again = self.overall.covariance, residuals.copy()
+        again, rows = residuals.copy(), errors.rows
+        known = ~np.isnan(residuals[rows]) & (np.diag(self.overall.covariance) > 0)
+        shrinkages = self.shrinkages(~np.isnan(residuals), errors)
+        moved = np.einsum("ij,ijk->ik", self.overall.centred(residuals[rows]), shrinkages) + self.overall.mean
+        again[rows] = np.where(known, moved, np.nan)
+        return again
+
+    def shrinkages(self, present: NDArray[np.bool_], errors: PredictionError) -> Array:
+        """What `shrunk` multiplies centred rows by, (n_errors, n_modes, n_modes)."""
+        covariance = self.overall.covariance
         varied = np.diag(covariance) > 0
         covariance = covariance + np.diag(np.where(varied, JITTER * np.diag(covariance), 1.0))
-        for part in parts(len(errors.rows), len(varied) ** 2):
-            rows, covariances = errors.rows[part], errors.covariances[part]
-            few = np.where(varied, residuals[rows], np.nan)
-            white = whitened(few, self.overall, covariance + covariances)[0]
-            masks, of_row = patterns(~np.isnan(few))
-            present = masks[:, :, np.newaxis] & masks[:, np.newaxis, :]
-            roots = np.linalg.inv(whitenings(covariance, masks)[0] + np.eye(len(varied)) * ~masks[:, np.newaxis, :])
-            back = np.einsum("ij,ijk->ik", np.nan_to_num(white), np.where(present, roots, 0.0)[of_row])
-            again[rows] = np.where(np.isnan(few), np.nan, back + self.overall.mean)
-        return again
+        found = [np.empty((0, *covariance.shape))]
+        for part in parts(len(errors.rows), covariance.size):
+            masks = present[errors.rows[part]] & varied
+            few, of_row = patterns(masks)
+            both = few[:, :, np.newaxis] & few[:, np.newaxis, :]
+            back = np.linalg.inv(whitenings(covariance, few)[0] + np.eye(len(varied)) * ~few[:, np.newaxis, :])
+            wide = whitenings(covariance + errors.covariances[part], masks)[0]
+            found.append(wide @ np.where(both, back, 0.0)[of_row])
+        return np.concatenate(found)
 
     def _in_parts(
         self, weather: Array, present: NDArray[np.bool_], errors: PredictionError | None

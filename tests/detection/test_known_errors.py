@@ -7,6 +7,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection._origin import origin_of
 from skthermo.preprocessing import LagFeatures
 from skthermo.residuals.gaussian import Gaussian
 from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
@@ -99,6 +100,24 @@ def test_residuals_of_known_errors_have_one_covariance_whatever_the_error(whiten
         assert np.abs(np.cov(part.T) - expected).max() < 0.15
     if whiten is not None:
         assert np.abs(np.cov(baseline.T) - np.eye(3)).max() < 0.1
+
+
+@pytest.mark.parametrize("whiten", WHITENINGS)
+def test_what_changes_make_of_residuals_is_their_derivative_whatever_the_error(whiten):
+    compensator = TemperatureCompensator(Known(), targets=MODES, whiten=whiten)
+    baseline = compensator.fit_transform(of_known_errors(3000, 0).add({"T1": 0.0} | dict.fromkeys(MODES, 10.0)))
+    later = of_known_errors(2000, 1).add({"T1": 0.0} | dict.fromkeys(MODES, 10.0))
+    later.loc[later.index[::3], "f2"] = np.nan
+    residuals = compensator.transform(later)
+    changes = origin_of(residuals).changes()
+    for n, mode in enumerate(MODES):
+        change = 1e-3 * compensator.levels_[n]
+        moved = compensator.transform(later.assign(**{mode: later[mode] + change})) - residuals
+        has_it = later[mode].notna().to_numpy()
+        stated = changes.matrices[changes.which][has_it, :, n]
+        np.testing.assert_allclose(np.nan_to_num(moved[has_it]), 1e-3 * stated, atol=1e-9)
+    complete = origin_of(compensator.transform(later.dropna())).changes().typical()
+    np.testing.assert_allclose(origin_of(baseline).changes().typical(), complete, atol=0.05 * np.abs(complete).max())
 
 
 def test_errors_together_count_in_the_modes_that_are_there():
