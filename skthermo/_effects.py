@@ -290,6 +290,19 @@ def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
     return kept
 
 
+def usual_frequencies(fem: Any) -> Array:
+    """Frequencies in Hz of a model at its nominal state, or of a fitted chain at the mean of its parameters."""
+    if is_model(fem):
+        return as_floats(fem.frequencies(np.ones((1, len(fem.parameter_names)))))[0]
+    check_is_fitted(fem)
+    return healthy_frequencies(fem, mean_parameters(fem))[0]
+
+
+def mean_parameters(fem: Any) -> Array:
+    """Mean of the parameters of the records of a fitted chain, (1, n_parameters)."""
+    return np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+
+
 def damage_directions(fem: Any) -> pd.DataFrame:
     """Relative change of each frequency for a loss of stiffness of each damage group, at its beginning.
 
@@ -300,9 +313,8 @@ def damage_directions(fem: Any) -> pd.DataFrame:
     groups = list(read_groups(model, None))
     if is_chain:
         check_is_fitted(fem)
-        theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
         structure = ChangedStructure(fem, StructuralChanges.of_damage(model, groups))
-        effects = FrequencyEffects.at(structure, theta, np.ones((1, len(fem.mode_names_))))
+        effects = FrequencyEffects.at(structure, mean_parameters(fem), np.ones((1, len(fem.mode_names_))))
         values, names = effects(np.zeros(len(groups)))[1].T, list(fem.mode_names_)
     else:
         nominal = np.ones((1, len(model.parameter_names)))

@@ -19,7 +19,8 @@ MOST_STEPS = 3  # for each direction; rows that have not ended then are solved o
 N_DRAWS = 2000  # normal records, by which rates of detection are estimated
 N_DRAWS_OF_PATTERN = 400  # by which the mean squared length of projections is
 TAIL, FEWEST_IN_TAIL = 0.1, 20  # share of the baseline that shows how rare large indices are, and least number of it
-STEPS = np.linspace(0.0, 1.0, 21)  # losses between which the smallest one that is found is interpolated
+BEYOND = 5.0  # standard deviations above the threshold at which every record is found
+STEPS = np.linspace(0.0, 1.0, 21)  # shares of the largest amount that are tried
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ class JoinedTests:
 
 @dataclass(frozen=True)
 class Detectability:
-    """Which losses normal records let a threshold find, by the name of each direction.
+    """Which amounts of each direction normal records let a threshold find, none above the ``largest``.
 
     ``white`` are the effects of the directions on what is tested, whitened, (n_modes, n_directions).
     """
@@ -186,23 +187,26 @@ class Detectability:
     white: Array
     names: Sequence[Any]
     threshold: float
+    largest: float
 
     def pod(self, severities: ArrayLike) -> pd.DataFrame:
         """Share of records above the threshold, by severity and direction."""
-        losses = np.ravel(real_array(severities, "severities"))
-        if not ((losses >= 0) & (losses <= 1)).all():
-            raise ValueError(f"severities is {severities!r:.200}; expected losses from 0 to 1")
-        rates = [self._rates_of(direction, losses) for direction in range(len(self.names))]
-        return pd.DataFrame(np.transpose(rates), pd.Index(losses, name="severity"), list(self.names))
+        amounts = np.ravel(real_array(severities, "severities"))
+        if not ((amounts >= 0) & (amounts <= self.largest)).all():
+            expected = "losses from 0 to 1" if self.largest == 1 else "amounts that are not negative"
+            raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
+        rates = [self._rates_of(direction, amounts) for direction in range(len(self.names))]
+        return pd.DataFrame(np.transpose(rates), pd.Index(amounts, name="severity"), list(self.names))
 
     def smallest(self, level: float) -> pd.Series:
-        """Smallest loss that is found in a share of the records; infinite where not even a whole one is."""
+        """Smallest amount that is found in a share of the records; infinite where not even the largest is."""
         found = [self._smallest(effect, level) for effect in range(len(self.names))]
         return pd.Series(found, pd.Index(list(self.names), name="direction"), dtype=float)
 
     def _smallest(self, direction: int, level: float) -> float:
         """The first of some steps that is found often enough, and again of finer ones before it."""
-        low, high = 0.0, 1.0
+        length = max(float(np.linalg.norm(self.white[:, direction])), np.finfo(float).tiny)
+        low, high = 0.0, min((self.threshold + BEYOND) / length, self.largest)
         for _ in range(2):
             steps = low + STEPS * (high - low)
             reached = np.flatnonzero(self._rates_of(direction, steps) >= level)
@@ -212,13 +216,14 @@ class Detectability:
             low, high = float(steps[last - 1]), float(steps[last])
         return high
 
-    def _rates_of(self, direction: int, losses: Array) -> Array:
-        """Shares of normal rows with each loss above the threshold."""
+    def _rates_of(self, direction: int, amounts: Array) -> Array:
+        """Shares of normal rows with each amount above the threshold."""
         draws = np.random.RandomState(0).standard_normal((N_DRAWS, len(self.white)))
-        moved = (draws + (losses[:, np.newaxis] * self.white[:, direction])[:, np.newaxis]).reshape(-1, len(self.white))
+        moved = draws + np.outer(amounts, self.white[:, direction])[:, np.newaxis]
+        moved = moved.reshape(-1, len(self.white))
         lengths = Cones.of(self.white).project(moved @ self.white, np.zeros(len(moved), dtype=np.intp))[1]
         above = self.tests(lengths, np.linalg.norm(moved, axis=1)) > self.threshold
-        return above.reshape(len(losses), -1).mean(axis=1)
+        return above.reshape(len(amounts), -1).mean(axis=1)
 
 
 def mean_squares(white: Array) -> Array:

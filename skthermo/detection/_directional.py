@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._effects import damage_directions
-from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, patterns, real_array
+from skthermo._effects import damage_directions, usual_frequencies
+from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._cone import Cones, Detectability, JoinedTests, mean_squares
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector
@@ -21,6 +21,7 @@ from skthermo.detection._patterns import PatternScale, as_if_complete
 from skthermo.residuals.gaussian import Gaussian, precisions, whitenings
 
 UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
+FAR_OFF = 2.0  # factor between means of columns and a model's frequencies, beyond which they are no frequencies
 ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be distinguished
 
 
@@ -40,7 +41,8 @@ class DirectionalDetector(MahalanobisDetector):
 
     The one-sided likelihood-ratio test against the cone of all non-negative combinations of the directions [Kud63]_,
     [Per69]_. The damage index is the length of the projection of a whitened record on that cone, in standard
-    deviations, or an *unsquared* Mahalanobis distance (omnibus) that is as rare.
+    deviations, or an *unsquared* Mahalanobis distance (omnibus), expressed as the length that is exceeded so much more
+    often that the distance gives its share of the false alarms.
 
     Parameters
     ----------
@@ -50,8 +52,8 @@ class DirectionalDetector(MahalanobisDetector):
         - ``"softening"``: each frequency can only fall.
         - An FE model, or a fitted `~skthermo.surrogate.DataInformedFEM`: those by a loss of stiffness of each of its
           damage groups.
-        - (n_directions, n_modes): relative changes by one unit of each direction. The columns of a frame are matched by
-          name where both have names, and its index names the directions.
+        - (n_directions, n_modes): relative changes by one unit of each direction, in any unit. The columns of a frame
+          are matched by name where both have names, and its index names the directions.
     contamination : float, default=0.02
         Share of healthy records above the threshold.
     omnibus : float, default=0.2
@@ -97,8 +99,9 @@ class DirectionalDetector(MahalanobisDetector):
     -----
     Records are frequencies, all of them positive, or residuals of a `TemperatureCompensator` directly before, which
     says what it makes of a relative change: residuals in Hz or whitened, also by weather. Other steps in between do not
-    say so. Behind them, "softening" takes the columns as frequencies less something, refuses columns that are
-    components (exactly uncorrelated), and other directions are refused.
+    say so. Behind them, "softening" holds for columns that grow with their frequency, such as logarithms, but amounts
+    are not shares of frequencies; columns that are components (exactly uncorrelated) are refused. Other directions are
+    refused where values are not positive, and those of a model also where the columns are far from its frequencies.
 
     The test is one-sided: a change outside the cone is left to the omnibus. A cone that spans nearly everything gains
     nothing. :doc:`/guide/detectors_theory` has the joint calibration and records with missing modes.
@@ -212,14 +215,16 @@ class DirectionalDetector(MahalanobisDetector):
         -------
         DataFrame of shape (n_samples, n_directions)
             The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
-            stiffness of each group, from 0 to 1, by effects in proportion to the loss. NaN where a record has no
-            mode. Directions of ``indistinguishable_`` share what either could explain.
+            stiffness of each group, with "softening" the fall of each frequency, from 0 to 1, by effects in proportion
+            to it; else in the unit of the given directions. NaN where a record has no mode. Directions of
+            ``indistinguishable_`` share what either could explain.
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False, order="C")
         amounts = [self._projected(self._normal, part)[0] for part in _parts(self._records(X, F))]
         index = X.index if isinstance(X, pd.DataFrame) else None
-        return pd.DataFrame(np.minimum(np.concatenate(amounts), 1.0), index, self.directions_.index)
+        limited = np.minimum(np.concatenate(amounts), largest_amount(self.directions))
+        return pd.DataFrame(limited, index, self.directions_.index)
 
     def pod(self, severities: ArrayLike) -> pd.DataFrame:
         """Probability of detection of single records, by drawing normal ones from the learned covariance.
@@ -227,12 +232,18 @@ class DirectionalDetector(MahalanobisDetector):
         Parameters
         ----------
         severities : array-like of shape (n_severities,)
-            Amounts of each direction: losses of stiffness of each group, from 0 to 1.
+            Amounts of each direction: losses of stiffness of each group, or falls of each frequency, from 0 to 1, or
+            amounts in the unit of the given directions.
 
         Returns
         -------
         DataFrame of shape (n_severities, n_directions)
             Share of such records above the threshold; at 0 the false alarms.
+
+        Raises
+        ------
+        ValueError
+            If a severity is negative, or a loss larger than 1.
         """
         check_is_fitted(self)
         return self._detectability(self.threshold_).pod(severities)
@@ -248,13 +259,15 @@ class DirectionalDetector(MahalanobisDetector):
         Returns
         -------
         Series of shape (n_directions,)
-            Loss of stiffness by group, infinite where not even a whole loss is found.
+            Loss of stiffness by group, or fall of each frequency, infinite where not even a whole loss is found; else
+            in the unit of the given directions.
         """
         check_is_fitted(self)
         return self._detectability(self.threshold_).smallest(check_probability(level, "level"))
 
     def _detectability(self, threshold: float) -> Detectability:
-        return Detectability(self.tests_, self._white_effects(), list(self.directions_.index), threshold)
+        names = list(self.directions_.index)
+        return Detectability(self.tests_, self._white_effects(), names, threshold, largest_amount(self.directions))
 
     def _white_effects(self) -> Array:
         """What a unit of each direction makes of whitened columns, (n_columns, n_directions)."""
@@ -265,7 +278,10 @@ class DirectionalDetector(MahalanobisDetector):
     def _levels(self, F: Array) -> Array:
         """What a relative change of each frequency makes of its column, in records of which no step says it."""
         if (F[~np.isnan(F)] > 0).all():
-            return np.nanmean(F, axis=0)
+            levels = means_of_known(F)
+            if _is_fem(self.directions):
+                self._check_frequencies(levels)
+            return levels
         softens = isinstance(self.directions, str)
         complete = F[~np.isnan(F).any(axis=1)]
         spread = complete.std(axis=0) if len(complete) > F.shape[1] else np.zeros(F.shape[1])
@@ -279,6 +295,16 @@ class DirectionalDetector(MahalanobisDetector):
                 "column; expected frequencies in Hz, or a pipeline in which the detector follows the compensator"
             )
         return np.ones(F.shape[1])
+
+    def _check_frequencies(self, levels: Array) -> None:
+        """Refuse columns that are no frequencies of the model that gives the directions, but something else of them."""
+        expected = usual_frequencies(self.directions)
+        if len(expected) == len(levels) and np.nanmedian(np.abs(np.log(levels / expected))) > np.log(FAR_OFF):
+            raise ValueError(
+                f"the means of the columns are {np.round(levels, 3).tolist()}, the frequencies of the model "
+                f"{np.round(expected, 3).tolist()} Hz; expected frequencies in Hz, most within a factor of {FAR_OFF:g} "
+                "of the model's, or a pipeline in which the detector follows the compensator"
+            )
 
     def _projected(self, normal: Gaussian, records: Records) -> tuple[Array, Array]:
         """Amounts of the directions, and length of the projection on their cone as if no mode were missing."""
@@ -329,7 +355,7 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
                 "relative changes (n_directions, n_modes)"
             )
         return pd.DataFrame(-np.eye(n_modes), modes, modes)
-    if is_model(directions) or is_model(getattr(directions, "model", None)):
+    if _is_fem(directions):
         directions = damage_directions(directions)
     table = directions if isinstance(directions, pd.DataFrame) else pd.DataFrame(real_array(directions, "directions"))
     labels = list(table.columns)
@@ -355,6 +381,16 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
             f"{own[wrong.argmax()]!r} is zero or not finite; expected finite relative changes, one of them not 0"
         )
     return pd.DataFrame(values, own, modes)
+
+
+def largest_amount(directions: Any) -> float:
+    """That of each direction: a whole loss; without limit where directions are given in a unit of their own."""
+    return 1.0 if isinstance(directions, str) or _is_fem(directions) else np.inf
+
+
+def _is_fem(directions: Any) -> bool:
+    """Whether an FE model or a chain gives the directions."""
+    return is_model(directions) or is_model(getattr(directions, "model", None))
 
 
 def _parts(records: Records) -> list[Records]:

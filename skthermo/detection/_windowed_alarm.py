@@ -18,7 +18,7 @@ from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._cone import Detectability, JoinedTests
-from skthermo.detection._directional import DirectionalDetector
+from skthermo.detection._directional import DirectionalDetector, largest_amount
 from skthermo.detection._laws import CountLaw, MeanLaw
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._thresholds import conformal_threshold
@@ -239,7 +239,8 @@ class WindowedAlarm(DamageDetector):
         check_is_fitted(self)
         deviations = self.law_.deviations(self.usual_counts_)
         white = self.law_.white_effects / deviations[:, np.newaxis]
-        return Detectability(self.tests_, white, list(self.detector_.directions_.index), self.threshold_)
+        names, largest = list(self.detector_.directions_.index), largest_amount(self.detector_.directions)
+        return Detectability(self.tests_, white, names, self.threshold_, largest)
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         return (

@@ -69,8 +69,10 @@ def test_one_direction_is_found_as_a_one_sided_normal_test_says():
     from scipy.stats import norm
 
     only = JoinedTests(Tail(0.0, 1.0), Tail(0.0, 1.0), 0.0)
-    found = Detectability(only, np.array([[20.0], [0.0]]), ["one"], threshold=2.0)
+    found = Detectability(only, np.array([[20.0], [0.0]]), ["one"], threshold=2.0, largest=1.0)
     losses = np.array([0.0, 0.05, 0.1, 0.2])
     assert found.pod(losses)["one"].to_numpy() == pytest.approx(norm.cdf(20 * losses - 2), abs=0.03)
     assert found.smallest(0.9)["one"] == pytest.approx((2 + norm.ppf(0.9)) / 20, abs=0.005)
-    assert Detectability(only, np.array([[0.1], [0.0]]), ["one"], 2.0).smallest(0.9)["one"] == np.inf
+    assert Detectability(only, np.array([[0.1], [0.0]]), ["one"], 2.0, 1.0).smallest(0.9)["one"] == np.inf
+    given = Detectability(only, np.array([[0.1], [0.0]]), ["one"], 2.0, np.inf)
+    assert given.smallest(0.9)["one"] == pytest.approx((2 + norm.ppf(0.9)) / 0.1, rel=0.02)

@@ -8,7 +8,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.decomposition import PCA
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
+from sklearn.preprocessing import MinMaxScaler, StandardScaler
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
@@ -137,6 +137,23 @@ def test_steps_that_do_not_say_what_they_do_are_refused(between):
             make_pipeline(between, DirectionalDetector()).fit(F)
 
 
+@pytest.mark.parametrize("change", [np.log, lambda F: MinMaxScaler((1, 2)).fit_transform(F)])
+def test_columns_that_are_no_frequencies_of_the_model_are_refused(change):
+    with pytest.raises(ValueError, match=r"7\.4|7\.5"):
+        DirectionalDetector(make_truss()).fit(change(F))
+    softening = DirectionalDetector().fit(change(F))
+    assert (softening.predict(change(F)) == -1).mean() < 0.05
+
+
+def test_the_unit_of_given_directions_does_not_matter():
+    effects = DirectionalDetector(make_truss()).fit(F).directions_
+    whole, per_mille = (DirectionalDetector(effects * size).fit(F) for size in (1.0, 1e-3))
+    smallest = whole.minimum_detectable_damage()
+    np.testing.assert_allclose(per_mille.minimum_detectable_damage(), 1e3 * smallest, rtol=1e-6)
+    np.testing.assert_allclose(per_mille.pod(1e3 * smallest), whole.pod(smallest), rtol=1e-12)
+    np.testing.assert_allclose(per_mille.severities(F), 1e3 * whole.severities(F), rtol=1e-6, atol=1e-9)
+
+
 def test_an_index_means_the_same_whichever_modes_are_there():
     random = np.random.RandomState(0)
     baseline, later = (
@@ -175,7 +192,10 @@ def test_more_damage_is_never_less_alarm():
 
 def test_rates_that_are_expected_are_those_of_shifted_normal_records():
     random = np.random.RandomState(0)
-    level, root = 5 + np.arange(6), 0.01 * (np.eye(6) + 0.3 * random.standard_normal((6, 6)))
+    level, root = (
+        1.1 * make_truss().frequencies(np.ones((1, 4)))[0],
+        0.01 * (np.eye(6) + 0.3 * random.standard_normal((6, 6))),
+    )
 
     def normal(n):
         return level * (1 + random.standard_normal((n, 6)) @ root)
