@@ -14,11 +14,12 @@ from sklearn.base import BaseEstimator, clone
 from skthermo._effects import damage_directions, usual_frequencies
 from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
 from skthermo._validation import Interval, StrOptions, check_is_fitted
-from skthermo.detection._cone import Cones, Detectability, JoinedTests, mean_squares
+from skthermo.detection._detectability import Detectability, JoinedTests, explained_share, mean_squares
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector
 from skthermo.detection._origin import Changes, origin_of
 from skthermo.detection._patterns import PatternScale, as_if_complete
-from skthermo.residuals.gaussian import Gaussian, precisions, whitenings
+from skthermo.residuals.cones import Cones
+from skthermo.residuals.gaussian import precisions, whitenings
 
 UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
 FAR_OFF = 2.0  # factor between means of columns and a model's frequencies, beyond which they are no frequencies
@@ -72,6 +73,8 @@ class DirectionalDetector(MahalanobisDetector):
     indistinguishable_ : list of tuple of str
         Pairs of directions that move the frequencies alike, with a cosine of more than 0.95 in standard deviations: an
         alarm by one may be by the other.
+    sensitivities_ : Series of shape (n_directions,)
+        By how many standard deviations one unit of each direction moves a record that has all modes.
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
     tests_ : object
@@ -179,9 +182,11 @@ class DirectionalDetector(MahalanobisDetector):
         self.directions_ = read_directions(self.directions, names, n_modes)
         omnibus = super()._learn(records.values, times)
         self.typical_changes_ = records.changes.typical()
-        self.indistinguishable_ = self._alike()
+        white = self._white_effects()
+        self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
+        self.indistinguishable_ = _alike(white, self.directions_.index)
         present = ~np.isnan(records.values)
-        cone = self._projected(self._normal, records)[1]
+        cone = self._projected(records)[2]
         if self.threshold == "conformal":  # new records are farther in the cone by the factor by which they are at all
             own = super()._index(records.values)
             cone = cone * np.divide(omnibus, own, out=np.ones_like(own), where=own > 0)
@@ -195,7 +200,7 @@ class DirectionalDetector(MahalanobisDetector):
 
     def _joined(self, records: Records) -> Array:
         omnibus, present = super()._index(records.values), ~np.isnan(records.values)
-        cone = self._projected(self._normal, records)[1]
+        cone = self._projected(records)[2]
         return self.tests_(cone if present.all() else cone * self.cone_scale_(present), omnibus)
 
     def _seen_at(self, threshold: float) -> str:
@@ -221,10 +226,29 @@ class DirectionalDetector(MahalanobisDetector):
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False, order="C")
-        amounts = [self._projected(self._normal, part)[0] for part in _parts(self._records(X, F))]
+        amounts = [self._projected(part)[0] for part in _parts(self._records(X, F))]
         index = X.index if isinstance(X, pd.DataFrame) else None
         limited = np.minimum(np.concatenate(amounts), largest_amount(self.directions))
         return pd.DataFrame(limited, index, self.directions_.index)
+
+    def explained(self, X: ArrayLike) -> Array:
+        """Share of the departure of each record from the baseline that the directions explain.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Frequencies in Hz, or residuals, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            Of the squared Mahalanobis distance, from 0 to 1; small where something else has changed than a loss of
+            stiffness of the groups, such as a bearing or a mass. NaN where a record has no mode.
+        """
+        check_is_fitted(self)
+        F = self._validated(X, reset=False, order="C")
+        lengths = np.concatenate([self._projected(part)[1] for part in _parts(self._records(X, F))])
+        return explained_share(lengths, self._normal.distances(F))
 
     def pod(self, severities: ArrayLike) -> pd.DataFrame:
         """Probability of detection of single records, by drawing normal ones from the learned covariance.
@@ -306,8 +330,9 @@ class DirectionalDetector(MahalanobisDetector):
                 "of the model's, or a pipeline in which the detector follows the compensator"
             )
 
-    def _projected(self, normal: Gaussian, records: Records) -> tuple[Array, Array]:
-        """Amounts of the directions, and length of the projection on their cone as if no mode were missing."""
+    def _projected(self, records: Records) -> tuple[Array, Array, Array]:
+        """Amounts of the directions, length of the projection on their cone, and that as if no mode were missing."""
+        normal = self._normal
         scale = np.sqrt(np.diag(normal.covariance))
         present = ~np.isnan(records.values)
         masks, pattern = patterns(present)
@@ -324,7 +349,7 @@ class DirectionalDetector(MahalanobisDetector):
         amounts, lengths = cones.project(along, case)
         amounts[~present.any(axis=1)] = np.nan
         if present.all():
-            return amounts, lengths
+            return amounts, lengths, lengths
         effects = self.typical_changes_ / scale[:, np.newaxis] @ self.directions_.to_numpy().T
         whole, *sizes = mean_squares(
             whitenings(correlation, np.vstack([np.ones(len(scale), bool), masks]))[0] @ effects
@@ -333,16 +358,7 @@ class DirectionalDetector(MahalanobisDetector):
         nothing = size <= 0
         mapped = as_if_complete(lengths, np.where(nothing, whole, size)[pattern], whole)
         mapped = np.where(nothing[pattern], 0.0, np.nan_to_num(mapped))
-        return amounts, np.where(present.any(axis=1), mapped, np.nan)
-
-    def _alike(self) -> list[tuple[str, str]]:
-        """Pairs of directions with nearly the same whitened effects."""
-        white = self._white_effects()
-        unit = white / np.maximum(np.linalg.norm(white, axis=0), np.finfo(float).tiny)
-        first, second = np.triu_indices(unit.shape[1], 1)
-        alike = (unit.T @ unit)[first, second] > ALIKE
-        names = self.directions_.index
-        return [(names[i], names[k]) for i, k in zip(first[alike], second[alike], strict=True)]
+        return amounts, lengths, np.where(present.any(axis=1), mapped, np.nan)
 
 
 def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
@@ -381,6 +397,14 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
             f"{own[wrong.argmax()]!r} is zero or not finite; expected finite relative changes, one of them not 0"
         )
     return pd.DataFrame(values, own, modes)
+
+
+def _alike(white: Array, names: pd.Index) -> list[tuple[str, str]]:
+    """Pairs of directions with nearly the same whitened effects."""
+    unit = white / np.maximum(np.linalg.norm(white, axis=0), np.finfo(float).tiny)
+    first, second = np.triu_indices(unit.shape[1], 1)
+    alike = (unit.T @ unit)[first, second] > ALIKE
+    return [(names[i], names[k]) for i, k in zip(first[alike], second[alike], strict=True)]
 
 
 def largest_amount(directions: Any) -> float:

@@ -12,11 +12,12 @@ from scipy.stats import chi
 
 from skthermo._estimators.warnings import reported_by_caller, without_warnings
 from skthermo._tables.arrays import Array, patterns
-from skthermo.detection._cone import Cones, mean_squares
+from skthermo.detection._detectability import explained_share, mean_squares
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._origin import Changes, Origin, with_origin
 from skthermo.detection._patterns import as_if_complete
 from skthermo.detection._windows import Windows
+from skthermo.residuals.cones import Cones
 from skthermo.residuals.gaussian import Gaussian, check_invertible, whitenings
 
 CLIPPED = 1.5  # standard deviations within a window beyond which a record moves the mean of the window no more
@@ -51,25 +52,38 @@ class MeanLaw:
 
     def indices(self, windows: Windows) -> Array:
         """Damage indices of every window, (n_tests, n_windows), the omnibus first; NaN where no record has a mode."""
+        standard, counts = self._means(windows)
+        present, n_modes = counts > 0, standard.shape[1]
+        omnibus = as_if_complete(np.linalg.norm(standard, axis=1), present.sum(axis=1), n_modes)
+        if self.effects is None:
+            return omnibus[np.newaxis]
+        lengths, (masks, mask) = self._projected(standard, counts)[1], patterns(present)
+        if not masks.all():
+            whole, *sizes = mean_squares(np.vstack([np.ones(n_modes), masks])[:, :, np.newaxis] * self.white_effects)
+            lengths = as_if_complete(lengths, np.maximum(sizes, SMALLEST_SIZE)[mask], whole)
+        return np.stack([omnibus, np.where(present.any(axis=1), lengths, np.nan)])
+
+    def explained(self, windows: Windows) -> tuple[Array, Array]:
+        """Amounts of the directions in every window, and the share of its departure that they explain."""
+        standard, counts = self._means(windows)
+        amounts, lengths = self._projected(standard, counts)
+        amounts[(counts == 0).all(axis=1)] = np.nan
+        return amounts, explained_share(lengths, np.linalg.norm(standard, axis=1))
+
+    def _means(self, windows: Windows) -> tuple[Array, Array]:
+        """Robust means of whitened records in standard deviations, 0 without any, and how many have each mode."""
         white = self.records.whiten(windows.rows)
         counts, limits = windows.sums((~np.isnan(white)).astype(float)), CLIPPED * np.sqrt(1 - self.correlation)
         columns = zip(white.T, limits, strict=True)
         means = np.column_stack([robust_means(windows.inside(column), limit) for column, limit in columns])
-        deviations = self.deviations(counts)
-        standard = np.where(counts > 0, means / deviations, 0.0)
-        known, n_modes = (counts > 0).sum(axis=1), means.shape[1]
-        omnibus = as_if_complete(np.linalg.norm(standard, axis=1), known, n_modes)
-        if self.effects is None:
-            return omnibus[np.newaxis]
-        cases, case = np.unique(np.where(counts > 0, 1 / deviations, 0.0), axis=0, return_inverse=True)
+        return np.where(counts > 0, means / self.deviations(counts), 0.0), counts
+
+    def _projected(self, standard: Array, counts: Array) -> tuple[Array, Array]:
+        """Amounts of the directions, and length of the projection on their cone."""
+        weights = np.where(counts > 0, 1 / self.deviations(counts), 0.0)
+        cases, case = np.unique(weights, axis=0, return_inverse=True)
         effects = cases[:, :, np.newaxis] * self.white_effects
-        along = np.einsum("ij,ijk->ik", standard, effects[case])
-        lengths = Cones.of(effects).project(along, case)[1]
-        masks, mask = patterns(counts > 0)
-        if not masks.all():
-            whole, *sizes = mean_squares(np.vstack([np.ones(n_modes), masks])[:, :, np.newaxis] * self.white_effects)
-            lengths = as_if_complete(lengths, np.maximum(sizes, SMALLEST_SIZE)[mask], whole)
-        return np.stack([omnibus, np.where(known > 0, lengths, np.nan)])
+        return Cones.of(effects).project(np.einsum("ij,ijk->ik", standard, effects[case]), case)
 
     def deviations(self, counts: Array) -> Array:
         """Standard deviations of the means of so many whitened records of each mode."""

@@ -17,7 +17,7 @@ from skthermo._tables.arrays import Array, check_probability
 from skthermo._tables.frames import correlation_time
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import DamageDetector
-from skthermo.detection._cone import Detectability, JoinedTests
+from skthermo.detection._detectability import Detectability, JoinedTests
 from skthermo.detection._directional import DirectionalDetector, largest_amount
 from skthermo.detection._laws import CountLaw, MeanLaw
 from skthermo.detection._mahalanobis import MahalanobisDetector
@@ -204,6 +204,40 @@ class WindowedAlarm(DamageDetector):
         return f". It sees shifts of the mean of a window of {threshold:.2g} of its standard deviations"
 
     @available_if(_tests_directions)
+    def severities(self, X: ArrayLike) -> pd.DataFrame:
+        """Losses by which the mean of each window is explained, as `DirectionalDetector.severities` of records.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Records in order of time, in the columns of `fit`.
+
+        Returns
+        -------
+        DataFrame of shape (n_samples, n_directions)
+            Of the window that ends with each record; NaN where none of its records has a mode.
+        """
+        directional, index = self.detector_, X.index if isinstance(X, pd.DataFrame) else None
+        limited = np.minimum(self._explained(X)[0], largest_amount(directional.directions))
+        return pd.DataFrame(limited, index, directional.directions_.index)
+
+    @available_if(_tests_directions)
+    def explained(self, X: ArrayLike) -> Array:
+        """Share of the departure of each window that the directions explain, as `DirectionalDetector.explained`.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            Records in order of time, in the columns of `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            Of the squared distance of the mean of the window that ends with each record, from 0 to 1.
+        """
+        return self._explained(X)[1]
+
+    @available_if(_tests_directions)
     def pod(self, severities: ArrayLike) -> pd.DataFrame:
         """Probability of detection of full windows by the rule "mean", as `DirectionalDetector.pod` of records.
 
@@ -234,6 +268,14 @@ class WindowedAlarm(DamageDetector):
             Loss of stiffness by group, infinite where not even a whole loss is found.
         """
         return self._detectability().smallest(check_probability(level, "level"))
+
+    def _explained(self, X: ArrayLike) -> tuple[Array, Array]:
+        check_is_fitted(self)
+        windows = self._records(X, self._validated(X, reset=False, order="C"))
+        parts = [self.law_.explained(windows.ending_in(run.start, run.stop)) for run in windows.runs()]
+        lengths = [run.start - run.stop for run in windows.runs()]
+        amounts, shares = zip(*([one[n:] for one in part] for n, part in zip(lengths, parts, strict=True)), strict=True)
+        return np.concatenate(amounts), np.concatenate(shares)
 
     def _detectability(self) -> Detectability:
         check_is_fitted(self)

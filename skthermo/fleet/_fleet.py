@@ -41,7 +41,7 @@ SAID = {
     "watch": "Raised damage index without an alarm (watch)",
     "not evaluated": "Not evaluated, state not known",
 }
-ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "reason", "event", "revised"]
+ANSWERS = ["bridge", "time", "state", "index", "threshold", "modes", "groups", "reason", "event", "revised"]
 
 
 def _sentences(fleet: Fleet) -> Iterator[str]:
@@ -265,7 +265,7 @@ class Fleet:
                 table = one.events.reset_index()
                 table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
                 tables.append(table)
-        columns = ["bridge", "event", "kind", "start", "end", "peak", "peak_time", "modes", "n_alarms"]
+        columns = ["bridge", "event", "kind", "start", "end", "peak", "peak_time", "modes", "groups", "n_alarms"]
         columns += ["acknowledged", "harmless", "note"]
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.answers import answers_kept
@@ -18,11 +19,17 @@ from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import DAY, check_duration, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import BaseSearchCV, last_step
-from skthermo.detection import FusedDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import (
+    DirectionalDetector,
+    FusedDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, leading
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
@@ -30,8 +37,7 @@ from skthermo.residuals.weather import BEYOND, TrainingRange
 
 DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
-MATTERS = 2.0  # standard deviations from which a mode drives an alarm
-MOST_MODES = 3  # that are named
+EXPLAINED = 0.5  # share of a squared departure from which losses of stiffness explain it
 SET_ASIDE = 3  # of the last five records with a response that is set aside open an event
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
@@ -42,9 +48,9 @@ PROBED = (5.0, 20.0, 80.0)  # standard deviations by which each response is lowe
 
 @dataclass(frozen=True)
 class Branch:
-    """Steps up to a compensator, that compensator, and the detector behind; without one, the detector alone."""
+    """A detector, the steps before it, and the compensator among these; without one, the detector alone."""
 
-    before: list[Any]
+    steps: list[Any]
     compensator: TemperatureCompensator | None
     last: Any
 
@@ -56,10 +62,25 @@ class Branch:
             for inner in last.detectors_:
                 yield from cls.all_of(inner)
             return
-        steps = list(_steps(detector))
-        places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
-        compensator = steps[places[0]] if places else None
-        yield cls(steps[: places[0]] if places else [], compensator, last)
+        *steps, _ = _steps(detector)
+        compensators = (step for step in steps if isinstance(step, TemperatureCompensator))
+        yield cls(steps, next(compensators, None), last)
+
+    def explanations(self, records: pd.DataFrame) -> tuple[pd.DataFrame, Array] | None:
+        """Effects of losses of the damage groups in standard deviations, and the share of departures that they explain.
+
+        None without a detector that has such directions.
+        """
+        directional = getattr(self.last, "detector_", self.last)
+        if not isinstance(directional, DirectionalDetector) or isinstance(directional.directions, str):
+            return None
+        if not hasattr(self.last, "severities"):
+            return None
+        table: Any = records
+        for step in self.steps:
+            table = step.transform(table)
+        effects = self.last.severities(table) * directional.sensitivities_
+        return effects.T.groupby(_names_together(directional)).sum().T, self.last.explained(table)
 
     def standard(self, records: pd.DataFrame, usual: tuple[Array, Array], targets: list[Any]) -> Array:
         """Residuals of records in standard deviations, or responses without a compensator; NaN for other targets."""
@@ -67,7 +88,7 @@ class Branch:
             mean, deviation = usual
             return (as_floats(records[targets]) - mean) / deviation
         table: Any = records
-        for step in self.before:
+        for step in self.steps[: self.steps.index(self.compensator)]:
             table = step.transform(table)
         residuals = as_floats(self.compensator.transform(table))
         if self.compensator.whiten is None:
@@ -303,11 +324,27 @@ class ActiveDetector(SavesFrames):
                 standard = standard[places]
             sizes.append(np.nan_to_num(np.abs(standard)))
         size = np.round(np.mean(sizes, axis=0), 2)
-        names = []
-        for row in size:
-            worst = np.argsort(-row, kind="stable")[:MOST_MODES]
-            names.append(", ".join(str(self.targets[k]) for n, k in enumerate(worst) if n == 0 or row[k] > MATTERS))
-        return names
+        return [", ".join(leading(dict(zip(map(str, self.targets), row, strict=True)))) for row in size]
+
+    def groups(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[dict[str, float]]:
+        """Damage groups whose losses explain most of the departure of some records, by how many standard deviations.
+
+        Groups that cannot be distinguished count together. Nothing where no losses explain it.
+        """
+        if not len(rows):
+            return []
+        start = self.memory.start(records.index.asi8, rows[0])
+        part = records.iloc[start : rows[-1] + 1]
+        for branch in Branch.all_of(self.detector):
+            with without_warnings():
+                found = branch.explanations(part[self.columns])
+            if found is not None:
+                effects, shares = np.round(found[0].iloc[rows - start], 2), np.round(found[1][rows - start], 4)
+                return [
+                    {name: size for name, size in one.items() if size > 0} if share >= EXPLAINED else {}
+                    for one, share in zip(effects.to_dict("records"), shares, strict=True)
+                ]
+        return [{} for _ in rows]
 
     def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
         if not len(rows):
@@ -376,6 +413,16 @@ class ActiveDetector(SavesFrames):
 def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
     with without_warnings():
         return -np.asarray(detector.score_samples(records[columns]), dtype=float)
+
+
+def _names_together(detector: DirectionalDetector) -> dict[str, str]:
+    """Names of the groups of a detector, joined for those that cannot be distinguished from each other."""
+    names = detector.directions_.index
+    alike = pd.DataFrame(np.eye(len(names)), names, names)
+    for one, other in detector.indistinguishable_:
+        alike.loc[one, other] = 1.0
+    together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
+    return {name: " or ".join(names[together == together[name]]) for name in names}
 
 
 def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:

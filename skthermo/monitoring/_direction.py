@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import nnls
-from scipy.stats import chi
+from scipy.stats import chi2
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, patterns
 from skthermo._validation import last_step
+from skthermo.residuals.cones import Cones
 from skthermo.residuals.gaussian import Gaussian, whitenings
 
 LOWERED = 1e-3  # share by which a frequency is lowered to see what the detector gets
@@ -65,20 +65,22 @@ class Direction:
         The rows have to begin with those that lags and windows need.
         """
         means = _means(_features(self.steps, self.columns, X), self.window)
-        wanted = ~np.isnan(means).all(axis=1) & (True if rows is None else rows)
+        wanted = np.flatnonzero(~np.isnan(means).all(axis=1) & (True if rows is None else rows))
         signs = np.zeros(len(means), dtype=np.int64)
-        for row in np.flatnonzero(wanted):
-            signs[row] = self._sign(means[row])
+        signs[wanted] = self._signs(means[wanted])
         return signs
 
-    def _sign(self, departure: Array) -> int:
-        present = ~np.isnan(departure)
-        root = whitenings(self.baseline.covariance, present[np.newaxis])[0][0]
-        white = root @ np.where(present, departure - self.baseline.mean, 0.0)
-        effects = root @ self.lowered
-        left = nnls(-effects, white)[1]
-        explained = left <= max(np.sqrt(MIXED) * np.linalg.norm(white), chi.isf(NOISE, present.sum()))
-        return -1 if explained and left < nnls(effects, white)[1] else 1
+    def _signs(self, departures: Array) -> NDArray[np.int64]:
+        present = ~np.isnan(departures)
+        masks, pattern = patterns(present)
+        roots = whitenings(self.baseline.covariance, masks)[0]
+        white = np.einsum("ij,ijk->ik", self.baseline.centred(departures), roots[pattern])
+        effects, squares = roots @ self.lowered, (white**2).sum(axis=1)
+        along = np.einsum("ij,ijk->ik", white, effects[pattern])
+        softer, stiffer = (Cones.of(effects).project(sign * along, pattern)[1] for sign in (1, -1))
+        left = squares - stiffer**2
+        explained = left <= np.maximum(MIXED * squares, chi2.isf(NOISE, present.sum(axis=1)))
+        return np.where(explained & (stiffer > softer), -1, 1)
 
 
 def _features(steps: Any, columns: list, X: pd.DataFrame) -> pd.DataFrame:

@@ -122,8 +122,9 @@ class Monitor(SavesFrames, Estimator):
         A row for each event, counted from 1: ``kind`` ("damage", "watch", "stiffening", or "measurement or structure":
         responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
         is open), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
-        largest number of responses set aside), ``peak_time``, ``modes``, ``n_alarms`` (records while it was open),
-        ``acknowledged``, ``harmless`` and ``note``.
+        largest number of responses set aside), ``peak_time``, ``modes`` (at the peak) and ``groups`` (of all records in
+        alarm together), as in `update`, ``n_alarms`` (records while it was open), ``acknowledged``, ``harmless`` and
+        ``note``.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
@@ -351,9 +352,10 @@ class Monitor(SavesFrames, Estimator):
         DataFrame
             On the stamps of new records, and of known ones that are evaluated anew because others came late: ``state``
             ("healthy", "watch", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names
-            of the modes that drive an alarm, the worst first), ``reason`` (why a record is not evaluated, or what else
-            is worth saying), ``event`` (its number in ``events_``, 0 for none), ``revised`` (whether it was evaluated
-            before).
+            of the modes that drive an alarm, the worst first), ``groups`` (of a directional detector with damage
+            groups: those whose losses explain most of an alarm, "" where none do; "a or b" cannot be distinguished),
+            ``reason`` (why a record is not evaluated, or what else is worth saying), ``event`` (its number in
+            ``events_``, 0 for none), ``revised`` (whether it was evaluated before).
 
         Raises
         ------

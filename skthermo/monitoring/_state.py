@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,12 +14,21 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, Acknowledgement, EventLog, event_table
+from skthermo.monitoring._events import (
+    DAMAGE,
+    MEASUREMENT,
+    STIFFENING,
+    WATCH,
+    Acknowledgement,
+    EventLog,
+    event_table,
+    leading,
+)
 from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
 from skthermo.monitoring._transitions import Transition, event_changes
 
-ANSWER = ("state", "index", "threshold", "modes", "reason", "event")
+ANSWER = ("state", "index", "threshold", "modes", "groups", "reason", "event")
 
 
 @dataclass(frozen=True)
@@ -147,11 +155,13 @@ class MonitorState(SavesFrames):
         times = raw.index.asi8
         after = (rules[kind].follow(begin.log.state(kind), one, times)[0] for kind, one in series.items())
         rows = np.flatnonzero(np.any(list(after), axis=0) & ~np.isnan(index))
-        drivers = np.full(len(raw), "", dtype=object)
-        drivers[rows] = active.drivers(records, rows + n_memory)
+        modes, effects = np.full(len(raw), "", dtype=object), [{} for _ in range(len(raw))]
+        modes[rows] = active.drivers(records, rows + n_memory)
+        for row, one in zip(rows, active.groups(records, rows + n_memory), strict=True):
+            effects[row] = one
         series |= {MEASUREMENT: seen.n_held}
-        modes = dict.fromkeys(series, drivers) | {MEASUREMENT: np.array(seen.held, dtype=object)}
-        log, numbers, points = _followed(rules, begin.log, states, series, modes, raw.index)
+        drivers = dict.fromkeys(series, (modes, effects)) | {MEASUREMENT: (seen.held, [{}] * len(raw))}
+        log, numbers, points = _followed(rules, begin.log, states, series, drivers, raw.index)
         reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :], outside[len(known) :])
         reasons = known["reason"].tolist() + reasons
         before = self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)]
@@ -166,7 +176,7 @@ class MonitorState(SavesFrames):
         for row in range(len(known), len(raw)):
             reasons[row] = "; ".join(filter(None, [reasons[row], *(text for text, at in remarks.items() if at[row])]))
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
-        answers = _answers(raw.index, index, active.threshold, drivers, reasons, numbers, is_held)
+        answers = _answers(raw.index, index, active.threshold, (modes, effects), reasons, numbers, is_held)
         state = replace(
             self,
             checkpoints=tuple(_since([*self.checkpoints[:place], *points], store.last - store.max_delay)),
@@ -306,7 +316,7 @@ def _followed(
     log: EventLog,
     states: dict[pd.Timestamp, CorrectionState],
     series: dict[str, Array],
-    modes: dict[str, Any],
+    drivers: dict[str, tuple[Sequence[str], Sequence[dict[str, float]]]],
     stamps: pd.DatetimeIndex,
 ) -> tuple[EventLog, dict[str, NDArray[np.int64]], list[Checkpoint]]:
     """The log after some days, numbers of the events at their records by kind, and checkpoints before each day."""
@@ -315,8 +325,9 @@ def _followed(
     for (day, state), (start, stop) in zip(states.items(), pairwise(bounds), strict=True):
         points.append(Checkpoint(day, state, log))
         own = slice(start, stop)
-        parts = ({kind: one[own] for kind, one in whole.items()} for whole in (series, modes))
-        found, log = log.follow(rules, *parts, stamps.asi8[own])
+        levels = {kind: one[own] for kind, one in series.items()}
+        of_day = {kind: (modes[own], effects[own]) for kind, (modes, effects) in drivers.items()}
+        found, log = log.follow(rules, levels, of_day, stamps.asi8[own])
         for kind, number in found.items():
             numbers[kind][own] = number
     return log, numbers, points
@@ -370,15 +381,15 @@ def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Chec
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
     """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
-    modes, is_held = np.full(len(stamps), "", dtype=object), np.zeros(len(stamps), dtype=bool)
-    return _answers(stamps, nothing, threshold, modes, list(reasons), {DAMAGE: number}, is_held)
+    drivers, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
+    return _answers(stamps, nothing, threshold, drivers, list(reasons), {DAMAGE: number}, is_held)
 
 
 def _answers(
     stamps: pd.DatetimeIndex,
     index: Array,
     threshold: float,
-    drivers: NDArray[Any],
+    drivers: tuple[Sequence[str], Sequence[dict[str, float]]],
     reasons: list[str],
     numbers: dict[str, NDArray[np.int64]],
     is_held: NDArray[np.bool_],
@@ -388,13 +399,15 @@ def _answers(
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
     for kind in (STIFFENING, MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))
+    groups, is_shown = [", ".join(leading(sizes)) for sizes in drivers[1]], is_alarm | is_watch
     quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")
     state = np.where(is_alarm, "alarm", np.where(is_watch, "watch", quiet))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(np.where(is_alarm | is_watch, drivers, "").tolist(), stamps, dtype=object),
+        "modes": pd.Series(np.where(is_shown, drivers[0], "").tolist(), stamps, dtype=object),
+        "groups": pd.Series(np.where(is_shown, groups, "").tolist(), stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
         "event": np.where(has_index | is_held, number, 0),
     }

@@ -59,8 +59,8 @@ class MonitorStatus:
         ``single`` (of each alone, by name), and ``within`` how many seconds. Shares of the mean, or in the unit of the
         response where not all are positive; None where none is seen.
     events : tuple of dict
-        Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes`` and
-        ``acknowledged``.
+        Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes``,
+        ``groups`` and ``acknowledged``.
     faults : tuple of dict
         Sensors that have failed and still do: ``column``, ``kind``, ``since`` and ``detail``.
     counts : dict
@@ -210,6 +210,7 @@ def _open_events(events: pd.DataFrame) -> Iterator[dict[str, Any]]:
             "since": event["start"],
             "peak": float(event["peak"]),
             "modes": [mode for mode in event["modes"].split(", ") if mode],
+            "groups": [group for group in event["groups"].split(", ") if group],
             "acknowledged": bool(event["acknowledged"]),
         }
 
@@ -265,6 +266,7 @@ def _of_events(events: pd.DataFrame) -> Iterator[str]:
         said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
         note = f" ({event['note']})" if event["note"] else ""
         peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
+        peak += f", explained by a loss of stiffness of {event['groups']}" if event["groups"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}"
     if n_earlier:
         yield f"events: {n_earlier} earlier ones are in events_"

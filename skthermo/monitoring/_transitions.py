@@ -47,11 +47,16 @@ def event_changes(before: Sequence[Event], after: Sequence[Event], newest: int) 
         )
         was = known.pop(old, None)
         if was is None or (was.end is not None and event.end is None):
-            yield Transition("opened", event.start, newest, event.kind, number, detail=event.modes)
+            yield Transition("opened", event.start, newest, event.kind, number, detail=_drivers(event))
         if event.end is not None and (was is None or was.end is None):
             yield Transition("closed", event.end, newest, event.kind, number, detail=f"peak {event.peak:.4g}")
     for number, event in known.items():
         yield Transition("withdrawn", event.start, newest, event.kind, number, detail="by records that came late")
+
+
+def _drivers(event: Event) -> str:
+    """Modes that drive an event, and the damage groups that explain it."""
+    return event.modes + (f"; explained by a loss of stiffness of {event.groups}" if event.groups else "")
 
 
 def _is_same(one: Event, other: Event) -> bool:

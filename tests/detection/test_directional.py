@@ -243,3 +243,31 @@ def test_windows_find_more_with_directions(rule):
         assert expected == pytest.approx(rates["model"], abs=0.12)
         assert detector[-1].minimum_detectable_damage()["bottom"] < 0.08
     assert hasattr(detector[-1], "pod") == (rule == "mean")
+
+
+def test_losses_that_explain_records_are_those_that_have_moved_them():
+    level = make_truss().frequencies(np.ones((1, 4)))[0]
+    random = np.random.RandomState(0)
+    baseline = level * (1 + 0.01 * random.standard_normal((2000, 6)))
+    single, week = (
+        make().fit(baseline)
+        for make in (
+            lambda: DirectionalDetector(make_truss()),
+            lambda: WindowedAlarm(7, detector=DirectionalDetector(make_truss())),
+        )
+    )
+    losses = np.array([0.08, 0.0, 0.05, 0.0])
+    moved = np.tile(baseline.mean(axis=0) + level * (losses @ single.directions_.to_numpy()), (7, 1))
+    raised = np.tile(baseline.mean(axis=0) * 1.02, (7, 1))
+    for detector in (single, week):
+        np.testing.assert_allclose(detector.severities(moved).iloc[-1], losses, atol=2e-3)
+        assert detector.explained(moved)[-1] == pytest.approx(1, abs=1e-3)
+        assert detector.explained(raised)[-1] < 0.02
+        assert (detector.severities(raised).iloc[-1] < 1e-6).all()
+    white = single.directions_.to_numpy() * baseline.mean(axis=0) / 0.01 / level
+    np.testing.assert_allclose(single.sensitivities_, np.linalg.norm(white, axis=1), rtol=0.05)
+    nothing = np.full((7, 6), np.nan)
+    with pytest.warns(UserWarning, match="not-evaluated"):
+        assert single.predict(nothing).tolist() == [0] * 7
+    assert np.isnan(single.explained(nothing)).all()
+    assert week.severities(nothing).isna().all(axis=None)

@@ -1,14 +1,16 @@
 """The detector of a monitor to which none is given."""
 
+import pickle
 import warnings
 
 import pandas as pd
 import pytest
+from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor
-from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 MODES = [f"f{mode}" for mode in range(1, 7)]
 
@@ -34,9 +36,34 @@ def test_frequencies_have_directions_and_other_responses_have_none():
     assert type(mixed[-1]) is MahalanobisDetector
 
 
-def test_a_chain_gives_the_directions_of_its_groups():
-    T, F = records().drop(columns=MODES), records()[MODES]
-    fem = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
+@pytest.fixture(scope="module")
+def fem():
+    return DataInformedFEM(make_truss(), random_state=0).fit(records().drop(columns=MODES), records()[MODES])
+
+
+@pytest.mark.parametrize("window", [None, 7])
+def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window):
+    last = DirectionalDetector(fem)
+    last = last if window is None else WindowedAlarm(window, detector=last)
+    compensator = TemperatureCompensator(TemperatureMapper(), targets=MODES)
+    fresh = fitted(detector=make_pipeline(compensator, last), fem=fem)
+    for group, loss in {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}.items():
+        changed = records({group.strip(): loss}, 1, "2026-01-01")[:30]
+        whole, by_day = clone_fitted(fresh), clone_fitted(fresh)
+        answers = whole.update(changed)
+        parts = pd.concat([by_day.update(changed[start : start + 4]) for start in range(0, len(changed), 4)])
+        assert (answers["groups"] == parts["groups"]).all()
+        event = whole.events_.iloc[-1]
+        assert event["kind"] == "damage"
+        assert event["groups"].split(", ")[0] == (group if loss > 0 else "")
+        assert list(whole.status("2026-01-31").events[-1]["groups"]) == [g for g in event["groups"].split(", ") if g]
+
+
+def clone_fitted(monitor):
+    return pickle.loads(pickle.dumps(monitor))
+
+
+def test_a_chain_gives_the_directions_of_its_groups(fem):
     monitor = fitted(fem=fem)
     last = monitor.detector_[-1]
     assert isinstance(last, DirectionalDetector)

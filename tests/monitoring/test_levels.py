@@ -15,7 +15,7 @@ from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_recor
 from tests.monitoring.test_status import replayed
 
 LEVELS = {"healthy": 0, "not evaluated": 0, "watch": 1, "alarm": 2}
-ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
+ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 pytestmark = pytest.mark.filterwarnings("ignore:.*not-evaluated")
 
 

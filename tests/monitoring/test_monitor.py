@@ -29,7 +29,7 @@ from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
-ANSWER = ["state", "index", "threshold", "modes", "reason", "event"]
+ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-excursion|not-evaluated)"

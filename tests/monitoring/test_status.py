@@ -145,7 +145,7 @@ def events(draw):
     """Events of one kind one after the other, the last of which may be open."""
     times = sorted(draw(st.sets(st.integers(0, 40), max_size=8)))
     pairs = [(start, end) for start, end in zip(times[::2], [*times[1::2], None], strict=False)]
-    return [Event("damage", start, end, 2.0, start, "f1", 3) for start, end in pairs]
+    return [Event("damage", start, end, 2.0, start, "f1", (), 3) for start, end in pairs]
 
 
 @given(events(), events())

@@ -11,7 +11,7 @@ from skthermo.monitoring._status import facts_of
 NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "detected", "until", "detail"])
 
 
-def event_row(start, end, kind="damage", modes="f1", acknowledged=False, harmless=False, note=""):
+def event_row(start, end, kind="damage", modes="f1", groups="", acknowledged=False, harmless=False, note=""):
     """One event, as `FakeMonitor` takes them."""
     return {
         "kind": kind,
@@ -20,6 +20,7 @@ def event_row(start, end, kind="damage", modes="f1", acknowledged=False, harmles
         "peak": 7.5,
         "peak_time": pd.Timestamp(start),
         "modes": modes,
+        "groups": groups,
         "n_alarms": 3,
         "acknowledged": acknowledged,
         "harmless": harmless,
@@ -56,8 +57,22 @@ class FakeMonitor:
         index[len(index) - n_not_evaluated if n_not_evaluated is not None else 0 :] = np.nan
         known = ~np.isnan(index)
         evaluated = {"state": np.where(known, "healthy", "not evaluated"), "index": index, "threshold": 3.0}
-        evaluated = pd.DataFrame(evaluated, stamps).assign(reason=np.where(known, "", reason), modes="", event=0)
-        columns = ["kind", "start", "end", "peak", "peak_time", "modes", "n_alarms", "acknowledged", "harmless", "note"]
+        evaluated = pd.DataFrame(evaluated, stamps).assign(
+            reason=np.where(known, "", reason), modes="", groups="", event=0
+        )
+        columns = [
+            "kind",
+            "start",
+            "end",
+            "peak",
+            "peak_time",
+            "modes",
+            "groups",
+            "n_alarms",
+            "acknowledged",
+            "harmless",
+            "note",
+        ]
         self.events_ = pd.DataFrame(list(events), range(1, len(events) + 1), columns)
         for name in ("start", "end", "peak_time"):
             self.events_[name] = pd.to_datetime(self.events_[name]).dt.tz_localize(zone)

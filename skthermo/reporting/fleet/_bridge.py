@@ -126,6 +126,8 @@ def _why(standing: Standing, opened: pd.DataFrame, unexplained: Sequence[int]) -
     if standing.state == "alarm":
         modes = listed(sorted({mode for text in opened["modes"] if text for mode in str(text).split(", ")}))
         texts.append(f"Modes that drive it: {modes}." if modes else "")
+        groups = listed(sorted({group for text in opened["groups"] if text for group in str(text).split(", ")}))
+        texts.append(f"Explained by a loss of stiffness of {groups}." if groups else "")
         if standing.status.is_late:
             texts.append(f"No record since {moment(standing.last, is_short=True)}.")
     elif standing.state == "watch":

@@ -143,7 +143,8 @@ def _open_events(standing: Standing) -> list[str]:
     sentences = [] if len(standing.opened("damage")) else ["No damage event is open."]
     for number, event in standing.events[standing.events["end"].isna()].iterrows():
         text = f"Event {number} ({event['kind']}) has been open since {moment(event['start'])}"
-        sentences.append(text + (f"; modes that drive it: {event['modes']}." if event["modes"] else "."))
+        text += f"; modes that drive it: {event['modes']}." if event["modes"] else "."
+        sentences.append(f"{text} {_explained(event)}".rstrip())
     waiting = _waiting(standing)
     if len(waiting) == 1:
         sentences.append(f"Event {waiting[0]} has ended, and nobody has said yet what it was.")
@@ -152,6 +153,11 @@ def _open_events(standing: Standing) -> list[str]:
         number = counted(len(waiting), "event")
         sentences.append(f"{number}: {shown} have ended, and nobody has said yet what they were.")
     return sentences
+
+
+def _explained(event: pd.Series) -> str:
+    """The parts whose loss of stiffness explains an event."""
+    return f"A loss of stiffness of {event['groups']} explains most of it." if event["groups"] else ""
 
 
 def _waiting(standing: Standing) -> list[int]:
@@ -167,9 +173,11 @@ def _what_to_do(standing: Standing) -> list[str]:
     if standing.state == "attention":
         steps.append("Ask an engineer to look at the parts that have lost stiffness.")
     if standing.state == "alarm":
+        parts = listed(list(dict.fromkeys(filter(None, standing.opened("damage")["groups"]))))
+        first = parts or "what the modes named above depend on"
         steps.append(
-            "Ask an engineer to look at the structure, beginning with what the modes named above depend on, and at the "
-            "raw records: works on the structure, unusual loads or ice may be the cause too."
+            f"Ask an engineer to look at the structure, beginning with {first}, and at the raw records: works on the "
+            "structure, unusual loads or ice may be the cause too."
         )
     if len(standing.opened("measurement or structure")):
         steps.append(
@@ -200,11 +208,12 @@ def events(standing: Standing) -> Section:
     text = "; and ".join([text, *others]) + "."
     rest = len(known) - MOST_LISTED
     older = f"The table lists the newest {MOST_LISTED}; {rest:,} older ones are in the monitor." if rest > 0 else ""
-    columns = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Records", "Acknowledged", "Note"]
+    columns = ["Event", "Kind", "Start", "End", "Highest index", "Modes", "Parts", "Records", "Acknowledged", "Note"]
     rows = [_cells(standing, number, event) for number, event in known.iloc[::-1].head(MOST_LISTED).iterrows()]
     caption = (
         "Events, the newest first. Highest index: the largest damage index of the event; the threshold is "
         f"{significant(standing.monitor.threshold_, 3)} now. Modes: those that changed most, the first the most. "
+        "Parts: those whose loss of stiffness explains most of it, where the monitor has a model. "
         "Records: how many were in alarm."
     )
     return section("events", "Events", paragraphs(text, older), table(caption, columns, rows, is_cards=True))
@@ -220,6 +229,7 @@ def _cells(standing: Standing, number: object, event: pd.Series) -> list[object]
         moment(event["end"], is_short=True) or element("strong", "still open"),
         f"{significant(event['peak'], 3)} on {moment(event['peak_time'], is_short=True)}",
         event["modes"] or "none named",
+        event["groups"] or "none named",
         f"{event['n_alarms']:,}",
         said,
         element("span", note, class_="text") if note else "",
