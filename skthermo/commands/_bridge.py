@@ -176,10 +176,10 @@ class Bridge:
             return
         from skthermo.reporting import owner_report  # a job without a page needs no drawings
 
-        options = {"title": None} if self.settings is None else {"title": self.name} | self.settings.options["page"]
-        options |= {"title": self.options.title} if self.options.title else {}
-        options.pop("fdr", None)
         try:
+            options = {} if self.settings is None else self.settings.page()
+            options |= {"title": self.options.title} if self.options.title else {}
+            options.pop("fdr", None)
             done.written.append(owner_report(monitor, page, now=self.options.now, **options))
         except Exception as error:  # it does not hide an alarm
             done.failed(error, f"{page} was not written: ")

@@ -59,8 +59,9 @@ DAY_FALLS = (
 )
 WIDTH = 110  # of comments
 OTHERS = """
-# An FE model, by which slow drift of the stiffness is followed: a function of a Python file that gives one,
-# or a folder of matrices that another program exported. Other settings are those of DataInformedFEM.
+# An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
+# a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
+# are those of DataInformedFEM.
 # [fem]
 # model = "model.py:make_model"
 # random_state = 0
@@ -68,6 +69,7 @@ OTHERS = """
 # The page for the owner.
 # [page]
 # title = "Bridge over the river"
+# structure = "model.py:make_structure"
 # drift_limit = 0.1"""
 
 

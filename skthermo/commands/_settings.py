@@ -120,7 +120,7 @@ SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = 
     "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
     "page": (
         lambda: import_module("skthermo.reporting").owner_report,
-        ("subject", "path", "identified", "structure", "detector", "max_false_alarms", "now"),
+        ("subject", "path", "identified", "detector", "max_false_alarms", "now"),
     ),
 }
 """What each section calls, imported when it is needed, and which parameters come from elsewhere."""
@@ -214,6 +214,14 @@ class Settings:
             return None
         return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
 
+    def page(self) -> dict[str, Any]:
+        """Arguments of the owner's page."""
+        options = {"title": self.name} | self.options["page"]
+        if "structure" in options:
+            setting = f"{self.file}: [page] structure"
+            options["structure"] = _made_by(self.path(options["structure"]), setting, "a Structure")
+        return options
+
 
 def with_directions_of(fem: Any, detector: Any) -> Any:
     """The detector, which takes the directions of damage from a fitted chain where it knows none but "softening"."""
@@ -227,18 +235,25 @@ def with_directions_of(fem: Any, detector: Any) -> Any:
 
 def _model(path: Path, settings: Path) -> Any:
     """An FE model: what a function of a Python file gives, or matrices that other programs exported."""
-    file, _, function = str(path).rpartition(".py:")
-    if not file:
-        from skthermo.fem import load_affine
+    if ".py:" in str(path):
+        return _made_by(path, f"{settings}: [fem] model", "a model")
+    from skthermo.fem import load_affine
 
-        return load_affine(path)
+    return load_affine(path)
+
+
+def _made_by(path: Path, setting: str, what: str) -> Any:
+    """What a function of a Python file gives, as in "bridge.py:make_model"."""
+    file, _, function = str(path).rpartition(".py:")
     names: dict[str, Any] = {"__name__": Path(file).stem}
     code = Path(f"{file}.py")
+    if not file or not code.is_file():
+        raise ValueError(
+            f"{setting} is {str(path)!r}; expected a Python file and its function, such as 'bridge.py:make'"
+        )
     exec(compile(code.read_text(encoding="utf-8"), str(code), "exec"), names)
     if not callable(names.get(function)):
-        raise ValueError(
-            f"{settings}: [fem] model: {code} has no function {function!r}; expected one that gives a model"
-        )
+        raise ValueError(f"{setting}: {code} has no function {function!r}; expected one that gives {what}")
     return names[function]()
 
 

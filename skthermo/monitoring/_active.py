@@ -66,15 +66,19 @@ class Branch:
         compensators = (step for step in steps if isinstance(step, TemperatureCompensator))
         yield cls(steps, next(compensators, None), last)
 
+    @property
+    def directional(self) -> DirectionalDetector | None:
+        """The fitted detector that has directions of damage groups, alone or in a window."""
+        one = getattr(self.last, "detector_", self.last)
+        return one if isinstance(one, DirectionalDetector) and not isinstance(one.directions, str) else None
+
     def explanations(self, records: pd.DataFrame) -> tuple[pd.DataFrame, Array] | None:
         """Effects of losses of the damage groups in standard deviations, and the share of departures that they explain.
 
         None without a detector that has such directions.
         """
-        directional = getattr(self.last, "detector_", self.last)
-        if not isinstance(directional, DirectionalDetector) or isinstance(directional.directions, str):
-            return None
-        if not hasattr(self.last, "severities"):
+        directional = self.directional
+        if directional is None or not hasattr(self.last, "severities"):
             return None
         table: Any = records
         for step in self.steps:
@@ -158,7 +162,8 @@ class ActiveDetector(SavesFrames):
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
-        changes = LoweredIndices.of(partial(_index_of, detector, columns), trained, targets, usual[1], within)
+        index_of = partial(_index_of, detector, columns)
+        changes = LoweredIndices.of(index_of, trained, targets, usual[1], within, _losses_of(detector))
         options = {"hold": DAY, "persistence": persistence, "release": release}
         estimates = {
             kind: estimate_false_alarms(
@@ -413,6 +418,15 @@ class ActiveDetector(SavesFrames):
 def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
     with without_warnings():
         return -np.asarray(detector.score_samples(records[columns]), dtype=float)
+
+
+def _losses_of(detector: Any) -> pd.DataFrame | None:
+    """Loss of each damage group that moves a record by one standard deviation, and the relative changes by it."""
+    found = [branch.directional for branch in Branch.all_of(detector) if branch.directional is not None]
+    if not found:
+        return None
+    seen = found[0].sensitivities_[found[0].sensitivities_ > 0]
+    return found[0].directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
 
 
 def _names_together(detector: DirectionalDetector) -> dict[str, str]:

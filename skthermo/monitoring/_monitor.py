@@ -113,7 +113,8 @@ class Monitor(SavesFrames, Estimator):
         By how much responses have to fall until half of the records are above the threshold, in the weather of the
         baseline: ``common`` (all by one share), ``single`` (each alone, by name), and ``within`` which time an alarm
         follows. Shares of the mean, or, where not all responses are positive, in their units without a ``common``
-        change; NaN where none is seen.
+        change. ``groups`` are losses of stiffness by name of the damage group, where the detector has directions of
+        such. NaN where none is seen.
     watch_threshold_ : float or None
         An event of kind "watch" opens with an index above it, in the same way; None without ``watch_per_year``.
     lookback_ : object

@@ -1,9 +1,9 @@
-"""By how much responses have to fall until a detector raises an alarm."""
+"""By how much responses have to fall, or damage groups to lose stiffness, until a detector raises an alarm."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -64,13 +64,15 @@ class SmallestChanges:
     """Falls of responses that a threshold sees: half of the records are above it, and an alarm follows ``within`` days.
 
     ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of
-    each alone, a share where ``is_relative``, else in its unit. NaN where no fall is seen.
+    each alone, a share where ``is_relative``, else in its unit. ``groups`` are losses of stiffness of damage groups, of
+    a detector that has their directions. NaN where no fall or loss is seen.
     """
 
     common: float
     single: dict[Any, float]
     is_relative: bool
     within: pd.Timedelta
+    groups: dict[str, float] = field(default_factory=dict)
 
     @property
     def is_large(self) -> bool:
@@ -79,21 +81,32 @@ class SmallestChanges:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values: NaN is None, ``within`` in seconds."""
-        single = {str(name): _known(value) for name, value in self.single.items()}
-        return {"common": _known(self.common), "single": single, "within": self.within.total_seconds()}
+        single, groups = (
+            {str(name): _known(value) for name, value in some.items()} for some in (self.single, self.groups)
+        )
+        within = self.within.total_seconds()
+        return {"common": _known(self.common), "single": single, "groups": groups, "within": within}
 
     def __str__(self) -> str:
-        seen = {name: value for name, value in self.single.items() if np.isfinite(value)}
-        parts = [f"all responses by {percent(self.common, '.2g')}"] if np.isfinite(self.common) else []
-        if seen:
-            least, most = min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)
-            values = [percent(seen[name], ".2g") if self.is_relative else f"{seen[name]:.2g}" for name in (least, most)]
-            ends = f"by {values[0]} ({least})" + (f" to {values[1]} ({most})" if most != least else "")
-            parts.append(f"one response alone {ends}")
+        parts = [f"a fall of all responses by {percent(self.common, '.2g')}"] if np.isfinite(self.common) else []
+        if single := _range_text(self.single, "{:.2g} %" if self.is_relative else "{:.2g}"):
+            parts.append(f"{'of' if parts else 'a fall of'} one response alone {single}")
+        if groups := _range_text(self.groups, "{:.2g} %"):
+            parts.append(f"a loss of stiffness {groups}")
         if not parts:
             return "no fall of the responses raises an alarm"
-        text = f"a fall of {', or of '.join(parts)} raises an alarm within {duration_text(self.within)}"
+        text = f"{', or '.join(parts)} raises an alarm within {duration_text(self.within)}"
         return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _range_text(changes: Mapping[Any, float], form: str) -> str:
+    """The smallest and the largest of some changes, with their names; "" where none is seen."""
+    seen = {name: value for name, value in changes.items() if np.isfinite(value)}
+    if not seen:
+        return ""
+    ends = dict.fromkeys((min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)))
+    factor = 100 if "%" in form else 1
+    return "by " + " to ".join(f"{form.format(factor * seen[name])} ({name})" for name in ends)
 
 
 def _known(value: float) -> float | None:
@@ -102,12 +115,14 @@ def _known(value: float) -> float | None:
 
 @dataclass(frozen=True)
 class LoweredIndices(SavesFrames):
-    """Median damage indices of a baseline of which responses are lowered, each alone and, last, all by one share.
+    """Median damage indices of a baseline of which responses are lowered.
 
+    Each alone, all by one share, and as by losses of stiffness of damage groups: ``kinds`` and ``names`` say which.
     ``steps`` are by how much, (n_changes, n_steps): shares where all responses are positive throughout, which
     ``is_relative`` says, else in their units, and then there is no common change.
     """
 
+    kinds: list[str]
     names: list[Any]
     steps: Array
     medians: Array
@@ -123,30 +138,42 @@ class LoweredIndices(SavesFrames):
         names: Sequence[Any],
         deviations: Array,
         within: pd.Timedelta,
+        losses: pd.DataFrame | None = None,
     ) -> LoweredIndices:
-        """By a detector's indices of records in order of time; ``deviations`` are those of the responses."""
-        some, steps = whole_weeks(records, MOST_PROBED), np.array(STEPS)
+        """By a detector's indices of records in order of time; ``deviations`` are those of the responses.
+
+        ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
+        record by one standard deviation; their column ``"loss"`` is that loss.
+        """
+        some = whole_weeks(records, MOST_PROBED)
+        responses = some[list(names)]
         is_relative = bool((records[list(names)].min() > 0).all())
-        scale = some[list(names)].mean().to_numpy() if is_relative else np.ones(len(names))
-        shares = deviations / scale
-        start = index_of(some)
-        curves = [[{name: step * size} for step in steps[1:]] for name, size in zip(names, deviations, strict=True)]
-        sizes = [*shares]
+        shares = deviations / (responses.mean().to_numpy() if is_relative else 1.0)
+        changes = [
+            ("single", name, share, {name: size}) for name, share, size in zip(names, shares, deviations, strict=True)
+        ]
         if is_relative:
-            sizes.append(float(np.median(shares)))
-            curves.append([{name: step * sizes[-1] * some[name] for name in names} for step in steps[1:]])
-        indices = [np.array([start, *(index_of(lowered(some, falls)) for falls in curve)]) for curve in curves]
-        return cls(
-            list(names), np.outer(sizes, steps), np.array([_medians(one) for one in indices]), is_relative, within
-        )
+            share = float(np.median(shares))
+            changes.append(("common", "", share, dict((share * responses).items())))
+        for group, row in (pd.DataFrame() if losses is None else losses).iterrows():
+            falls = -row.drop("loss").to_numpy() * responses
+            changes.append(("groups", group, float(row["loss"]), dict(falls.items())))
+        start, medians = index_of(some), []
+        for *_, falls in changes:
+            by_step = ({name: step * size for name, size in falls.items()} for step in STEPS[1:])
+            medians.append(_medians(np.array([start, *(index_of(lowered(some, one)) for one in by_step)])))
+        kinds, of, sizes, _ = zip(*changes, strict=True)
+        return cls(list(kinds), list(of), np.outer(sizes, STEPS), np.array(medians), is_relative, within)
 
     def smallest(self, threshold: float) -> SmallestChanges:
         """The falls by which the median index exceeds a threshold."""
-        found = [crossing(*pair) for pair in zip(self.steps, self.medians / threshold, strict=True)]
-        found = [one if one < 1 or not self.is_relative else np.nan for one in found]
-        common = found[len(self.names)] if self.is_relative else np.nan
-        single = dict(zip(self.names, found, strict=False))
-        return SmallestChanges(common, single, self.is_relative, self.within)
+        found: dict[str, dict[Any, float]] = {"single": {}, "common": {}, "groups": {}}
+        for kind, name, steps, medians in zip(self.kinds, self.names, self.steps, self.medians, strict=True):
+            fall = crossing(steps, medians / threshold)
+            is_share = self.is_relative or kind == "groups"
+            found[kind][name] = fall if fall < 1 or not is_share else np.nan
+        common = found["common"].get("", np.nan)
+        return SmallestChanges(common, found["single"], self.is_relative, self.within, found["groups"])
 
 
 def _medians(indices: Array) -> Array:

@@ -56,8 +56,8 @@ class MonitorStatus:
         Number of events a year of a healthy structure, for which the thresholds were set.
     smallest_change : dict or None
         Falls of the responses that raise an alarm in the weather of the baseline: ``common`` (of all by one share),
-        ``single`` (of each alone, by name), and ``within`` how many seconds. Shares of the mean, or in the unit of the
-        response where not all are positive; None where none is seen.
+        ``single`` (of each alone, by name), ``groups`` (losses of stiffness by damage group), and ``within`` how many
+        seconds. Shares of the mean, or in the unit of the response where not all are positive; None where none is seen.
     events : tuple of dict
         Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes``,
         ``groups`` and ``acknowledged``.

@@ -34,7 +34,7 @@ HEADINGS = {
 }
 ONLY_FOR = {
     "identified": ("DetectabilityStudy", "Monitor"),
-    "structure": ("DetectabilityStudy",),
+    "structure": ("DetectabilityStudy", "Monitor"),
     "detector": ("DetectabilityStudy",),
     "now": ("Monitor", "Fleet"),
 }
@@ -72,7 +72,8 @@ def owner_report(
     title : str, optional
         Heading of the report.
     structure : Structure, optional
-        Drawn with the damage groups in colour.
+        Drawn with the damage groups in colour; on the page on a monitor with directions of these groups, in the colour
+        of the smallest loss that raises an alarm.
     detector : str, optional
         Name of the detector that the report is on, where there are several; by default the first of the study's
         ranking.
@@ -136,7 +137,7 @@ def owner_report(
         check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)
     elif kind == "Monitor":
-        introduction, sections = monitor_page(Standing.of(subject, now, limit))
+        introduction, sections = monitor_page(Standing.of(subject, now, limit), structure)
         if identified is not None:
             from skthermo.reporting._identified import identified_damage
 

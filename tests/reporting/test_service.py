@@ -16,6 +16,7 @@ from skthermo.monitoring import Monitor
 from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.reporting import owner_report
 from skthermo.reporting.service._sections import (
+    detectable,
     drift,
     drift_sentences,
     events,
@@ -32,7 +33,7 @@ from tests.reporting.pages import HOSTILE, QUOTED, Page
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "false_alarms", "settings"]
+SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "false_alarms", "detectable", "settings"]
 SPACE = "\xa0"
 
 
@@ -213,11 +214,11 @@ def test_the_smallest_change_that_would_be_seen_is_said():
     monitor = FakeMonitor()
     text = "A fall of all responses by 1 %, or of one response alone by 2 % (f1) to 3 % (f2) raises an alarm"
     assert text in today_of(monitor).text
-    page = Page(false_alarms(standing_of(monitor)))
+    page = Page(detectable(standing_of(monitor), None))
     falls = dict(zip(page.heads[-3:], page.cells[-3:], strict=True))
     assert falls == {"all responses by one share": f"1{SPACE}%", "f1 alone": f"2{SPACE}%", "f2 alone": f"3{SPACE}%"}
     monitor.smallest_changes_ = SmallestChanges(np.nan, {"f1": 0.5, "f2": np.nan}, False, pd.Timedelta("3D"))
-    page = Page(false_alarms(standing_of(monitor)))
+    page = Page(detectable(standing_of(monitor), None))
     assert page.cells[-2:] == [f"0.50{SPACE}Hz", "none is seen"]
 
 

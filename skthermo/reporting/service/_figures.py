@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pandas as pd
 
-from skthermo._tables.text import counted, significant
-from skthermo.plotting import MonitorDisplay
+from skthermo._tables.text import counted, percent, significant
+from skthermo.fem import Structure
+from skthermo.plotting import MonitorDisplay, StructureDisplay
 from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
@@ -46,6 +49,21 @@ def draw_days(standing: Standing) -> list[Html]:
         values = Values(f"damage index {title.split(',')[0]}", _daily(days, standing.monitor.threshold_))
         drawn.append(_drawn(standing, alt, title, values=values, start=start, parts=["index"]))
     return drawn
+
+
+def draw_detectable(structure: Structure, losses: Mapping[str, float]) -> Html:
+    """The smallest loss of stiffness of each member's group that raises an alarm."""
+    seen = {name: 100 * loss for name, loss in losses.items() if name in structure.groups}
+    alt = "Drawing of the structure. Smallest losses that raise an alarm: " + "; ".join(
+        f"{name} {percent(loss / 100, '.2g')}" for name, loss in seen.items()
+    )
+
+    def make() -> StructureDisplay:
+        display = StructureDisplay.from_structure(structure, seen, label="smallest loss (%)")
+        fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
+        return display
+
+    return draw(make, f"{alt}.", height=None, width=6.2)
 
 
 def chart_year(standing: Standing) -> Html:

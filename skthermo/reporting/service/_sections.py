@@ -19,10 +19,11 @@ from skthermo._tables.text import (
     share_text,
     significant,
 )
+from skthermo.fem import Structure
 from skthermo.monitoring import Monitor
 from skthermo.reporting._html import Html, Section, bullets, element, figure, joined, paragraphs, section, table
 from skthermo.reporting._settings import parameters, settings
-from skthermo.reporting.service._figures import chart_year, draw_days, draw_drift, draw_month
+from skthermo.reporting.service._figures import chart_year, draw_days, draw_detectable, draw_drift, draw_month
 from skthermo.reporting.service._standing import (
     ONE_DAY,
     YEAR,
@@ -35,6 +36,7 @@ MOST_LISTED = 30  # largest number of events in the table
 MOST_NAMED = 5  # largest number of events in a sentence
 N_ERRORS = 2  # standard errors on either side of an estimate
 FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
+DETECTABLE = "What raises an alarm"
 EXCLAMATION = "M12 5.5v8.5M12 17.2v1.3"
 SYMBOLS = {
     "healthy": "M6 12.5l4 4 8-9",
@@ -60,7 +62,9 @@ KINDS = {
 }
 
 
-def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[Html, list[Section]]:
+def monitor_page(
+    standing: Standing, structure: Structure | None = None, *, is_one_of_many: bool = False
+) -> tuple[Html, list[Section]]:
     """What stands above the sections, and these, the settings last; one of many has smaller drawings."""
     return paragraphs(*introduction(standing.monitor)), [
         today(standing),
@@ -70,6 +74,7 @@ def monitor_page(standing: Standing, *, is_one_of_many: bool = False) -> tuple[H
         sensors(standing),
         not_evaluated(standing),
         false_alarms(standing),
+        detectable(standing, structure),
         _settings(standing.monitor),
     ]
 
@@ -477,11 +482,29 @@ def false_alarms(standing: Standing) -> Section:
     if monitor.watch_threshold_ is not None:
         rows.insert(1, ["Level above which a watch begins", significant(monitor.watch_threshold_, 4)])
     rule = table("The rule for events, for the engineer.", ["What", "Value"], rows)
-    return section("false_alarms", "False alarms", paragraphs(*sentences), rule, _smallest_changes(standing))
+    return section("false_alarms", "False alarms", paragraphs(*sentences), rule)
+
+
+def detectable(standing: Standing, structure: Structure | None) -> Section:
+    """By how much responses have to fall, or parts to lose stiffness, until there is an alarm."""
+    smallest = standing.monitor.smallest_changes_
+    text = (
+        f"The smallest changes that raise an alarm within {duration_text(smallest.within)}, in weather like that of "
+        "the baseline: half of the records are then above the threshold. Smaller changes count as healthy."
+    )
+    seen = {name: loss for name, loss in smallest.groups.items() if np.isfinite(loss)}
+    if structure is None or not set(seen) & set(structure.groups):
+        return section("detectable", DETECTABLE, paragraphs(text), _smallest_changes(standing))
+    caption = (
+        "The structure: a member has the colour of the smallest loss of stiffness of its group that raises an alarm. "
+        "The monitor sees no loss of grey ones."
+    )
+    drawn = figure(caption, [draw_detectable(structure, seen)])
+    return section("detectable", DETECTABLE, paragraphs(text), drawn, _smallest_changes(standing))
 
 
 def _smallest_changes(standing: Standing) -> Html:
-    """By how much each response has to fall, alone or with all others, until there is an alarm."""
+    """Each response alone, all of them, and the damage groups."""
     smallest, units = standing.monitor.smallest_changes_, standing.monitor.units_
 
     def amount(fall: float, unit: str) -> str:
@@ -492,11 +515,11 @@ def _smallest_changes(standing: Standing) -> Html:
     falls = {"all responses by one share": smallest.common} if smallest.is_relative else {}
     falls |= {f"{name} alone": fall for name, fall in smallest.single.items()}
     rows = [[name, amount(fall, str(units.get(name.removesuffix(" alone")) or ""))] for name, fall in falls.items()]
-    caption = (
-        f"Smallest fall that raises an alarm within {duration_text(smallest.within)}, in weather like that of the "
-        "baseline: half of the records are then above the threshold."
-    )
-    return table(caption, ["Response", "Smallest fall"], rows)
+    rows += [
+        [f"loss of stiffness of {name}", percent(loss, ".2g") if np.isfinite(loss) else "none is seen"]
+        for name, loss in smallest.groups.items()
+    ]
+    return table("Smallest changes that raise an alarm.", ["What falls", "Smallest change"], rows)
 
 
 def _settings(monitor: Monitor) -> Section:
