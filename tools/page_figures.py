@@ -19,11 +19,12 @@ IMAGES = ROOT / "docs" / "images"
 def quickstart() -> None:
     """The displays of ``docs/quickstart.rst``, by the code that the page shows."""
     text = (ROOT / "docs" / "quickstart.rst").read_text()
-    images, names = iter(re.findall(r"figure:: /images/(\S+)", text)), {}
+    images = iter(name for name in re.findall(r"figure:: /images/(\S+)", text) if "narrow" not in name)
+    names: dict[str, Any] = {}
     for example in doctest.DocTestParser().get_examples(text):
         exec(example.source, names)
-        if example.source.startswith("display = "):
-            names["display"].figure_.savefig(IMAGES / next(images), dpi=130, bbox_inches="tight")
+        if match := re.match(r"(display|drawn) = ", example.source):
+            names[match[1]].figure_.savefig(IMAGES / next(images), dpi=130, bbox_inches="tight")
     with plt.rc_context({"font.size": 7}):
         figure, axes = plt.subplots(3, figsize=(3.6, 5.4), layout="constrained")
         names["display"].plot(axes)

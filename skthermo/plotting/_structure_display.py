@@ -19,6 +19,7 @@ from skthermo.plotting._structures import (
     add_members,
     check_structure,
     draw_supports,
+    height_of,
     set_view,
     sort_members,
     structure_axes,
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
 
 WIDTH, THIN = 2.5, 0.8
+LOW = 0.4  # share of its width below which a structure is too low for a colour bar beside it
+HEIGHT_OF_BAR = 0.5  # inches, with its label
 
 
 @dataclass(eq=False, repr=False)
@@ -159,7 +162,7 @@ class StructureDisplay(Display):
         >>> from skthermo.plotting import StructureDisplay
         >>> detector = DirectionalDetector(make_truss()).fit(make_truss_campaign(random_state=0).frequencies)
         >>> display = StructureDisplay.from_estimator(detector, truss_structure())
-        >>> display.colorbar_.ax.get_ylabel()
+        >>> display.colorbar_.ax.get_xlabel()
         'smallest loss found (%)'
         >>> plt.close(display.figure_)
         """
@@ -213,7 +216,9 @@ class StructureDisplay(Display):
             room = {"left": 0.03, "right": 0.97 if self.values is None else 0.87, "top": 0.97}
             self.ax_.get_gridspec().update(bottom=0.9 / self.figure_.get_figheight(), **room)
         set_view(self.ax_, nodes, is_own_figure)
-        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_own_figure and view.is_space)
+        is_low = is_own_figure and not view.is_space and height_of(nodes) < LOW
+        is_beside = is_own_figure and view.is_space
+        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_low, is_beside)
         self._draw_legend(view, supports, is_own_figure)
         return self
 
@@ -244,10 +249,13 @@ class StructureDisplay(Display):
             style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high, "zorder": 4}
             self.members_["points"] = add_members(self.ax_, self.structure, nodes, "points", points, **style)
 
-    def _draw_colorbar(self, is_beside: bool) -> Colorbar:
-        """Colour bar, in a new figure of a structure in space beside the cell that the structure fills."""
+    def _draw_colorbar(self, is_low: bool, is_beside: bool) -> Colorbar:
+        """Colour bar; in a new figure above a low structure, or beside the cell that one in space fills."""
         shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
+        if is_low:
+            self.figure_.set_figheight(self.figure_.get_figheight() + HEIGHT_OF_BAR)
+            place = {"ax": self.ax_, "location": "top", "shrink": 0.5, "aspect": 40, "pad": 0.05}
         if is_beside:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
         return self.figure_.colorbar(shown, label=plain(self.label or ""), **place)

@@ -312,16 +312,36 @@ def test_check_and_init_say_what_they_found(records, tmp_path):
     assert (missing.code, len(valid(missing.json)["errors"])) == (FAILED, 1)
 
 
+MODEL = """from skthermo.datasets import make_truss, truss_structure
+
+
+def make_model():
+    return make_truss()
+
+
+def make_structure():
+    return truss_structure()
+"""
+
+
 @pytest.mark.nightly
-def test_an_fe_model_of_a_python_file_follows_drift(bridge, records):
-    (bridge / "model.py").write_text(
-        "from skthermo.datasets import make_truss\n\n\ndef make_model():\n    return make_truss()\n"
-    )
+def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records, monkeypatch):
+    monkeypatch.undo()  # of the short page
+    (bridge / "model.py").write_text(MODEL)
     text = settings(bridge).read_text()
     named = '[fem]\nmodel = "model.py:make_model"\nrandom_state = 0'
-    settings(bridge).write_text(text.replace('# [fem]\n# model = "model.py:make_model"\n# random_state = 0', named))
+    text = text.replace('# [fem]\n# model = "model.py:make_model"\n# random_state = 0', named)
+    text = text.replace("# [page]", "[page]").replace("# structure = ", "structure = ")
+    settings(bridge).write_text(text)
     assert run("fit", settings(bridge), "--replace").code == 0
-    assert load_monitor(bridge / "monitor.joblib").drift_ is not None
+    monitor = load_monitor(bridge / "monitor.joblib")
+    assert monitor.drift_ is not None
+    assert set(monitor.smallest_changes_.groups) == {"bottom", "top", "diagonal", "vertical"}
+    assert run("report", settings(bridge)).code != FAILED
+    assert "Drawing of the structure. Smallest losses" in (bridge / "status.html").read_text()
+    edit(settings(bridge), "make_structure", "make_strcture")
+    failed = run("report", settings(bridge))
+    assert (failed.code, "make_strcture" in failed.err) == (FAILED, True)
     edit(settings(bridge), "make_model", "make_modl")
     failed = run("fit", settings(bridge), "--replace")
     assert (failed.code, "make_modl" in failed.err) == (FAILED, True)

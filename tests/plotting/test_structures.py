@@ -43,7 +43,7 @@ def test_a_group_colours_its_members_and_a_member_its_own_line():
     assert [found[1.5, 1.0], found[4.5, 1.0], found[3.0, 1.0]] == [2.0, 5.0, 1.0]
     assert np.isnan(found[1.5, 0.0])
     assert display.members_["lines"].get_clim() == (1.0, 5.0)
-    assert display.colorbar_.ax.get_ylabel() == "E (Pa)"
+    assert display.colorbar_.ax.get_xlabel() == "E (Pa)"
     by_group = {"ties": 1.0, "rafters": 2.0, "post": 3.0}
     for values in (by_group, pd.Series(by_group), [1, 1, 2, 2, 3]):
         np.testing.assert_array_equal(StructureDisplay.from_structure(structure, values).values, [1, 1, 2, 2, 3])

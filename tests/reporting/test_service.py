@@ -10,7 +10,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo._tables.text import share_text
-from skthermo.datasets import make_truss_campaign
+from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._smallest import SmallestChanges
@@ -220,6 +220,27 @@ def test_the_smallest_change_that_would_be_seen_is_said():
     monitor.smallest_changes_ = SmallestChanges(np.nan, {"f1": 0.5, "f2": np.nan}, False, pd.Timedelta("3D"))
     page = Page(detectable(standing_of(monitor), None))
     assert page.cells[-2:] == [f"0.50{SPACE}Hz", "none is seen"]
+
+
+def test_losses_that_raise_an_alarm_are_listed_and_drawn_on_the_structure():
+    monitor = FakeMonitor()
+    monitor.smallest_changes_ = SmallestChanges(
+        0.01, {"f1": 0.02}, True, pd.Timedelta("3D"), {"top": 0.04, "bottom": np.nan}
+    )
+    assert "a loss of stiffness by 4 % (top)" in today_of(monitor).text
+    for structure in (None, truss_structure()):
+        page = Page(detectable(standing_of(monitor), structure))
+        losses = dict(zip(page.heads[-2:], page.cells[-2:], strict=True))
+        assert losses == {"loss of stiffness of top": f"4{SPACE}%", "loss of stiffness of bottom": "none is seen"}
+        assert len(page.all("img")) == (structure is not None)
+
+
+def test_parts_that_explain_an_event_are_where_an_engineer_looks_first():
+    event = event_row("2025-06-20", None, groups="top, bottom or diagonal")
+    today = today_of(FakeMonitor(events=[event]))
+    assert "A loss of stiffness of top, bottom or diagonal explains most of it." in today.text
+    assert "beginning with top, bottom or diagonal," in today.text
+    assert "top, bottom or diagonal" in Page(events(standing_of(FakeMonitor(events=[event])))).cells
 
 
 def test_events_that_nobody_has_explained_are_named():

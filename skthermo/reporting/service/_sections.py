@@ -497,7 +497,7 @@ def detectable(standing: Standing, structure: Structure | None) -> Section:
         return section("detectable", DETECTABLE, paragraphs(text), _smallest_changes(standing))
     caption = (
         "The structure: a member has the colour of the smallest loss of stiffness of its group that raises an alarm. "
-        "The monitor sees no loss of grey ones."
+        "Grey ones are in no group, or no loss of theirs raises an alarm."
     )
     drawn = figure(caption, [draw_detectable(structure, seen)])
     return section("detectable", DETECTABLE, paragraphs(text), drawn, _smallest_changes(standing))
