@@ -7,6 +7,7 @@
 - z24: four folds, in each of which a quarter of the healthy records, a contiguous one, is held back.
 - wrong: the truss with directions that are off at random, lack a group, or are another structure's.
 - expected: rates by ``pod`` beside those of true records of the truss and of the fleet.
+- study: rates by ``pod`` beside those that a DetectabilityStudy simulates on the truss.
 - whiten: the directional detector behind each ``whiten`` of the compensator, its own threshold.
 - time: fit and predict of a year of hourly records, over those of MahalanobisDetector.
 
@@ -33,7 +34,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import load_z24, make_fleet, make_truss, make_truss_campaign, make_z24
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
-from skthermo.surrogate import TemperatureMapper
+from skthermo.studies import DetectabilityStudy
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 RATES = (0.005, 0.01, 0.02)
 FOUND_BY = "directions of the model", "20 neighbours, raw"
@@ -265,6 +267,28 @@ def expected(options):
         print(f"{kind:8s} {what:8s} {100 * np.mean(off):6.1f} {100 * np.abs(off).mean():6.1f} {len(off):4d}")
 
 
+def study(options):
+    print("Truss, by simulation beside pod: severity, rate of a DetectabilityStudy, rate by pod, %")
+    off = []
+    for seed in range(options.first_seed, options.first_seed + 3):
+        year, weather = make_truss_campaign(random_state=seed), make_truss_campaign(random_state=seed + 1000)
+        fem = DataInformedFEM(make_truss(), random_state=seed).fit(year.temperatures, year.frequencies)
+        detector = compensated(DirectionalDetector(fem), list(year.frequencies))
+        groups = ("bottom", "top", "diagonal")
+        scenarios = [{}, *({group: loss} for group in groups for loss in (0.03, 0.06, 0.1))]
+        simulated = DetectabilityStudy(fem, detector, scenarios, random_state=seed, uncertainty="noise")
+        rates = simulated.run(weather.temperatures)
+        last = clone(detector).fit(together(year))[-1]
+        for scenario, rate in zip(scenarios, rates["rate"], strict=True):
+            ((group, loss),) = scenario.items() or {"bottom": 0.0}.items()
+            said = last.pod([loss])[group].iloc[0]
+            off.append((bool(scenario), said - rate))
+            print(f"{seed}  {group:9s} {loss:4.0%}  {100 * rate:5.1f}  {100 * said:5.1f}")
+    for what in (False, True):
+        mine, name = np.array([error for kind, error in off if kind == what]), "damaged" if what else "healthy"
+        print(f"{name}: mean {100 * mine.mean():.1f}, mean of magnitudes {100 * np.abs(mine).mean():.1f} points")
+
+
 def whiten(options):
     options = argparse.Namespace(**vars(options) | {"parts": ["truss", "fleet", "footbridge"]})
     rows = {}
@@ -306,7 +330,7 @@ def timed(options):
         print(f"{what}: {seconds['directional']:.2f} s, {seconds['directional'] / seconds['Mahalanobis']:.1f} times")
 
 
-PARTS = {"z24": z24, "wrong": wrong, "expected": expected, "whiten": whiten, "time": timed}
+PARTS = {"z24": z24, "wrong": wrong, "expected": expected, "study": study, "whiten": whiten, "time": timed}
 
 
 def main():
