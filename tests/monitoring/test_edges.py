@@ -2,7 +2,7 @@
 
 import pickle
 import warnings
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing.checks import Plausible
 
@@ -41,17 +41,24 @@ def detector(targets, last=None):
     return make_pipeline(compensator, MahalanobisDetector() if last is None else last)
 
 
+TESTS = {
+    "any direction": MahalanobisDetector,
+    "softening": DirectionalDetector,
+    "model": partial(DirectionalDetector, make_truss()),
+}
+
+
 @cache
-def saved(window=None, **options):
+def saved(window=None, test="any direction", **options):
     """A monitor of the truss after its baseline."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        last = None if window is None else WindowedAlarm(window)
+        last = TESTS[test]() if window is None else WindowedAlarm(window, detector=TESTS[test]())
         return pickle.dumps(Monitor(detector(MODES, last), **options).fit(truss()[:N_BASELINE]))
 
 
-def fitted(window=None, **options):
-    return pickle.loads(saved(window, **options))
+def fitted(window=None, test="any direction", **options):
+    return pickle.loads(saved(window, test, **options))
 
 
 def changed(factors, n_days=20, start=0):
@@ -67,16 +74,17 @@ SIZES = st.builds(lambda sign, size: float(np.exp(sign * size)), st.sampled_from
 @pytest.mark.one_case
 @pytest.mark.parametrize("options", [{}, {"sensors": False}], ids=["with sensors", "without"])
 @settings(
-    max_examples=12, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=18, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
 )
 @given(
     factors=st.dictionaries(st.sampled_from(MODES), SIZES | st.just(0.0) | st.just(-1.0), min_size=1),
     window=st.sampled_from([None, "2D"]),
+    test=st.sampled_from([*TESTS]),
     start=st.integers(0, 300),
     n_days=st.integers(4, 20),
 )
-def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, window, start, n_days):
-    monitor = fitted(window, **options)
+def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, window, test, start, n_days):
+    monitor = fitted(window, test, **options)
     answers = monitor.update(changed(factors, n_days, start))[SETTLED:]
     assert set(answers["state"]) <= {"alarm", "not evaluated"}
     assert answers.loc[answers["state"] == "not evaluated", "reason"].ne("").all()
