@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.warnings import warn_user, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import DAY, check_duration, usual_step
 from skthermo._tables.saved_frames import SavesFrames
@@ -38,6 +38,7 @@ from skthermo.residuals.weather import BEYOND, TrainingRange
 DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 EXPLAINED = 0.5  # share of a squared departure from which losses of stiffness explain it
+KINDS_OF_ESTIMATE = "missing-seasons", "extrapolated-threshold", "undetected-changes", "baseline-excursion"
 SET_ASIDE = 3  # of the last five records with a response that is set aside open an event
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
@@ -175,7 +176,7 @@ class ActiveDetector(SavesFrames):
             for kind, one in by_kind.items()
         }
         if monitor.watch_per_year is not None:
-            with without_warnings():  # those of the higher threshold have been given
+            with reported_by_caller(KINDS_OF_ESTIMATE):  # for the higher threshold
                 per_year = monitor.watch_per_year
                 watch = estimate_false_alarms(by_kind[DAMAGE], per_year, **options, name="watch_per_year")
             lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)

@@ -286,13 +286,17 @@ def estimate_false_alarms(
             f"{f' (the first at {infinite[0]})' if len(infinite) else ''}; expected at least 2, all of them finite"
         )
     found = Excursions.of(known, hold, persistence)
+    n_peaks = len(found.squares)
+    seen = (
+        f"{name} is {per_year:g}, but the baseline of {found.years} has only {counted_number(n_peaks, 'excursion')} "
+        f"followed by {counted_number(hold / DAY, 'day')} of quiet"
+    )
+    if n_peaks < FEWEST_PEAKS:
+        raise ValueError(f"{seen}; expected at least {FEWEST_PEAKS}")
+    if per_year * found.n_years > n_peaks:
+        per_year = n_peaks / found.n_years
+        warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-excursions")
     asked = per_year * found.n_years
-    if len(found.squares) < FEWEST_PEAKS or asked > len(found.squares):
-        raise ValueError(
-            f"{name} is {per_year:g}, but the baseline of {found.years} has only "
-            f"{counted_number(len(found.squares), 'excursion')} followed by {counted_number(hold / DAY, 'day')} of "
-            f"quiet; expected at least {FEWEST_PEAKS}, and as many as alarms are asked for"
-        )
     tail = Tail.of(found.squares, asked, found.scales)
     release = release_level(known, hold, persistence) if release is None else release
     rule = EventRule(max(tail.threshold(asked), release), release, hold, persistence)

@@ -180,10 +180,15 @@ def test_a_threshold_far_beyond_the_baseline_is_said_to_be_one():
     assert estimate.rule.threshold > index.max()
 
 
-def test_more_alarms_than_excursions_are_refused():
+def test_of_more_alarms_than_excursions_there_are_as_many_as_these():
     index = pd.Series(chi(np.random.default_rng(7), 365), stamps(365))
-    with pytest.raises(ValueError, match=r"false_alarms_per_year is 500, .* only \d+ excursions"):
-        estimate_false_alarms(index, 500.0)
+    with pytest.warns(UserWarning, match=r"false_alarms_per_year is 500, .* only \d+ excursions .*few-excursions"):
+        many = estimate_false_alarms(index, 500.0)
+    n_excursions = len(find_events(index, index.index, many.rule))
+    assert many.expected == pytest.approx(n_excursions, rel=0.1)
+    assert many.rule.threshold < estimate_false_alarms(index, 0.9 * many.expected).rule.threshold
+    with pytest.raises(ValueError, match="expected at least"):
+        estimate_false_alarms(index[:3], 500.0)
     with pytest.raises(ValueError, match="0 baseline records have a damage index, 0 of them"):
         estimate_false_alarms(index * np.nan)
 

@@ -97,8 +97,9 @@ def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(t
     assert "watch: opens above" in monitor.summary()
     with pytest.raises(ValueError, match="watch_per_year"):
         fitted_monitor(records, watch_per_year=1)
-    with pytest.raises(ValueError, match="watch_per_year is 5000"):
-        fitted_monitor(records, watch_per_year=5000)
+    with pytest.warns(UserWarning, match="watch_per_year is 5000"):
+        many = fitted_monitor(records, watch_per_year=5000)
+    assert many.watch_threshold_ <= monitor.watch_threshold_
 
 
 def assert_as_if_never_come(monitor, other):
