@@ -1,7 +1,15 @@
-"""From monitoring data to a thermal FE model: inverse surrogate, temperature mapper, the chain."""
+"""From monitoring data to a thermal FE model: inverses, temperature mapper, the chain."""
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
-from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
-__all__ = ["DataInformedFEM", "FitReport", "FittedChain", "InverseSurrogate", "TemperatureMapper", "paper_network"]
+__all__ = [
+    "DataInformedFEM",
+    "FitReport",
+    "FittedChain",
+    "InverseSurrogate",
+    "PosteriorInverse",
+    "TemperatureMapper",
+    "paper_network",
+]

@@ -51,10 +51,10 @@ class Box:
         """Which parameters of each row are not even near the box; NaN is not."""
         return Box(self.near, self.names).outside(theta)
 
-    def warning(self, theta: Array, far: NDArray[np.bool_], tested: str) -> str:
-        """Text of the warning if many rows have parameters that fail a test of the prior, else an empty string."""
+    def warning(self, theta: Array) -> str:
+        """Text of the warning if many rows have parameters far outside, else an empty string."""
         known = ~np.isnan(theta).any(axis=1)
-        far = far[known]
+        far = self.far_outside(theta[known])
         rows = far.any(axis=1)
         if not rows.size or rows.mean() <= MANY_FAR_ROWS:
             return ""
@@ -62,9 +62,10 @@ class Box:
         values = theta[known][far[:, worst], worst]
         lowest, highest = self.bounds[worst]
         return (
-            f"{rows.sum()} of {rows.size} rows give parameters {tested}. {self.names[worst]!r} is {values.min():.3g} "
-            f"to {values.max():.3g} in {len(values)} rows, with bounds {lowest:.6g} to {highest:.6g}. Give frequencies "
-            "in Hz in the order of the model's modes, wider bounds, or the noise of the measurement"
+            f"{rows.sum()} of {rows.size} rows give parameters farther outside the bounds than half their width. "
+            f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, with bounds "
+            f"{lowest:.6g} to {highest:.6g}. Give frequencies in Hz in the order of the model's modes, wider bounds, "
+            "or the noise of the measurement"
         )
 
 
@@ -86,17 +87,11 @@ def reason_of(model: FEModel, reduce: Reduce) -> str:
     return NO_GAIN if hasattr(model, "reduction_pays") else "it has no reduced model"
 
 
-def box_around(theta: Array, limits: Array | None = None) -> Array:
-    """Lowest and highest of each parameter in rows of theta, with a margin, within limits; (n_parameters, 2)."""
+def box_around(theta: Array) -> Array:
+    """Lowest and highest of each parameter in rows of theta, with a margin; (n_parameters, 2)."""
     lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
     margin = np.maximum(MARGIN * (highest - lowest), LEAST_MARGIN * lowest)
-    box = np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
-    if limits is None:
-        return box
-    first, last = limits.T
-    return np.column_stack(
-        [np.clip(box[:, 0], first, last / (1 + LEAST_MARGIN)), np.clip(box[:, 1], first * (1 + LEAST_MARGIN), last)]
-    )
+    return np.column_stack([np.maximum(lowest - margin, lowest / 2), highest + margin])
 
 
 class KnownChanges:
@@ -152,13 +147,22 @@ class Simulator:
     _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
 
     @classmethod
-    def around(cls, model: FEModel, theta: Array, reduce: Reduce, known: Simulator | None = None) -> Simulator:
+    def around(
+        cls,
+        model: FEModel,
+        theta: Array,
+        reduce: Reduce,
+        known: Simulator | None = None,
+        *,
+        n_rows: int | None = None,
+    ) -> Simulator:
         """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
 
-        A known simulator is taken if its reduced model is of the same model, as accurate, and covers that box.
+        It will be used for ``n_rows``, by default for these. A known simulator is taken if its reduced model is of the
+        same model, as accurate, and covers that box.
         """
         auto, box = is_auto(reduce), box_around(theta)
-        tol = tolerance(model, reduce, SOLVES_PER_ROW * len(theta))
+        tol = tolerance(model, reduce, SOLVES_PER_ROW * (len(theta) if n_rows is None else n_rows))
         allowed = DEFAULT_TOLERANCE if auto else tol
         is_known = known is not None and known.model is model and known.covers(box)
         usual = theta if reduce and isinstance(model, AffineModel | ReducedModel) else None
@@ -211,14 +215,14 @@ class Simulator:
             return False
         return bool((self.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= self.box[:, 1]).all())
 
-    def extended(self, theta: Array, limits: Array) -> Simulator:
-        """The simulator whose reduced model also covers a box around rows of theta, within limits (n_parameters, 2).
+    def extended(self, theta: Array) -> Simulator:
+        """The simulator whose reduced model also covers a box around rows of theta.
 
         Where no basis is accurate in so wide a box, the reduced model stays as it is.
         """
         if self.box is None or not self.outside(theta).any():
             return self
-        wanted = box_around(theta, limits)
+        wanted = box_around(theta)
         lowest, highest = np.minimum(self.box[:, 0], wanted[:, 0]), np.maximum(self.box[:, 1], wanted[:, 1])
         box = np.column_stack([lowest, highest])
         try:

@@ -14,7 +14,6 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
@@ -69,7 +68,7 @@ from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._regression import TemperatureMapper
-from skthermo.surrogate._simulator import Box, Simulator, tolerance
+from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
     RecordSimulator,
@@ -85,10 +84,7 @@ from skthermo.surrogate.chain._stages import (
     possible,
     ratio_regressor,
 )
-from skthermo.surrogate.inverse import InverseSurrogate
-
-START_SAMPLES, START_PENALTY = 200, 1e-3
-"""Simulations and ridge penalty of a regressor that merely gives the start of a refined estimate."""
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
 
 class Simulated(TypedDict, total=False):
@@ -116,8 +112,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     model : FE model
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
-        M1. By default ``InverseSurrogate(model)``; an InverseSurrogate without a model gets this one. Names such as
-        ``inverse__n_samples`` in ``set_params`` and grids reach the default parts, too.
+        M1. By default ``PosteriorInverse(model)``; ``InverseSurrogate()`` is the paper's. Either gets this model if it
+        has none. Names such as ``inverse__noise`` in ``set_params`` and grids reach the default parts, too.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``, behind the means of earlier temperatures that
         `~skthermo.preprocessing.find_memory` finds. With lags of hours, for example ``make_pipeline(LagFeatures(),
@@ -128,16 +124,16 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         model.
     imputer : transformer or "passthrough", default="passthrough"
         Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only. Without one,
-        rows with gaps do not train M2 unless the inverse refines.
+        a `PosteriorInverse` inverts rows with gaps from the modes that are there; other inverses leave them out.
     discrepancy : "auto", regressor or None, default="auto"
         Learns from the inputs of M2, mode by mode, what the FE model cannot follow: the ratio of measured over modelled
         frequencies. "auto" is a `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
-        Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `InverseSurrogate` says, which
+        Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `PosteriorInverse` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
     memory : str or joblib.Memory, optional
         Folder for the checks of the training records and, unless the inverse has a memory of its own, for all that
-        ``memory`` of `InverseSurrogate` stores.
+        its ``memory`` stores.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -152,8 +148,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     parameters_ : DataFrame or ndarray of shape (n_samples, n_parameters)
         Multipliers that M1 found in the training data, eq. (5).
     noise_ : ndarray of shape (n_modes,)
-        Relative standard deviation of the records about a regression on their weather, out of fold; an inverse with
-        ``noise="auto"`` takes it.
+        Relative standard deviation of the records about a regression on their weather, out of fold; an
+        `InverseSurrogate` with ``noise="auto"`` takes it.
     discrepancy_ : callable
         ``discrepancy_(T)``, (n_samples, n_modes), is the logarithm of measured over modelled frequencies at
         temperatures T; 0 with ``discrepancy=None``.
@@ -170,8 +166,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         What each temperature sensor shows, given the others: fills missing temperatures.
     training_range_ : TrainingRange
         Lowest and highest value of each input of M2, lags included, in the training records.
-    box_ : Box or None
-        Bounds of the inverse.
     simulator_ : Simulator
         The model and, where it is reduced, its reduced model.
     parameter_names_, mode_names_ : list of str
@@ -300,10 +294,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         stages = Stages(self, 5, X, y)
         with stages.stage("noise"):
             self.noise_ = measurement_noise(self.mapper_, filled, usable)
-        with stages.stage("inverse surrogate", self.inverse_):
+        with stages.stage("inverse", self.inverse_):
             aligned = self._fit_inverse(inverse, T, usable, shapes)
         with stages.stage("parameters of the records"):
             estimates = inverse.estimates(aligned, self.parameter_names_)
+            warn_each(() if shapes is None else inverse.shape_warnings(aligned, estimates.theta))
         with stages.stage("temperature mapper", self.mapper_):
             fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
@@ -342,20 +337,16 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        An inverse that refines finds the same parameters whatever its regressor, which is here a linear regression on
-        200 simulations at most. It refines on frequencies alone, also where `fit` had shapes. Records whose weight was
-        0 in `fit` are left out, and other weights are 1.
+        Prior and noise are learned anew. A `PosteriorInverse` sees frequencies alone, also where `fit` had shapes.
+        Records whose weight was 0 in `fit` are left out, and other weights are 1.
         """
         T, F = self.training_records_
         counted = self.records_.counted
         chain = clone(self)
         models = {name: model for name, part in chain.get_params().items() if part is self.model}
         chain.set_params(**({} if model is None else models), random_state=random_state, verbose=0, memory=None)
-        if isinstance(self.inverse_, InverseSurrogate) and self.inverse_.n_steps_:
-            n_samples = min(self.inverse_.n_samples, START_SAMPLES)
-            quick = {"regressor": Ridge(START_PENALTY), "n_samples": n_samples, "narrow_bounds": False, "dofs": None}
-            quick["memory"] = None  # others than the chain's own inversions are hardly asked for again
-            chain.set_params(**{f"inverse__{name}": value for name, value in quick.items()})
+        if isinstance(self.inverse_, PosteriorInverse):
+            chain.set_params(inverse__dofs=None, inverse__memory=None)  # others than its own are hardly asked for again
         weights = None if counted.all() or X is not None else counted.astype(float)
         if self.y_is_vector_:
             F = F.squeeze(axis=1)
@@ -425,14 +416,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         F : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz; NaN is allowed.
         shapes : array-like of shape (n_samples, n_modes, n_sensors), optional
-            Measured mode shapes, as in `fit`. Without them, an inverse with ``dofs`` that refines estimates parameters
-            from frequencies alone.
+            Measured mode shapes, as in `fit`. Without them, an inverse with ``dofs`` estimates parameters from
+            frequencies alone.
 
         Returns
         -------
         ndarray or DataFrame of shape (n_samples, n_parameters)
-            Multipliers of the nominal parameters; NaN in rows without any mode and, without refining, where one is
-            missing.
+            Multipliers of the nominal parameters; NaN in rows without any mode and, with an `InverseSurrogate`, where
+            one is missing.
 
         Raises
         ------
@@ -706,7 +697,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self.records_.temperatures, self.records_.frequencies
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
-        """How far inputs and parameters are outside the training range, row by row.
+        """How far the inputs of M2 are outside the training range, row by row.
 
         Parameters
         ----------
@@ -717,16 +708,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         DataFrame
             With X's index. A column for each input of M2, lags included: its distance outside the range of the training
-            rows, divided by that range (0 inside). ``outside_bounds`` says whether a parameter is outside the bounds of
-            the inverse. Where the mapper has learned from a fleet, ``from_fleet`` is True in weather that only the
-            fleet has seen.
+            rows, divided by that range (0 inside). Where the mapper has learned from a fleet, ``from_fleet`` is True in
+            weather that only the fleet has seen.
         """
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        theta = self.thermal_.learned(weather.filled)
-        outside = np.zeros(len(theta), dtype=bool) if self.box_ is None else self.box_.outside(theta).any(axis=1)
-        excess = excess.assign(outside_bounds=outside)
         if offers(self.mapper_, "from_fleet"):
             return excess.assign(from_fleet=rows_from_fleet(self.mapper_, weather.filled))
         return excess
@@ -775,18 +762,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     def _default_part(self, name: str) -> BaseEstimator | None:
         if name == "inverse":
-            return InverseSurrogate(reduce=self.reduce, n_jobs=self.n_jobs)
+            return PosteriorInverse(reduce=self.reduce, n_jobs=self.n_jobs)
         if name == "aligner":
             return BiasAligner(method="scale")
         if name == "mapper":
             return TemperatureMapper()
         return ratio_regressor() if is_auto(getattr(self, name)) else None
-
-    def set_params(self, **params: Any) -> Self:
-        super().set_params(**params)
-        if self.inverse is not None:
-            ChainInverse(self.inverse).warn_of_inert(self.model, params)
-        return self
 
     def _part(self, name: str) -> Any:
         """A clone of a part, or what it is by default."""
@@ -830,8 +811,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
         inverse = ChainInverse(self.inverse_)
-        bounds = [part.bounds for part in inverse.surrogates]
-        self.box_ = Box.of(bounds[0], self.parameter_names_) if bounds else None
         if shapes is None and inverse.shape_inputs is not None:
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
         return inverse
@@ -858,12 +837,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
             F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
         aligned = inverse.with_shapes(self.aligner_.fit(F).transform(F), shapes)
-        for part in inverse.surrogates:
-            if isinstance(part.noise, str):
+        for part in inverse.inverses:
+            if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
                 part.set_params(noise=self.noise_)
         self.inverse_.fit(aligned)
-        if shapes is not None:
-            warn_each(inverse.shape_warnings(aligned))
         return aligned
 
     def _learn_discrepancy(
@@ -871,7 +848,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     ) -> None:
         """Learn what the model cannot follow, and hold all that predicts."""
         inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-        known = next((getattr(part, "simulator_", None) for part in inverse.surrogates), None)
+        known = next((getattr(part, "simulator_", None) for part in inverse.inverses), None)
         simulator = Simulator.around(self.model, learned, self.reduce, known)
         records = TrainingRecords(
             temperatures=T,

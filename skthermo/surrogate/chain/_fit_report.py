@@ -15,6 +15,7 @@ from sklearn.base import BaseEstimator
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
 from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, row_times
 from skthermo._tables.saved_frames import SavesFrames
+from skthermo._tables.text import capital
 from skthermo._validation import last_step, offers, reach_of
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, linearise, match_modes
@@ -22,10 +23,10 @@ from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
-from skthermo.surrogate._simulator import Box, Simulator
+from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
 from skthermo.surrogate.chain._stages import Discrepancy, Estimates, ThermalModel, Weather
-from skthermo.surrogate.inverse import InverseSurrogate
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior
 from skthermo.updating import cramer_rao
 
 
@@ -42,7 +43,7 @@ class FittedChain(Protocol):
         Number of temperature columns.
     mode_names_, parameter_names_ : list of str
         Columns of the frequencies and of the parameters.
-    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, box_, thermal_, recorder_
+    inverse_, mapper_, aligner_, discrepancy_, simulator_, sensors_, training_range_, thermal_, recorder_
         What the chain has learned, as `DataInformedFEM` describes it.
     parameters_, noise_, records_, report_
         What it has found in the training records.
@@ -64,7 +65,6 @@ class FittedChain(Protocol):
     simulator_: Simulator
     sensors_: SensorRegression
     training_range_: TrainingRange
-    box_: Box | None
     parameters_: Table
     noise_: Array
     thermal_: ThermalModel
@@ -142,10 +142,9 @@ class FitReport(SavesFrames):
     unexplained_offset : float
         Size of the hidden offsets as a share of what weather and calibration may leave; above 1, the model is not
         calibrated to these records.
-    n_outside : int or None
-        Rows with parameters outside the bounds of the inverse; None where it has no bounds.
-    outside : Series
-        Share of rows outside, by parameter.
+    prior : ThermalPrior or None
+        With a `PosteriorInverse`: how much temperature moves the parameters, as the records teach it or as it was
+        given.
     deviations : Series
         Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound);
         infinite where the modes do not determine a parameter.
@@ -154,17 +153,19 @@ class FitReport(SavesFrames):
     n_scored : int
         Number of rows used for ``errors``, spread evenly over the training rows.
     n_unconverged : int or None
-        Rows whose parameters have not converged in refining; None without refining.
+        Rows whose parameters have not converged; None without a `PosteriorInverse`.
     n_by_full_model, n_full_solves : int
-        Rows whose refined parameters are outside the box of the reduced model, and how often the full model was solved
-        for them.
+        Rows whose parameters are outside the box of the reduced model, and how often the full model was solved for
+        them.
     round_trip : Series or None
-        Relative error of the nominal frequencies after inversion by M1 and another solution, by mode, in percent.
+        With an `InverseSurrogate`: relative error of the nominal frequencies after inversion by it and another
+        solution, by mode, in percent.
     scatter : Series
         Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
     variation : DataFrame
-        By mode, in percent: ``noise`` of the records, ``weather``, the standard deviation of what it does to the FE
-        model's frequencies, and ``discrepancy``, its root mean square over the training records.
+        By mode, in percent: ``noise`` of the records about a regression, ``misfit``, that about the FE model, by which
+        a `PosteriorInverse` weights the mode, ``weather``, the standard deviation of what it does to the FE model's
+        frequencies, and ``discrepancy``, its root mean square over the training records.
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
@@ -193,8 +194,7 @@ class FitReport(SavesFrames):
     offsets: pd.Series
     hidden_offsets: pd.Series
     unexplained_offset: float
-    n_outside: int | None
-    outside: pd.Series
+    prior: ThermalPrior | None
     deviations: pd.Series
     errors: pd.DataFrame
     n_scored: int
@@ -232,12 +232,10 @@ class FitReport(SavesFrames):
                 f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot distinguish all "
                 "of them."
             )
-        if self.n_outside is not None:
-            lines.append(
-                f"{self.n_outside} of {self.n_rows} rows have parameters outside the bounds of the inverse surrogate."
-            )
+        if self.prior is not None:
+            lines.append(f"{capital(str(self.prior))}.")
         if self.n_unconverged:
-            lines.append(f"The refined parameters of {self.n_unconverged} of {self.n_rows} rows have not converged.")
+            lines.append(f"The parameters of {self.n_unconverged} of {self.n_rows} rows have not converged.")
         if self.n_by_full_model:
             lines.append(
                 f"The parameters of {self.n_by_full_model} of {self.n_rows} rows are outside the box of the reduced "
@@ -280,8 +278,8 @@ class FitReport(SavesFrames):
 
     def _parameters(self) -> pd.DataFrame:
         percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
-        if self.n_outside is not None:
-            percent["rows outside (%)"] = (100 * self.outside).round(1)
+        if self.prior is not None:
+            percent["moved by itself (%)"] = (100 * self.prior.own).round(2)
         return percent
 
     def warnings(self) -> Iterator[SkthermoWarning]:
@@ -393,22 +391,21 @@ class FitReport(SavesFrames):
         yield ModelWarning(
             f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
             f"{self.round_trip[worst]:+.2g} %. Measurements scatter around the predictions by only "
-            f"{self.scatter[worst]:.2g} %, so that detectors take this error for damage. Let the inverse refine, set "
-            "narrow_bounds=True, or raise n_samples",
+            f"{self.scatter[worst]:.2g} %, so that detectors take this error for damage. Raise n_samples, or use "
+            "the default inverse",
             "round-trip-error",
         )
 
 
 def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
     """The report of a chain of which all else is fitted."""
-    records, box, theta = chain.records_, chain.box_, estimates.theta
+    records, theta = chain.records_, estimates.theta
     names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
     measured, of_model, predicted = _in_sample(chain)
     hidden = hidden_offsets(chain.aligner_, records.frequencies)
     errors_of_means = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
     means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
     errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
-    outside = np.zeros_like(theta, dtype=bool) if box is None else box.outside(theta)
     full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
     known, scatter = ~np.isnan(theta).any(axis=1), np.nan_to_num(robust_deviation(measured / predicted))
     last = last_step(chain.inverse_)
@@ -421,8 +418,7 @@ def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings
         offsets=mode_offsets(chain.model, records.frequencies),
         hidden_offsets=hidden,
         unexplained_offset=unexplained_offset(hidden, of_model, records.temperatures, errors_of_means),
-        n_outside=None if box is None else int(outside.any(axis=1).sum()),
-        outside=pd.Series(outside[known].mean(axis=0), index=names),
+        prior=getattr(last, "prior_", None),
         deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
         errors=pd.DataFrame(errors, index=modes),
         n_scored=len(measured),
@@ -451,10 +447,12 @@ def _in_sample(chain: FittedChain) -> tuple[Array, Array, Array]:
 def _variation(chain: FittedChain) -> pd.DataFrame:
     """What noise, the weather and the discrepancy do to each mode, in percent."""
     records = chain.records_
-    weather = np.nanstd(np.log(records.modelled[records.trained]), axis=0)
+    weather, last = np.nanstd(np.log(records.modelled[records.trained]), axis=0), last_step(chain.inverse_)
+    misfit = last.noise_ if isinstance(last, PosteriorInverse) else np.full_like(weather, np.nan)
     discrepancy = np.sqrt((chain.discrepancy_.at(records.inputs[records.trained]) ** 2).mean(axis=0))
     return 100 * pd.DataFrame(
-        {"noise": chain.noise_, "weather": weather, "discrepancy": discrepancy}, index=chain.mode_names_
+        {"noise": chain.noise_, "misfit": misfit, "weather": weather, "discrepancy": discrepancy},
+        index=chain.mode_names_,
     )
 
 
@@ -486,7 +484,7 @@ def filled(T: Table, sensors: SensorRegression) -> pd.DataFrame:
 def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
     """Rows that do not train the mapper, by reason: a sensor or a mode that is missing, with the periods."""
     T, F, trained = records.temperatures, records.frequencies, records.trained
-    without_theta = np.isnan(theta).any(axis=1)  # an inverse that refines needs some modes only
+    without_theta = np.isnan(theta).any(axis=1)  # a posterior needs some modes only
     complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
     missing = {
         f"temperature {sensor!r} is missing": np.isnan(as_floats(T)[:, columns]).any(axis=1) & ~trained

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -48,7 +46,6 @@ from skthermo.exceptions import (
     FewRecordsWarning,
     ModelWarning,
     RecordsWarning,
-    ResultWarning,
     SkthermoWarning,
     UnevaluatedRowsWarning,
     WeatherWarning,
@@ -57,17 +54,18 @@ from skthermo.fem import FEModel, shape_components
 from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse import InverseSurrogate, ShapeInputs, unconverged
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ShapeInputs, unconverged
 
 SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
 FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
+SHAPES_COMPARED = 100  # rows of parameters at which the model's shapes are compared with the measured ones
 UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """What M1 finds for each training record: parameters and, where it refines, how the steps ended, and how often the
-    full model was solved because they left the box of the reduced one."""
+    """What M1 finds for each training record: parameters and, of a `PosteriorInverse`, how the steps ended, and how
+    often the full model was solved because they left the box of the reduced one."""
 
     theta: Array
     n_unconverged: int | None = None
@@ -76,32 +74,32 @@ class Estimates:
 
 @dataclass(frozen=True)
 class ChainInverse:
-    """M1 of a chain: an `InverseSurrogate`, a pipeline that ends with one, or any other transformer."""
+    """M1 of a chain: a `PosteriorInverse`, an `InverseSurrogate`, a pipeline that ends with one, or a transformer."""
 
     estimator: BaseEstimator
 
     @property
-    def surrogates(self) -> list[InverseSurrogate]:
-        """Every `InverseSurrogate` that it is or holds."""
+    def inverses(self) -> list[PosteriorInverse | InverseSurrogate]:
+        """Every inverse of an FE model that it is or holds."""
         parts = (self.estimator, *self.estimator.get_params().values())
-        return [part for part in parts if isinstance(part, InverseSurrogate)]
+        return [part for part in parts if isinstance(part, PosteriorInverse | InverseSurrogate)]
 
     @property
-    def refining(self) -> InverseSurrogate | None:
-        """The fitted `InverseSurrogate` that it is or ends with, if that refines its estimates."""
+    def posterior(self) -> PosteriorInverse | None:
+        """The `PosteriorInverse` that it is or ends with."""
         last = last_step(self.estimator)
-        return last if isinstance(last, InverseSurrogate) and last.n_steps_ else None
+        return last if isinstance(last, PosteriorInverse) else None
 
     @property
     def shape_inputs(self) -> ShapeInputs | None:
         """How shapes are read; None without ``dofs``."""
-        part = next((part for part in self.surrogates if part.dofs is not None), None)
-        return None if part is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
+        part = self.posterior
+        return None if part is None or part.dofs is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
 
     def prepare(self, model: FEModel, memory: str | Memory | None, reduce: Reduce) -> None:
-        """Give every surrogate inside what it has not: the chain's model, memory and choice of a reduced model."""
+        """Give every inverse what it has not: the chain's model, memory and choice of a reduced model."""
         names = list(model.parameter_names)
-        for part in self.surrogates:
+        for part in self.inverses:
             if part.model is None:
                 part.set_params(model=model)
             if part.memory is None:
@@ -111,12 +109,13 @@ class ChainInverse:
                     f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
                     f"{model!r} has"
                 )
-            if is_auto(part.reduce) and (not reduce or hasattr(part.model, "reduced")):
+            may_reduce = isinstance(part, PosteriorInverse) and is_auto(part.reduce)
+            if may_reduce and (not reduce or hasattr(part.model, "reduced")):
                 part.set_params(reduce=reduce)
 
     def estimates(self, aligned: Table, parameter_names: list[str]) -> Estimates:
         """What the fitted inverse finds for aligned records, with warnings where they determine little."""
-        last = self.refining
+        last = self.posterior
         if last is None:
             theta = as_floats(self.estimator.transform(aligned))
             if theta.shape[1] != len(parameter_names):
@@ -140,7 +139,7 @@ class ChainInverse:
         inputs = self.shape_inputs
         if inputs is None:
             if shapes is not None:
-                raise ValueError("shapes are given, but the inverse has no dofs; expected InverseSurrogate(dofs=...)")
+                raise ValueError("shapes are given, but the inverse has no dofs; expected PosteriorInverse(dofs=...)")
             return F
         components = np.full((len(F), inputs.n_columns - inputs.n_modes), np.nan)
         if shapes is not None:
@@ -155,9 +154,9 @@ class ChainInverse:
         names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in inputs.dofs)]
         return frame_like(F, np.hstack([as_floats(F), components]), names)
 
-    def shape_warnings(self, aligned: Table) -> Iterator[SkthermoWarning]:
-        """Warnings about measured shapes, which are given beside the frequencies: kind and text of each."""
-        inverse = self.refining
+    def shape_warnings(self, aligned: Table, theta: Array) -> Iterator[SkthermoWarning]:
+        """Warnings about measured shapes, beside the parameters of the records: kind and text of each."""
+        inverse = self.posterior
         if inverse is None:
             return
         inputs, values = inverse.shape_inputs_, as_floats(aligned)
@@ -172,11 +171,10 @@ class ChainInverse:
                 f"{n_sensors} sensors. The other shapes are not used. Leave sensors that failed out of dofs",
                 "few-shapes",
             )
-        if not n_shapes or "shapes" not in inverse.samples_:
+        rows = spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), SHAPES_COMPARED)
+        if not n_shapes or not len(rows):
             return
-        possible = shape_components(inverse.samples_.shapes.swapaxes(1, 2), inputs.reference).reshape(
-            -1, n_modes, n_sensors
-        )
+        possible = inputs.of_parameters(inverse.model, theta[rows])[:, n_modes:].reshape(-1, n_modes, n_sensors)
         lowest, highest = possible.min(axis=0), possible.max(axis=0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # a mode without any shape
@@ -185,34 +183,12 @@ class ChainInverse:
         mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[mode, sensor] > UNLIKE:
             yield ModelWarning(
-                f"measured shapes of {names[mode]!r} are unlike those of the model anywhere in its bounds. At sensor "
-                f"{sensor} the median component is {median[mode, sensor]:.2f}, by the model {lowest[mode, sensor]:.2f} "
-                f"to {highest[mode, sensor]:.2f}. They distort the parameters. Check the modes, and order, signs and "
-                "gains of the sensors (dofs), or raise shape_noise",
+                f"measured shapes of {names[mode]!r} are unlike those of the model at the parameters of the records. "
+                f"At sensor {sensor} the median component is {median[mode, sensor]:.2f}, by the model "
+                f"{lowest[mode, sensor]:.2f} to {highest[mode, sensor]:.2f}. They distort the parameters. Check the "
+                "modes, and order, signs and gains of the sensors (dofs), or raise shape_noise",
                 "foreign-shapes",
             )
-
-    def warn_of_inert(self, model: FEModel, names: Iterable[str]) -> None:
-        """Warn if a search of scikit-learn sets the regressor of an inverse that refines: no score depends on it."""
-        frame = sys._getframe(2)
-        while frame.f_code.co_name in ("set_params", "_set_params") and frame.f_back is not None:
-            frame = frame.f_back  # past the estimators around the chain
-        if not frame.f_globals.get("__name__", "").startswith("sklearn.model_selection"):
-            return
-        params = self.estimator.get_params().items()
-        parts = {"inverse": self.estimator} | {f"inverse__{name}": part for name, part in params}
-        for name, part in parts.items():
-            searched = [
-                one for one in names if re.fullmatch(f"{name}__(regressor|n_samples|narrow_bounds)(__.*)?", one)
-            ]
-            if searched and isinstance(part, InverseSurrogate) and part.steps_on(model):
-                warn_user(
-                    f"{searched[0]!r} is searched, but refined estimates do not depend on the regressor and its "
-                    "simulations. All settings score alike. Give the inverse refine=0, or search over the "
-                    "InverseSurrogate itself",
-                    ResultWarning,
-                    "inert-search",
-                )
 
 
 PENALTIES = np.logspace(-1, 5, 7)  # few, because it is fitted often; below them, rounding errors would show

@@ -1,6 +1,8 @@
-"""The inverse surrogate M1: parameters from frequencies and mode shapes."""
+"""The inverse M1: parameters from frequencies and mode shapes."""
 
 from skthermo.surrogate.inverse._inverse import InverseSurrogate
-from skthermo.surrogate.inverse._refinement import ShapeInputs, unconverged
+from skthermo.surrogate.inverse._posterior import PosteriorInverse, unconverged
+from skthermo.surrogate.inverse._prior import ThermalPrior
+from skthermo.surrogate.inverse._shapes import ShapeInputs
 
-__all__ = ["InverseSurrogate", "ShapeInputs", "unconverged"]
+__all__ = ["InverseSurrogate", "PosteriorInverse", "ShapeInputs", "ThermalPrior", "unconverged"]

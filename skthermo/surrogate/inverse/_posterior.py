@@ -1,0 +1,574 @@
+"""The posterior mode of parameters given frequencies, by steps on the FE model; records teach prior and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from numbers import Integral, Real
+from typing import Any, Literal, overload
+
+import numpy as np
+import pandas as pd
+from joblib import Memory
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import Bunch
+
+from skthermo._estimators.memory import remembered
+from skthermo._estimators.warnings import warn_user
+from skthermo._io import with_progress
+from skthermo._tables.arrays import Array, as_floats, check_flag, check_model, check_noise, check_prior, spread_evenly
+from skthermo._tables.frames import column_names, frame_like
+from skthermo._validation import (
+    Estimator,
+    HasMethods,
+    Interval,
+    StrOptions,
+    TransformerMixin,
+    _fit_context,
+    check_is_fitted,
+    validate_data,
+)
+from skthermo.exceptions import FewRecordsWarning, ModelWarning
+from skthermo.fem import FEModel, evaluate, share_reordered
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse._prior import FIRST_NOISE, LinearRecords, ThermalPrior
+from skthermo.surrogate.inverse._shapes import ShapeInputs
+from skthermo.surrogate.inverse._steps import Linearise, Objective, Refined, information, minimise, refine
+from skthermo.surrogate.inverse._steps import deviations as deviations_of
+from skthermo.surrogate.inverse._surface import ResponseSurface, n_terms
+
+N_TEACHING = 300  # records, spread evenly, that teach prior and noise
+FEWEST_TEACHING = 10  # below which a warning is given
+N_PASSES = 4  # of linearising the model at what is known of these records, and learning from that
+LONGEST_MOVE = 1.0  # of ln theta of a record from one of these passes to the next
+FEWEST_RUNS, MOST_RUNS = 200, 600  # of a program without derivatives, in each of two rounds
+RUNS_PER_TERM = 3  # of a cubic surface
+EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
+"""Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
+others, and this noise lets steps move along the curve of these parameters."""
+MOST_STEPS = 100  # of each row
+CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
+ORDER_CHECKS = 256  # rows whose modes are looked at for another order
+MANY_REORDERED = 0.1  # share of them that gives a warning: 5 % does not harm the truss, 29 % doubles the error of Z24
+MANY = 0.01  # share of rows that have not converged, or that the full model solves, above which a warning is given
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Posterior modes of records, by an FE model or by a surface in its place.
+
+    ``noise`` is that of all observations, frequencies and components of shapes, (n_observations,). Rows start where the
+    response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own.
+    Rows that end outside the box of a reduced model go on with the full one.
+    """
+
+    simulator: Simulator
+    prior: ThermalPrior
+    noise: Array
+    n_modes: int
+    shapes: ShapeInputs | None
+    surface: ResponseSurface | None
+    is_program: bool
+    n_runs: int = 0
+    n_jobs: int | None = None
+
+    def invert(self, inputs: Array) -> Bunch:
+        """What `PosteriorInverse.invert` gives, for rows of inputs."""
+        n_parameters, some = len(self.prior.own), ~np.isnan(inputs).all(axis=1)
+        result = Bunch(
+            theta=np.full((len(inputs), n_parameters), np.nan),
+            std=np.full((len(inputs), n_parameters), np.nan),
+            residuals=np.full((len(inputs), self.n_modes), np.nan),
+            weight=np.zeros(len(inputs)),
+            converged=np.zeros(len(inputs), dtype=bool),
+            solves=np.zeros(len(inputs), dtype=np.intp),
+            full_solves=np.zeros(len(inputs), dtype=np.intp),
+        )
+        if not some.any():
+            return result
+        objective = self.objective(inputs[some])
+        found = self._refine(objective)
+        local, lost = found.local, found.stalled[:, np.newaxis]
+        sensitivity = np.nan_to_num(local.sensitivity)
+        std, at_best = (
+            deviations_of(information(sensitivity, spread, self.prior.precision))
+            for spread in (np.where(objective.missing, np.inf, objective.noise), objective.noise)
+        )
+        result.theta[some] = np.where(lost, np.nan, np.exp(local.x))
+        result.std[some] = np.where(lost, np.nan, std) * result.theta[some]
+        unknown = lost | np.isnan(objective.log_measured)
+        result.residuals[some] = np.where(unknown, np.nan, local.residual[:, : self.n_modes])
+        result.weight[some] = ((at_best / std) ** 2).mean(axis=1)
+        result.converged[some] = found.converged
+        result.solves[some], result.full_solves[some] = found.solves, found.full_solves
+        return result
+
+    def objective(self, inputs: Array) -> Objective:
+        """That of rows of inputs, by the reduced model where there is one."""
+        frequencies = inputs[:, : self.n_modes]
+        units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
+        gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
+        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT))
+        return Objective(self._linearise, np.log(frequencies), noise, self.prior.precision, units)
+
+    @property
+    def _linearise(self) -> Linearise:
+        if self.is_program and self.surface is not None:
+            return self.surface.linearise
+        return self._by(self.simulator.approximate)
+
+    def _by(self, simulator: Simulator) -> Linearise:
+        """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
+        dofs = None if self.shapes is None else self.shapes.dofs
+        return partial(simulator.linearise, n_jobs=self.n_jobs, dofs=dofs, relative=True)
+
+    def _refine(self, objective: Objective) -> Refined:
+        """Refine rows in blocks, which show the progress."""
+        n_rows = len(objective.log_measured)
+        start = np.zeros((n_rows, len(self.prior.own)))
+        if self.surface is not None:
+            by_surface = replace(objective.without_shapes(), linearise=self.surface.linearise)
+            found = minimise(by_surface, start, MOST_STEPS)
+            if self.is_program:
+                return found
+            start = found.local.x
+        size = CHUNKS_PER_BLOCK * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
+        blocks = np.split(np.arange(n_rows), range(size, n_rows, size))
+        refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
+        parts = with_progress(refined, n_rows, None, count=lambda part: len(part.converged), unit="records")
+        return Refined.together([*parts])
+
+    def _refine_block(self, objective: Objective, start: Array) -> Refined:
+        """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
+        found = refine(objective, start, MOST_STEPS, sorts=not getattr(self.simulator.model, "track", False))
+        if self.simulator.reduced is not None:
+            outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
+            if outside.size:
+                exact = replace(objective.of(outside), linearise=self._by(Simulator(self.simulator.model)))
+                last = minimise(exact, found.local.x[outside], MOST_STEPS)
+                last.full_solves += last.solves
+                last.solves += found.solves[outside]
+                found.put(outside, last)
+        return found
+
+    def learned(self, inputs: Array, reduce: Any, *, learns_prior: bool, learns_noise: NDArray[np.bool_]) -> Posterior:
+        """The same with prior and noise as records teach them, and a model or surface that suits these records.
+
+        The model is linearised at its nominal state first, and then at what is known of each record.
+        """
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), N_TEACHING)
+        if not len(rows):
+            return self
+        nominal = self._by(self.simulator)(np.ones((1, len(self.prior.own))))
+        now, x = self, np.zeros((len(rows), len(self.prior.own)))
+        objective = replace(self.objective(inputs[rows]), linearise=partial(_repeated, nominal))
+        runs: list[tuple[Array, Array]] = []
+        for number in range(N_PASSES):
+            records = LinearRecords.of(objective.at(x), objective.missing)
+            records = records.near(now.prior, now.noise) if number else records
+            learn = partial(records.learned, learns_prior=learns_prior, learns_noise=learns_noise)
+            prior, noise = learn(now.prior, now.noise)
+            move = records.posterior(prior, noise)[0] - x
+            x = x + np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
+            now = replace(now, prior=prior, noise=noise)
+            if now.is_program:
+                now = now._with_runs(x, runs) if number < 2 else now
+            elif number == 0:
+                around = partial(Simulator.around, now.simulator.model, np.exp(x), reduce, n_rows=len(inputs))
+                now = replace(now, simulator=around())
+            else:
+                now = replace(now, simulator=now.simulator.extended(np.exp(x)))
+            objective = now.objective(inputs[rows])
+        if now.is_program:
+            return now
+        solved = now.simulator.approximate.linearise(np.exp(x), now.n_jobs, relative=True)
+        return replace(now, surface=ResponseSurface.of(x, *solved))
+
+    def _with_runs(self, x: Array, runs: list[tuple[Array, Array]]) -> Posterior:
+        """The same with a surface through further runs of a program near some ln theta."""
+        random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
+        number = int(np.clip(RUNS_PER_TERM * n_terms(n_parameters, 3), FEWEST_RUNS, MOST_RUNS))
+        points = x[random.randint(len(x), size=number)]
+        points = points + self.prior.deviations * random.standard_normal(points.shape)
+        runs.append((points, evaluate(self.simulator.model, np.exp(points), n_jobs=self.n_jobs)))
+        surface = ResponseSurface.of(*(np.concatenate(part) for part in zip(*runs, strict=True)))
+        return replace(self, surface=surface, n_runs=self.n_runs + number + (2 * n_parameters + 1) * (len(runs) == 1))
+
+
+def _repeated(solved: tuple[Array, ...], theta: Array) -> tuple[Array, ...]:
+    """The same solution for each row of theta."""
+    return tuple(np.repeat(one, len(theta), axis=0) for one in solved)
+
+
+class PosteriorInverse(TransformerMixin, Estimator):
+    """Parameters of an FE model as the posterior mode given frequencies and mode shapes; equations (3)-(4) solved.
+
+    Steps on the model, from its nominal state, minimise squared misfits in standard deviations of the noise plus those
+    of ln theta by its prior. The records teach both: the prior, how much temperature moves all parameters together and
+    each by itself, and the noise of each mode, in which what the model cannot follow counts, too.
+
+    Parameters
+    ----------
+    model : FE model, optional
+        Needed, except in a chain, which gives its own. One without derivatives (``linearised``, ``jacobian``; with
+        ``dofs``, ``linearised_modes``) is a program: a surface of simulated frequencies takes its place.
+    prior : "learned", float, array-like of shape (n_parameters,) or mapping, default="learned"
+        Standard deviations of ln theta about the nominal state, of each parameter by itself: a number for all, one for
+        each, or a mapping from each parameter. "learned" takes them from the records of `fit`, with a common factor.
+    noise : "auto", float or array-like of shape (n_modes,), default="auto"
+        Relative standard deviation of the frequencies. "auto" takes it from the records of `fit`. With 0, frequencies
+        count as exact (to 1e-6; to 0.1 % in rows where a mode is missing).
+    dofs : array-like of int of shape (n_sensors,), or list of (node, direction), optional
+        Degrees of freedom of the model where mode shapes are measured, by position, the first being 0, or by label, as
+        in ``model.dofs``. Rows of X are then the frequencies followed by the shapes' real components at the sensors
+        (`~skthermo.fem.shape_components`), mode by mode: n_modes * (1 + n_sensors) columns.
+    shape_noise : float or array-like of shape (n_modes,), default=0.01
+        Standard deviation of the measured components of a shape as a share of their root mean square.
+    reduce : "auto", bool or float, default="auto"
+        Whether steps are taken on the reduced model ``model.reduced(bounds)`` within what the records need, much faster
+        for large models. "auto" reduces where ``model.reduction_pays`` and a basis is accurate. True allows a relative
+        error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Rows that end outside its box
+        are solved by the full model, with a warning that counts them (:doc:`/guide/costs`).
+    memory : str or joblib.Memory, optional
+        Folder for what `fit` learns and for the inversion of the records, so that searches and cross-validation make
+        each only once. Clear it when the program behind a model of your own changes.
+    n_jobs : int, optional
+        Number of parallel jobs when the model is solved for many rows.
+
+    Attributes
+    ----------
+    prior_ : ThermalPrior
+        ``common`` and ``own`` standard deviations, ``covariance``; ``print(prior_)`` says them in words.
+    noise_ : ndarray of shape (n_modes,)
+        Relative standard deviations of the frequencies.
+    posterior_ : Posterior
+        Prior, noise and model by which records are inverted.
+    simulator_ : Simulator
+        The model and, where it is reduced, its reduced model.
+    shape_inputs_ : ShapeInputs or None
+        With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors).
+    n_runs_ : int
+        How often a program without derivatives was run.
+    n_parameters_, parameter_names_ : int, list of str
+        Number of parameters and their names.
+    n_features_in_, feature_names_in_ : int, ndarray of str
+        Number of columns of X and, where `fit` saw a frame with such, their names.
+
+    See Also
+    --------
+    InverseSurrogate : A regressor that is trained on simulations, as in the paper.
+
+    Notes
+    -----
+    The prior is N(0, c^2 11' + diag(d^2)) of ln theta. Frequencies should be aligned to the nominal model's, as a
+    `DataInformedFEM` does. A record with a missing mode is inverted from those that are there. An estimate is an
+    effective stiffness, not a material property. :doc:`/guide/estimation` has the steps and what teaches the prior.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import PosteriorInverse
+    >>> year = make_truss_campaign(random_state=0)
+    >>> inverse = PosteriorInverse(make_truss()).fit(year.frequencies)
+    >>> print(inverse.prior_)
+    >>> theta, std = inverse.transform(year.frequencies, return_std=True)
+    >>> std.mean().round(3).to_dict()
+    """
+
+    _parameter_constraints: dict = {
+        "model": [HasMethods(["frequencies"]), None],
+        "prior": [StrOptions({"learned"}), Interval(Real, 0, None, closed="neither"), "array-like", dict],
+        "noise": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left"), "array-like"],
+        "dofs": ["array-like", None],
+        "shape_noise": [Interval(Real, 0, 1, closed="neither"), "array-like"],
+        "reduce": [StrOptions({"auto"}), "boolean", Interval(Real, 0, 1, closed="neither")],
+        "memory": [str, HasMethods(["cache"]), None],
+        "n_jobs": [Integral, None],
+    }
+
+    def __init__(
+        self,
+        model: FEModel | None = None,
+        *,
+        prior: ArrayLike | Mapping[str, float] | Literal["learned"] = "learned",
+        noise: ArrayLike | Literal["auto"] = "auto",
+        dofs: ArrayLike | None = None,
+        shape_noise: ArrayLike = 0.01,
+        reduce: bool | float | Literal["auto"] = "auto",
+        memory: str | Memory | None = None,
+        n_jobs: int | None = None,
+    ):
+        self.model = model
+        self.prior = prior
+        self.noise = noise
+        self.dofs = dofs
+        self.shape_noise = shape_noise
+        self.reduce = reduce
+        self.memory = memory
+        self.n_jobs = n_jobs
+
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X: ArrayLike, y: None = None) -> PosteriorInverse:
+        """Learn prior and noise from records of the healthy structure.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
+        y : None
+            Ignored.
+
+        Returns
+        -------
+        PosteriorInverse
+            The fitted estimator.
+
+        Raises
+        ------
+        ValueError
+            If there is no model, the number of columns is not the model's, a frequency is not positive, or a model that
+            is to be reduced has no method for it.
+
+        Warns
+        -----
+        UserWarning
+            If there are few records to learn from, or modes change their order in more than a tenth of them and the
+            model does not track them.
+        """
+        if self.model is None:
+            raise ValueError("PosteriorInverse has no model; expected an FE model")
+        check_model(self.model)
+        model, names = self.model, list(self.model.parameter_names)
+        self.shape_inputs_ = None if self.dofs is None else ShapeInputs.of(model, self.dofs, self.shape_noise)
+        n_columns = model.n_modes if self.shape_inputs_ is None else self.shape_inputs_.n_columns
+        found = validate_data(self, X).shape[1]
+        if found != n_columns:
+            sensors = 0 if self.shape_inputs_ is None else self.shape_inputs_.n_sensors
+            more = f" and their shapes at {sensors} sensors, {n_columns} columns" if sensors else ""
+            raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
+        self.parameter_names_, self.n_parameters_ = names, len(names)
+        inputs, first = self._read(X), self._first(getattr(X, "columns", None))
+        learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
+        learns_noise[: model.n_modes] = isinstance(self.noise, str)
+        n_records = int((~np.isnan(inputs).all(axis=1)).sum())
+        if n_records < FEWEST_TEACHING and (learns_prior or learns_noise.any()):
+            warn_user(
+                f"{n_records} records teach the prior of the parameters and the noise of the modes; expected at least "
+                f"{FEWEST_TEACHING}. Both stay near {100 * FIRST_NOISE:g} to 3 %. Give prior and noise",
+                FewRecordsWarning,
+                "few-teaching-records",
+            )
+        teach = partial(first.learned, inputs, self.reduce, learns_prior=learns_prior, learns_noise=learns_noise)
+        content = (replace(first, n_jobs=None), inputs, self.reduce, learns_prior, learns_noise)
+        known = remembered(self.memory, "prior", teach, lambda: content)
+        simulator = replace(known.simulator, model=model)  # not a copy that was read
+        self.posterior_ = replace(known, simulator=simulator, n_jobs=self.n_jobs)
+        self.simulator_, self.prior_ = simulator, known.prior
+        self.noise_ = known.noise[: model.n_modes]
+        self._warn_of_crossing(inputs)
+        return self
+
+    @overload
+    def transform(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
+    @overload
+    def transform(self, X: ArrayLike, return_std: Literal[False] = False) -> NDArray[np.float64]: ...
+    @overload
+    def transform(self, X: ArrayLike, return_std: bool) -> Any: ...
+    def transform(self, X: ArrayLike, return_std: bool = False) -> Any:
+        """Multipliers of the nominal parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
+        return_std : bool, default=False
+            Whether to return standard deviations too.
+
+        Returns
+        -------
+        theta : ndarray or DataFrame of shape (n_samples, n_parameters)
+            NaN in rows without any mode. A frame gives a frame on its own index.
+        std : ndarray or DataFrame of shape (n_samples, n_parameters)
+            Only with ``return_std``: posterior standard deviations by Laplace's approximation.
+
+        Warns
+        -----
+        UserWarning
+            If more than 1 % of the rows have not converged, or are solved by the full model beside a reduced one.
+        """
+        found = self.invert(X)
+        self.warn_of(found)
+        return (found.theta, found.std) if check_flag(return_std, "return_std") else found.theta
+
+    def invert(self, X: ArrayLike) -> Bunch:
+        """Parameters of measured frequencies, and how sure they are.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz and, with ``dofs``, components of shapes; NaN is allowed.
+
+        Returns
+        -------
+        Bunch
+            - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode and in rows that have
+              stalled;
+            - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation;
+            - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
+              missing;
+            - ``weight`` (n_samples,): mean precision of the parameters as a share of what all modes would give, 1 in
+              complete rows and 0 in rows without any mode;
+            - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
+              they have reached;
+            - ``solves``, ``full_solves`` (n_samples,): how often a model was solved with its derivatives for the row,
+              and how many of these were of the full model because steps ended outside the box of the reduced one.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> from skthermo.surrogate import PosteriorInverse
+        >>> model = make_truss()
+        >>> F = model.frequencies([[0.95, 1.05, 0.9, 1.0]])
+        >>> found = PosteriorInverse(model, prior=0.2, noise=0.001).fit(F).invert(F)
+        >>> found.theta.round(3), found.std.round(3)
+        """
+        check_is_fitted(self)
+        inputs = self._read(X)
+        invert = partial(self.posterior_.invert, inputs)
+        found = remembered(self.memory, "inversion", invert, lambda: (replace(self.posterior_, n_jobs=None), inputs))
+        names = self.get_feature_names_out()
+        return Bunch(**{**found, "theta": frame_like(X, found.theta, names), "std": frame_like(X, found.std, names)})
+
+    def warn_of(self, found: Bunch) -> None:
+        """Warn if many rows have not converged, or are solved by the full model.
+
+        Parameters
+        ----------
+        found : Bunch
+            What `invert` has given.
+        """
+        n_rows, rows = len(found.weight), np.flatnonzero(unconverged(found))
+        if rows.size > MANY * n_rows:
+            warn_user(
+                f"{rows.size} of {n_rows} rows did not converge in {MOST_STEPS} steps, row {rows[0]} the first. They "
+                "keep what they reached. Use a model with track=True where modes cross",
+                ModelWarning,
+                "not-converged",
+            )
+        rows = np.flatnonzero(found.full_solves)
+        if rows.size > MANY * n_rows:
+            warn_user(
+                f"the parameters of {rows.size} of {n_rows} rows, row {rows[0]} the first, are outside the box of the "
+                f"reduced model. The full one was solved {found.full_solves.sum()} times, which takes longer. Fit to "
+                "records of such weather",
+                ModelWarning,
+                "outside-reduced-model",
+            )
+
+    @overload
+    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
+        """Frequencies and, with ``dofs``, shapes of given parameters, computed by the FE model.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+
+        Returns
+        -------
+        ndarray or DataFrame of shape (n_samples, n_features)
+            Frequencies in Hz, followed by components of shapes with a root mean square of 1; NaN in rows with NaN. A
+            frame, whose columns must be the model's parameters, gives a frame on its own index.
+
+        Raises
+        ------
+        ValueError
+            If the parameters are not the model's.
+        """
+        check_is_fitted(self)
+        if self.shape_inputs_ is None:
+            values = evaluate(self.model, X, n_jobs=self.n_jobs)
+        else:
+            values = self.shape_inputs_.of_parameters(self.model, as_floats(X), self.n_jobs)
+        return frame_like(X, values, getattr(self, "feature_names_in_", self._column_names()))
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Names of the parameters.
+
+        Parameters
+        ----------
+        input_features : array-like of str, optional
+            Ignored.
+
+        Returns
+        -------
+        ndarray of str
+            The model's parameter names.
+        """
+        check_is_fitted(self)
+        return np.array(self.parameter_names_, dtype=object)
+
+    @property
+    def n_runs_(self) -> int:
+        """How often a program without derivatives was run."""
+        check_is_fitted(self)
+        return self.posterior_.n_runs
+
+    def _first(self, mode_names: Any) -> Posterior:
+        """What is known before the records: what is stated, and first values of the rest."""
+        model, shapes = self.model, self.shape_inputs_
+        prior = ThermalPrior.first(model.parameter_names)
+        if not isinstance(self.prior, str):
+            prior = ThermalPrior(prior.names, 0.0, check_prior(self.prior, prior.names))
+        stated = np.full(model.n_modes, FIRST_NOISE)
+        if not isinstance(self.noise, str):
+            stated = check_noise(self.noise, model.n_modes, mode_names)
+        noise = stated if shapes is None else np.append(stated, shapes.deviations)
+        needed = ("linearised", "jacobian") if shapes is None else ("linearised_modes",)
+        is_program = not any(hasattr(model, name) for name in needed)
+        return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program, 0, self.n_jobs)
+
+    def _read(self, X: ArrayLike) -> Array:
+        """Measured columns, with shapes normalised."""
+        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
+        inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=False)
+        frequencies = inputs[:, : self.model.n_modes]
+        if (frequencies <= 0).any():
+            row, column = np.argwhere(frequencies <= 0)[0]
+            raise ValueError(
+                f"row {row} of {column_names(X, 'f')[column]!r} is {frequencies[row, column]:g}; expected positive "
+                "frequencies in Hz, NaN where one is missing"
+            )
+        return inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
+
+    def _column_names(self) -> list[str]:
+        modes = [f"f{i + 1}" for i in range(self.model.n_modes)]
+        dofs = () if self.shape_inputs_ is None else self.shape_inputs_.dofs
+        return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
+
+    def _warn_of_crossing(self, inputs: Array) -> None:
+        """Warn if modes change their order among the records, and the model sorts them."""
+        model = self.simulator_.reduced or self.model
+        if getattr(self.model, "track", True) or not hasattr(model, "modes"):
+            return
+        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).any(axis=1)), ORDER_CHECKS)
+        if not len(rows):
+            return
+        share = share_reordered(model, self.posterior_.invert(inputs[rows]).theta)
+        if share > MANY_REORDERED:
+            warn_user(
+                f"modes change their order in {share:.1%} of {len(rows)} records (expected at most "
+                f"{MANY_REORDERED:.0%}). The model sorts them, so that a column is not always the same mode. Use a "
+                "model with track=True",
+                ModelWarning,
+                "modes-cross",
+            )
+
+
+def unconverged(found: Bunch) -> NDArray[np.bool_]:
+    """Rows with frequencies whose steps have not converged."""
+    return ~found.converged & (found.weight > 0)
