@@ -276,14 +276,14 @@ def test_every_estimator_is_listed():
     assert estimators == {type(estimator) for estimator in listed}
 
 
-@pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
+@pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
 def test_what_studies_monitors_and_priors_keep_has_a_trailing_underscore():
     for estimator, fit in [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR)), (PRIOR, fitted(PRIOR, [(T, F)]))]:
         check_names_of_state(estimator, fit)
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
+@pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
 def test_metadata_routing_changes_no_result():
     def results(estimator, data):
         fit = fitted(estimator, *data)

@@ -24,7 +24,7 @@ from tests.fem.frames import FRAME
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
 pytestmark = pytest.mark.filterwarnings(
     "default",  # Dask's own warnings are not tested
-    "ignore:.*(outside-prior|outside-training-weather)",
+    "ignore:.*(outside-bounds|outside-training-weather)",
     "ignore:.*modes-cross",
 )
 

@@ -22,19 +22,19 @@ STEPS = np.linspace(0.0, 1.0, 21)  # shares of the largest amount that are tried
 
 @dataclass(frozen=True)
 class Tail:
-    """Squared indices of a baseline above a level, and by how much they exceed it on average."""
+    """Squared indices of a baseline above a level, and by how much they exceed it on average, outliers apart."""
 
     level: float
     excess: float
 
     @classmethod
     def of(cls, index: Array) -> Tail:
-        """Of the highest tenth of the indices, or more of a short baseline."""
+        """Of the highest tenth of the indices, or more of a short baseline; by their median, because of outliers."""
         squares = index[np.isfinite(index)] ** 2
         share = min(max(TAIL, FEWEST_IN_TAIL / max(len(squares), 1)), 0.5)
         level = float(np.quantile(squares, 1 - share))
         above = squares[squares > level]
-        return cls(level, float(above.mean()) - level if len(above) else 0.0)
+        return cls(level, float(np.median(above) - level) / np.log(2) if len(above) else 0.0)
 
 
 @dataclass(frozen=True)

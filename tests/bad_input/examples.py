@@ -1715,7 +1715,7 @@ WARNED_OF = [
         "frequency_std",
     ),
     ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
-    ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-prior"),
+    ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-bounds"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
     ("DataInformedFEM", "modes swapped", lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]), "0, 1, 3, 2"),
     ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "20 complete rows"),

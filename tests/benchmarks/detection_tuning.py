@@ -72,7 +72,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=4, help="of each scenario in the search")
     parser.add_argument("--jobs", type=int, default=None)
     options = parser.parse_args()
-    warnings.filterwarnings("ignore", message=".*(not-converged|(outside-prior|outside-training-weather))")
+    warnings.filterwarnings("ignore", message=".*(not-converged|(outside-bounds|outside-training-weather))")
     tables, ranks = {}, []
     for seed in range(options.seeds):
         tables[seed], rank = one_seed(seed, options.repeats, options.jobs)

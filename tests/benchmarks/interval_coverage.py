@@ -66,7 +66,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=30)
     parser.add_argument("--correlations", type=float, nargs="+", default=CORRELATIONS)
     options = parser.parse_args()
-    warnings.filterwarnings("ignore", ".*(not-converged|modes-cross|(outside-prior|outside-training-weather))")
+    warnings.filterwarnings("ignore", ".*(not-converged|modes-cross|(outside-bounds|outside-training-weather))")
     found = table(options.correlations, options.repeats)
     print(f"coverage of 90 % intervals in percent: mean of {options.repeats} repeats, standard deviation between")
     print(

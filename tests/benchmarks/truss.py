@@ -64,7 +64,7 @@ class SingleRecords:
         inverse = InverseSurrogate(self.model, **({"bounds": 0.2, "noise": NOISE} | inverse_options))
         self.fem = DataInformedFEM(self.model, inverse=inverse, random_state=seed)
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=".*(not-converged|(outside-prior|outside-training-weather))")
+            warnings.filterwarnings("ignore", message=".*(not-converged|(outside-bounds|outside-training-weather))")
             warnings.filterwarnings("ignore", message=r".*\[underdetermined\]")
             self.fem.fit(self.baseline.temperatures, self.baseline.frequencies)
         self.regression = TemperatureMapper().fit(self.baseline.temperatures, self.baseline.frequencies)

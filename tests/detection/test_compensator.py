@@ -31,7 +31,7 @@ from tests.detection.compensated import (
 
 # The chain's linear inverse scatters with the noise, and folds of few records predict weather not seen.
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)"),
+    pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)"),
     pytest.mark.filterwarnings("ignore:.*weather-of-one-fold"),
     pytest.mark.filterwarnings("ignore:.*few-baseline-records"),
 ]

@@ -217,7 +217,7 @@ def test_studies_without_a_family_that_has_a_smallest_damage(chain):
 @pytest.mark.usefixtures("blank_drawings")
 def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     fem, T, _ = chain
-    with pytest.warns(UserWarning, match="(outside-prior|outside-training-weather)") as caught:
+    with pytest.warns(UserWarning, match="(outside-bounds|outside-training-weather)") as caught:
         study = run_study(fem, T + 60, [Scenario("healthy")])
     texts = [str(warning.message) for warning in caught]
     of_baseline = ("few-baseline-records", "high-threshold")

@@ -280,7 +280,7 @@ def test_records_that_cannot_be_evaluated_do_not_count():
 @pytest.mark.filterwarnings("ignore:.*many-false-alarms")
 def test_weather_outside_the_training_range_is_said_once(fem):
     study = study_of(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2)
-    with pytest.warns(UserWarning, match="(outside-prior|outside-training-weather)") as caught:
+    with pytest.warns(UserWarning, match="(outside-bounds|outside-training-weather)") as caught:
         study.run(WEATHER + 60)
     texts = [str(warning.message) for warning in caught]
     assert len(texts) == len(set(texts)) <= 3

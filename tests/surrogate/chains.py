@@ -11,7 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.preprocessing import BiasAligner, LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(random_state=0)
@@ -19,10 +19,14 @@ T, F = YEAR.temperatures, YEAR.frequencies
 
 
 def inverse(**options):
+    return PosteriorInverse(TRUSS, **({"noise": 0.01} | options))
+
+
+def trained(**options):
+    """An inverse that is trained on simulations."""
     quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    return InverseSurrogate(
-        TRUSS, quadratic, **({"bounds": 0.2, "n_samples": 200, "noise": 0.01, "random_state": 3} | options)
-    )
+    settings = {"bounds": 0.2, "n_samples": 200, "noise": 0.01, "random_state": 3}
+    return InverseSurrogate(**({"model": TRUSS, "regressor": quadratic} | settings | options))
 
 
 def mapper(lags=2):

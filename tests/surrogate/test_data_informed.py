@@ -21,10 +21,10 @@ from skthermo.fem import AffineModel, CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from tests.surrogate.chains import TRUSS, F, Logged, T, chain, fitted, inverse, mapper
+from tests.surrogate.chains import TRUSS, F, Logged, T, chain, fitted, inverse, mapper, trained
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
-pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-prior|outside-training-weather)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
 
 YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 
@@ -54,8 +54,7 @@ def test_the_discrepancy_is_what_the_model_cannot_follow():
     """Modes that the weather moves unlike any parameter does."""
     slope = np.linspace(-0.002, 0.002, 6)
     unlike = np.exp(slope * (T[["T1"]].to_numpy() - 15))
-    fem = chain(inverse=inverse(bounds=0.02)).fit(T, F * unlike)
-    plain = chain(inverse=inverse(bounds=0.02), discrepancy=None).fit(T, F * unlike)
+    fem, plain = (chain(discrepancy=discrepancy).fit(T, F * unlike) for discrepancy in ("auto", None))
     truth = LATER.clean_frequencies * np.exp(slope * (LATER.temperatures[["T1"]].to_numpy() - 15))
     errors = [mape(truth, one.predict(LATER.temperatures)).mean() for one in (fem, plain)]
     assert errors[0] < 0.5 * errors[1]
@@ -75,9 +74,13 @@ def test_noise_is_estimated_out_of_fold_whatever_the_outliers_and_the_memory():
 
 
 def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
-    auto = chain(inverse=inverse(noise="auto")).fit(T, F)
+    auto = chain(inverse=trained(noise="auto")).fit(T, F)
     np.testing.assert_array_equal(auto.inverse_.noise_, auto.noise_)
-    np.testing.assert_array_equal(chain(inverse=inverse(noise=0.02)).fit(T, F).inverse_.noise_, 0.02)
+    for one in (inverse, trained):
+        np.testing.assert_array_equal(chain(inverse=one(noise=0.02)).fit(T, F).inverse_.noise_, 0.02)
+    learned = chain(inverse=inverse(noise="auto")).fit(T, F)
+    np.testing.assert_array_equal(learned.report_.variation["misfit"], 100 * learned.inverse_.noise_)
+    assert (learned.inverse_.noise_ > 0.8 * learned.noise_).all()
 
 
 def test_outliers_do_not_move_the_model():
@@ -94,12 +97,9 @@ def test_outliers_do_not_move_the_model():
 def test_equals_scikit_learns_transformed_target_regressor(seeded):
     quarter = T[::4], F[::4]
     parts = (
-        (inverse(refine=0), mapper())
+        (trained(), mapper())
         if seeded
-        else (
-            InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, refine=0, random_state=5),
-            TemperatureMapper(random_state=6),
-        )
+        else (InverseSurrogate(TRUSS, bounds=0.2, noise=0.01, random_state=5), TemperatureMapper(random_state=6))
     )
     transformer = make_pipeline(BiasAligner(TRUSS), parts[0])
     words = TransformedTargetRegressor(parts[1], transformer=transformer, check_inverse=False).fit(*quarter)
@@ -138,8 +138,8 @@ def test_gaps_flow_through_fit_predict_and_score():
     predicted = model.predict(holed_T)
     np.testing.assert_array_equal(predicted.isna().any(axis=1), holed_T.isna().all(axis=1))
     np.testing.assert_array_equal(model.parameters_.isna().any(axis=1), holed_F.isna().all(axis=1))
-    unrefined = chain(inverse=inverse(refine=0)).fit(holed_T, holed_F)
-    np.testing.assert_array_equal(unrefined.parameters_.isna().any(axis=1), holed_F.isna().any(axis=1))
+    by_regressor = chain(inverse=trained(), mapper=mapper(lags=1)).fit(holed_T, holed_F)
+    np.testing.assert_array_equal(by_regressor.parameters_.isna().any(axis=1), holed_F.isna().any(axis=1))
     assert 0.5 < model.score(holed_T, holed_F) < 1
 
 
@@ -193,7 +193,7 @@ def test_third_party_models_are_held_by_reference():
 
 
 def test_nested_parameters_can_be_set():
-    model = chain().set_params(
+    model = chain(inverse=trained()).set_params(
         mapper__lagfeatures__lags=4, inverse__regressor__ridge__alpha=0.1, inverse__noise=0.01, aligner__method="scale"
     )
     assert model.fit(T, F).mapper_[0].lags_ == [0, 1, 2, 3]
@@ -233,10 +233,10 @@ def test_nullable_frames_are_frames():
 
 @pytest.mark.nightly
 def test_pandas_output_everywhere_changes_no_value():
-    transformer = make_pipeline(BiasAligner(TRUSS), inverse(refine=0))
+    transformer = make_pipeline(BiasAligner(TRUSS), trained())
     words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
     with config_context(transform_output="pandas"):
-        alike = chain(inverse=inverse(refine=0), discrepancy=None).fit(T, F)
+        alike = chain(inverse=trained(), discrepancy=None).fit(T, F)
         np.testing.assert_allclose(words.fit(T, F).predict(T), alike.predict(T), rtol=1e-12)
         pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), fitted().predict(T))
 
@@ -265,7 +265,7 @@ def test_grid_search_over_nested_parameters_on_two_jobs(tmp_path):
     grid = {"mapper__lagfeatures__lags": [1, 2], "inverse__noise": [0.0, 0.01]}
     quarter = T[::4], F[::4]
     searches = [
-        GridSearchCV(chain(inverse=inverse(memory=str(tmp_path))), grid, cv=KFold(2), n_jobs=n_jobs).fit(*quarter)
+        GridSearchCV(chain(inverse=trained(memory=str(tmp_path))), grid, cv=KFold(2), n_jobs=n_jobs).fit(*quarter)
         for n_jobs in (1, 2)
     ]
     np.testing.assert_array_equal(*(search.cv_results_["mean_test_score"] for search in searches))
@@ -310,7 +310,7 @@ def test_same_seed_same_bits():
 
 
 def test_seed_fills_only_what_has_none():
-    seeded = DataInformedFEM(TRUSS, inverse=inverse(), random_state=0).fit(T, F)
+    seeded = DataInformedFEM(TRUSS, inverse=trained(), random_state=0).fit(T, F)
     assert seeded.inverse_.random_state == 3
     assert isinstance(seeded.mapper_.random_state, int)
     assert seeded.mapper is None

@@ -12,12 +12,11 @@ from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss
 from skthermo.fem import CallableModel
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, _simulator
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper, _simulator
 from skthermo.surrogate._simulator import Simulator
 from tests.fem.frames import portal
 
 LARGE, SMALL = portal(4), make_truss()
-MANY, FEW = 300, 20
 
 
 def records(model, n_rows=60):
@@ -29,9 +28,8 @@ def records(model, n_rows=60):
     return pd.DataFrame(30 * share, stamps, ["T"]), pd.DataFrame(F, stamps).add_prefix("f")
 
 
-def chain(model, n_samples=MANY, **options):
-    inverse = InverseSurrogate(regressor=Ridge(1e-3), bounds=0.15, noise=0.001, n_samples=n_samples)
-    return DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0, **options)
+def chain(model, **options):
+    return DataInformedFEM(model, mapper=TemperatureMapper(Ridge()), random_state=0, **options)
 
 
 def predictions(fem, T):
@@ -61,7 +59,7 @@ def test_a_large_model_is_reduced_and_nothing_changes_but_the_time():
 )
 def test_what_a_reduced_model_would_not_speed_up_stays_full(model):
     T, F = records(model)
-    auto, full = (chain(model, 60, reduce=reduce).fit(T, F) for reduce in ("auto", False))
+    auto, full = (chain(model, reduce=reduce).fit(T, F) for reduce in ("auto", False))
     np.testing.assert_array_equal(auto.predict(T), full.predict(T))
     assert auto.simulator_.reduced is None
     assert auto.report_.solved.startswith("Solved by the full model: ")
@@ -81,7 +79,7 @@ def test_the_decision_is_monotone_in_rows_and_in_size():
 @pytest.mark.filterwarnings("ignore:.*few-rows")
 def test_few_rows_do_not_pay_for_a_basis():
     T, F = records(LARGE, 12)
-    fem = chain(LARGE, FEW).fit(T, F)
+    fem = chain(LARGE).fit(T, F)
     assert fem.inverse_.simulator_.reduced is None
     assert fem.report_.solved == "Solved by the full model: a reduced model would save no time."
 
@@ -90,9 +88,9 @@ def test_few_rows_do_not_pay_for_a_basis():
 @pytest.mark.filterwarnings("ignore:.*few-rows")
 def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
     T, F = records(LARGE, 12)
-    assert chain(LARGE, FEW, reduce=True).fit(T, F).inverse_.reduce is True
-    assert chain(LARGE, MANY, reduce=False).fit(T, F).inverse_.reduce is False
-    own = chain(LARGE, FEW, reduce=True).set_params(inverse__reduce=False).fit(T, F)
+    assert chain(LARGE, reduce=True).fit(T, F).inverse_.reduce is True
+    assert chain(LARGE, reduce=False).fit(T, F).inverse_.reduce is False
+    own = chain(LARGE, reduce=True).set_params(inverse__reduce=False).fit(T, F)
     assert own.inverse_.simulator_.reduced is None
     assert own.simulator_.reduced is not None
 

@@ -21,7 +21,7 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMap
 TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures.iloc[:360:3], YEAR.frequencies.iloc[:360:3]
 WEIGHTS = np.random.default_rng(0).uniform(0.1, 2, len(T))
-PLAIN = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, refine=0, random_state=0)
+PLAIN = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, random_state=0)
 FOLDS = KFold(2, shuffle=True, random_state=0)
 ROUTING = pytest.mark.parametrize("routing", [False, True], ids=["off", "on"])
 
@@ -162,7 +162,7 @@ def test_with_routing_the_steps_that_request_weights_get_them():
 
 def test_routing_changes_no_result():
     gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
-    fem = DataInformedFEM(TRUSS, inverse=InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=100), random_state=0)
+    fem = DataInformedFEM(TRUSS, random_state=0)
     off = clone(fem).fit(T, gaps)
     with config_context(enable_metadata_routing=True):
         on = clone(fem).fit(T, gaps)

@@ -24,7 +24,7 @@ from tests.surrogate.chains import F, T, as_measured, inverse
 from tests.surrogate.chains import chain as any_chain
 
 # Vertical stiffness hardly moves the frequencies, so that its estimates scatter with the noise.
-pytestmark = pytest.mark.filterwarnings("ignore:.*outside-prior")
+pytestmark = pytest.mark.filterwarnings("ignore:.*outside-bounds")
 
 LATER = make_truss_campaign(random_state=1)
 PLAIN = TemperatureMapper(LinearRegression())

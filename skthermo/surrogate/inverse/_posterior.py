@@ -17,7 +17,16 @@ from sklearn.utils import Bunch
 from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
-from skthermo._tables.arrays import Array, as_floats, check_flag, check_model, check_noise, check_prior, spread_evenly
+from skthermo._tables.arrays import (
+    Array,
+    as_floats,
+    check_flag,
+    check_model,
+    check_noise,
+    check_prior,
+    spread_evenly,
+    tolerance,
+)
 from skthermo._tables.frames import column_names, frame_like
 from skthermo._validation import (
     Estimator,
@@ -30,9 +39,9 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
-from skthermo.fem import FEModel, evaluate, share_reordered
+from skthermo.fem import FEModel, evaluate
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._prior import FIRST_NOISE, LinearRecords, ThermalPrior
+from skthermo.surrogate.inverse._prior import FIRST_NOISE, LinearRecords, ThermalPrior, least_noise
 from skthermo.surrogate.inverse._shapes import ShapeInputs
 from skthermo.surrogate.inverse._steps import Linearise, Objective, Refined, information, minimise, refine
 from skthermo.surrogate.inverse._steps import deviations as deviations_of
@@ -49,8 +58,6 @@ EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
 others, and this noise lets steps move along the curve of these parameters."""
 MOST_STEPS = 100  # of each row
 CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
-ORDER_CHECKS = 256  # rows whose modes are looked at for another order
-MANY_REORDERED = 0.1  # share of them that gives a warning: 5 % does not harm the truss, 29 % doubles the error of Z24
 MANY = 0.01  # share of rows that have not converged, or that the full model solves, above which a warning is given
 
 
@@ -163,12 +170,15 @@ class Posterior:
         nominal = self._by(self.simulator)(np.ones((1, len(self.prior.own))))
         now, x = self, np.zeros((len(rows), len(self.prior.own)))
         objective = replace(self.objective(inputs[rows]), linearise=partial(_repeated, nominal))
+        least = self.noise.copy()
+        least[: self.n_modes] = least_noise(np.log(inputs[:, : self.n_modes]))
         runs: list[tuple[Array, Array]] = []
         for number in range(N_PASSES):
             records = LinearRecords.of(objective.at(x), objective.missing)
             records = records.near(now.prior, now.noise) if number else records
-            learn = partial(records.learned, learns_prior=learns_prior, learns_noise=learns_noise)
-            prior, noise = learn(now.prior, now.noise)
+            prior, noise = records.learned(
+                now.prior, now.noise, least, learns_prior=learns_prior, learns_noise=learns_noise
+            )
             move = records.posterior(prior, noise)[0] - x
             x = x + np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
             now = replace(now, prior=prior, noise=noise)
@@ -333,12 +343,12 @@ class PosteriorInverse(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            If there are few records to learn from, or modes change their order in more than a tenth of them and the
-            model does not track them.
+            If there are few records to learn from.
         """
         if self.model is None:
             raise ValueError("PosteriorInverse has no model; expected an FE model")
         check_model(self.model)
+        tolerance(self.model, self.reduce)
         model, names = self.model, list(self.model.parameter_names)
         self.shape_inputs_ = None if self.dofs is None else ShapeInputs.of(model, self.dofs, self.shape_noise)
         n_columns = model.n_modes if self.shape_inputs_ is None else self.shape_inputs_.n_columns
@@ -366,7 +376,6 @@ class PosteriorInverse(TransformerMixin, Estimator):
         self.posterior_ = replace(known, simulator=simulator, n_jobs=self.n_jobs)
         self.simulator_, self.prior_ = simulator, known.prior
         self.noise_ = known.noise[: model.n_modes]
-        self._warn_of_crossing(inputs)
         return self
 
     @overload
@@ -526,7 +535,7 @@ class PosteriorInverse(TransformerMixin, Estimator):
             prior = ThermalPrior(prior.names, 0.0, check_prior(self.prior, prior.names))
         stated = np.full(model.n_modes, FIRST_NOISE)
         if not isinstance(self.noise, str):
-            stated = check_noise(self.noise, model.n_modes, mode_names)
+            stated = np.maximum(check_noise(self.noise, model.n_modes, mode_names), EXACT)
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
         needed = ("linearised", "jacobian") if shapes is None else ("linearised_modes",)
         is_program = not any(hasattr(model, name) for name in needed)
@@ -549,24 +558,6 @@ class PosteriorInverse(TransformerMixin, Estimator):
         modes = [f"f{i + 1}" for i in range(self.model.n_modes)]
         dofs = () if self.shape_inputs_ is None else self.shape_inputs_.dofs
         return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
-
-    def _warn_of_crossing(self, inputs: Array) -> None:
-        """Warn if modes change their order among the records, and the model sorts them."""
-        model = self.simulator_.reduced or self.model
-        if getattr(self.model, "track", True) or not hasattr(model, "modes"):
-            return
-        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).any(axis=1)), ORDER_CHECKS)
-        if not len(rows):
-            return
-        share = share_reordered(model, self.posterior_.invert(inputs[rows]).theta)
-        if share > MANY_REORDERED:
-            warn_user(
-                f"modes change their order in {share:.1%} of {len(rows)} records (expected at most "
-                f"{MANY_REORDERED:.0%}). The model sorts them, so that a column is not always the same mode. Use a "
-                "model with track=True",
-                ModelWarning,
-                "modes-cross",
-            )
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, robust_deviation
 from skthermo._tables.text import listed, percent
 from skthermo.surrogate.inverse._steps import Local, information
 
 FIRST_DEVIATION, FIRST_NOISE = 0.03, 0.01  # of ln theta and of ln f, before records are known
-MOVED, NOISY = (1e-3, 3.0), (1e-5, 0.3)  # ranges of the deviations that are learned
+MOVED = 1e-3, 3.0  # range of the deviations of ln theta
+LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the noise
+SHARE_OF_STEPS = 0.1  # least noise as a share of the scatter of the differences of successive records
 FAR = 5.0  # standard deviations beyond which a frequency teaches nothing
 
 
@@ -91,11 +93,12 @@ class LinearRecords:
         return np.einsum("spq,sq->sp", covariances, pulls), covariances
 
     def learned(
-        self, prior: ThermalPrior, noise: Array, *, learns_prior: bool, learns_noise: NDArray[np.bool_]
+        self, prior: ThermalPrior, noise: Array, least: Array, *, learns_prior: bool, learns_noise: NDArray[np.bool_]
     ) -> tuple[ThermalPrior, Array]:
         """The most likely prior and noise, from given ones.
 
-        Noise is that of each observation, (n_observations,). What the model cannot follow counts as noise.
+        Noise is that of each observation, (n_observations,), and no smaller than the least. What the model cannot
+        follow counts as noise.
         """
         n_own = 1 + len(prior.own)
 
@@ -112,7 +115,8 @@ class LinearRecords:
         start = np.log(np.append([prior.common, *prior.own] if learns_prior else [], noise[learns_noise]))
         if not len(start):
             return prior, noise
-        bounds = np.log([MOVED] * (n_own * learns_prior) + [NOISY] * int(learns_noise.sum()))
+        noisy = [(one, MOST_NOISE) for one in least[learns_noise]]
+        bounds = np.log([MOVED] * (n_own * learns_prior) + noisy)
         return read(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
     def _likelihood(self, prior: ThermalPrior, noise: Array) -> tuple[float, Array, Array]:
@@ -133,3 +137,13 @@ class LinearRecords:
         of_prior = np.append(prior.common**2 * slope.sum(), prior.own**2 * np.diag(slope))
         of_noise = (np.where(known, left**2 + variances, 0.0) / noise**2 - known).sum(axis=0)
         return float(likelihood), of_prior, of_noise
+
+
+def least_noise(log_frequencies: Array) -> Array:
+    """A lower limit of the noise of each mode, from records in their order, (n_modes,).
+
+    A mode that a parameter of its own can follow would otherwise count as exact.
+    """
+    steps = robust_deviation(np.diff(log_frequencies, axis=0)) if len(log_frequencies) > 1 else np.zeros(1)
+    share = SHARE_OF_STEPS / np.sqrt(2) * np.nan_to_num(steps)
+    return np.clip(np.broadcast_to(share, log_frequencies.shape[1:]), LEAST_NOISE, MOST_NOISE / 2)
