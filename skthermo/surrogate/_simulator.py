@@ -170,6 +170,8 @@ class Simulator:
             return replace(known, usual=usual)
         if tol is None:
             return cls(model, reason=reason_of(model, reduce), usual=usual)
+        if known is not None and known.model is model and known.reason == NO_BASIS:
+            return replace(known, usual=usual)
         try:
             return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol, usual=usual)
         except RuntimeError as error:

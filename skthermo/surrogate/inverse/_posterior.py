@@ -27,7 +27,7 @@ from skthermo._tables.arrays import (
     spread_evenly,
     tolerance,
 )
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.frames import column_names, frame_like, row_times
 from skthermo._validation import (
     Estimator,
     HasMethods,
@@ -116,7 +116,8 @@ class Posterior:
         frequencies = inputs[:, : self.n_modes]
         units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
         gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
-        noise = np.maximum(self.noise, np.where(gaps, EXACT_WITH_GAPS, EXACT))
+        noise = np.tile(self.noise, (len(inputs), 1))
+        noise[:, : self.n_modes] = np.maximum(self.noise[: self.n_modes], np.where(gaps, EXACT_WITH_GAPS, EXACT))
         return Objective(self._linearise, np.log(frequencies), noise, self.prior.precision, units)
 
     @property
@@ -369,7 +370,8 @@ class PosteriorInverse(TransformerMixin, Estimator):
                 FewRecordsWarning,
                 "few-teaching-records",
             )
-        teach = partial(first.learned, inputs, self.reduce, learns_prior=learns_prior, learns_noise=learns_noise)
+        in_order = inputs[np.argsort(row_times(X), kind="stable")]
+        teach = partial(first.learned, in_order, self.reduce, learns_prior=learns_prior, learns_noise=learns_noise)
         content = (replace(first, n_jobs=None), inputs, self.reduce, learns_prior, learns_noise)
         known = remembered(self.memory, "prior", teach, lambda: content)
         simulator = replace(known.simulator, model=model)  # not a copy that was read
