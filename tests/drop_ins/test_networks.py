@@ -12,7 +12,9 @@ from skthermo.metrics import mape
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper
 from tests.drop_ins.recipes import run_recipe
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*outside-bounds")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*outside-bounds"
+)
 PAGE = "drop_ins.rst"
 TRUSS = make_truss()
 YEAR = make_truss_campaign(noise=0.001, random_state=0)

@@ -287,6 +287,7 @@ def test_processes_that_search_together_simulate_once(tmp_path):
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*round-trip-error")
 def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
     trees = ExtraTreesRegressor(3)
     parts = {
