@@ -2,12 +2,12 @@
 A step of your own between the stages
 =====================================
 
-Each stage of the method can be used alone, and you may change its result before the next stage. As an example, the
-inverse surrogate's own refinement is switched off with ``refine=0``; its estimates are improved by one Gauss-Newton
-step on the FE model's frequencies and derivatives, and the temperature mapper learns from the improved parameters.
+Each stage of the method can be used alone, and you may change its result before the next stage. As an example, M1 is
+the paper's, a regressor that is trained on simulations; its estimates are improved by one Gauss-Newton step on the FE
+model's frequencies and derivatives, and the temperature mapper learns from the improved parameters.
 
-You need not do this: by default the surrogate takes such steps itself until they converge. The page shows where your
-own ideas can go.
+You need not do this: the default inverse takes such steps itself until they converge. The page shows where your own
+ideas can go.
 
 Run it with ``python examples/plot_gauss_newton_step.py``; it needs :download:`page_recipes.py` beside it. The guide is
 :doc:`/guide/method`.
@@ -25,8 +25,8 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 options = command_line().parse_args()
 
 # %%
-# The chain, without refinement
-# -----------------------------
+# The paper's chain
+# -----------------
 # A year of the truss, measured with 0.2 % noise. The inverse surrogate is a small network that has learned simulated
 # frequencies; its estimates are a first guess.
 
@@ -34,7 +34,7 @@ SCATTER = 0.005  # of the records, and what the model cannot follow
 WIDTH = 0.2
 model = make_truss()
 year = make_truss_campaign(noise=0.002, random_state=0)
-inverse = InverseSurrogate(bounds=WIDTH, noise=SCATTER, refine=0)
+inverse = InverseSurrogate(bounds=WIDTH, noise=SCATTER)
 fem = DataInformedFEM(model, inverse=inverse, random_state=0).fit(year.temperatures, year.frequencies)
 theta = fem.estimate_parameters(year.frequencies)
 print(theta.describe().loc[["mean", "std", "min", "max"]].round(3))
@@ -89,16 +89,16 @@ pd.DataFrame(histories).plot(style=".", xlabel="", ylabel="misfit of six frequen
 #
 # The mapper learns from the improved parameters
 # ----------------------------------------------
-# A later year, noise-free, tells whether this helps. The last line is the chain with its own refinement, the default.
-# It maps temperatures in coordinates of frequencies, without the part of the parameters that the prior keeps back.
+# A later year, noise-free, tells whether this helps. The last line is the default chain, whose
+# :class:`~skthermo.surrogate.PosteriorInverse` takes steps until they converge, with a prior that the records teach.
 
 mapper = clone(fem.mapper_).fit(year.temperatures, improved)
-default = clone(fem).set_params(inverse__refine=None).fit(year.temperatures, year.frequencies)
+default = clone(fem).set_params(inverse=None).fit(year.temperatures, year.frequencies)
 later = make_truss_campaign(noise=0.0, random_state=1)
 predicted = {
     "mapper fitted to the estimates": fem.mapper_.predict(later.temperatures),
     "mapper fitted to the improved estimates": mapper.predict(later.temperatures),
-    "chain with its own refinement": default.predict_parameters(later.temperatures),
+    "default chain": default.predict_parameters(later.temperatures),
 }
 for name, parameters in predicted.items():
     print(f"Error over a later year, {name}: {misfit(model, parameters, later.frequencies).mean():.3f} %")

@@ -6,7 +6,7 @@ from z24_recipes import FREQUENCIES, Records, bridge_model, chain, compensate
 
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import identify_damage
-from skthermo.surrogate import InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import PosteriorInverse, TemperatureMapper
 
 FROST = 2.0  # pavement below this, in degrees Celsius, may hold ice
 
@@ -14,7 +14,7 @@ FROST = 2.0  # pavement below this, in degrees Celsius, may hold ice
 def in_parameters(records):
     """The records with multipliers of the FE model in place of frequencies, and the names of these."""
     model = bridge_model()
-    inverse = InverseSurrogate(model, bounds=0.5, noise=0.005, random_state=0)
+    inverse = PosteriorInverse(model)
     others = [column for column in records.baseline if column not in FREQUENCIES]
     to_parameters = ColumnTransformer(
         [

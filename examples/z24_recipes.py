@@ -15,7 +15,7 @@ from skthermo.datasets import load_z24, make_z24
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 FILES = ("z24_monitoring.csv", "z24/z24_monitoring.csv", "z24.mat", "z24/z24.mat")
 NO_DATA = f"""No Z24 data at {{}}.
@@ -43,14 +43,10 @@ def bridge_model(track=True):
     return make_z24(track=track).reduced([[0.4, 4.0]] * 4, random_state=0)
 
 
-def chain(model, bounds=0.3, regressor=None):
-    """Default chain, or with another regressor for the mapper; frequencies aligned to the model's by their means.
-
-    The noise of the measurement is estimated from the records, so that the inverse does not amplify it.
-    """
+def chain(model, regressor=None):
+    """Default chain, or with another regressor for the mapper; frequencies aligned to the model's by their means."""
     return DataInformedFEM(
         model,
-        inverse=InverseSurrogate(model, bounds=bounds),
         mapper=TemperatureMapper(regressor),
         aligner=BiasAligner(model, method="scale"),
         random_state=0,

@@ -44,7 +44,7 @@ from skthermo.preprocessing import (
     SensorMeans,
 )
 from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
@@ -193,7 +193,7 @@ TRANSFORMERS_AND_DETECTORS = [
 TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 LINEAR_INVERSE = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=100, noise=0.01, random_state=0)
-CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR_INVERSE, mapper=TemperatureMapper(Ridge()), reduce=True)
+CHAIN = DataInformedFEM(TRUSS, mapper=TemperatureMapper(Ridge()), reduce=True)
 NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
 
 
@@ -201,7 +201,7 @@ BOUND = [  # estimators and what they learn from
     (TemperatureMapper(), (T, F / F.mean())),
     (FleetMapper(), (T, F)),
     (LINEAR_INVERSE, (F[:20],)),
-    (clone(LINEAR_INVERSE).set_params(refine=0, narrow_bounds=True), (F,)),
+    (PosteriorInverse(TRUSS), (F[:20],)),
     (CHAIN, (T, F)),
     (
         DataInformedFEM(TRUSS, inverse=LINEAR_INVERSE, mapper=TemperatureMapper(Ridge())),

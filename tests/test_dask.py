@@ -18,7 +18,7 @@ from skthermo.fem import CallableModel, sample
 from skthermo.fleet import fit_fleet
 from skthermo.metrics import frequency_scorer
 from skthermo.monitoring import Monitor
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.fem.frames import FRAME
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
@@ -86,7 +86,7 @@ def test_a_grid_search_is_that_of_one_process():
     year = make_truss_campaign(samples_per_year=100, random_state=0)
     chain = DataInformedFEM(
         TRUSS,
-        inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=100),
+        inverse=PosteriorInverse(noise=0.01),
         mapper=TemperatureMapper(Ridge()),
         random_state=0,
     )
@@ -104,9 +104,7 @@ def test_a_grid_search_is_that_of_one_process():
 @pytest.mark.nightly
 def test_a_fleet_is_that_of_one_process():
     years = {name: make_truss_campaign(samples_per_year=100, random_state=seed) for seed, name in enumerate("ab")}
-    chain = DataInformedFEM(
-        TRUSS, inverse=InverseSurrogate(regressor=Ridge(1e-6), noise=0.01, n_samples=100), mapper=TemperatureMapper()
-    )
+    chain = DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.01), mapper=TemperatureMapper())
     given = dict.fromkeys(years, chain), {n: (one.temperatures, one.frequencies) for n, one in years.items()}
     later = make_truss_campaign(2, samples_per_year=100, random_state=3)
     new = dict.fromkeys(years, (later.temperatures[100:], later.frequencies[100:]))

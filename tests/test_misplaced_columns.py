@@ -13,7 +13,7 @@ from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_tru
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
 from skthermo.residuals.misplaced import misplaced_columns
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 YEAR = make_truss_campaign(random_state=0)
 MODES = list(YEAR.frequencies)
@@ -93,7 +93,7 @@ def test_the_warning_comes_from_fit():
         TemperatureCompensator(Ridge(), targets=[name for name in MODES if name != "f4"]).fit(both)
     with pytest.warns(RecordsWarning, match="'T2'"):
         TemperatureCompensator(Ridge(), targets=[*MODES, "T2"]).fit(both)
-    inverse = InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=50, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     chain = DataInformedFEM(make_truss(5), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
     with pytest.warns(RecordsWarning, match="'f6'"):
         chain.fit(YEAR.temperatures.join(YEAR.frequencies["f6"]), YEAR.frequencies[MODES[:5]])

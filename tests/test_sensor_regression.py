@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
 from skthermo.residuals.weather import SensorRegression
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 
 def records(n_rows, seed=0):
@@ -107,7 +107,7 @@ def test_weather_that_training_does_not_know_says_nothing_of_sensors():
 
 LINEAR_CHAIN = DataInformedFEM(
     make_truss(),
-    inverse=InverseSurrogate(make_truss(), LinearRegression(), n_samples=200),
+    inverse=PosteriorInverse(make_truss()),
     mapper=TemperatureMapper(LinearRegression()),
     random_state=0,
 )

@@ -19,8 +19,7 @@ from skthermo.surrogate import DataInformedFEM, FitReport
 
 MOST_PREDICTED = 1000  # number of records that are drawn over temperature
 
-LARGE_DEVIATION, MANY_OUTSIDE = 0.5, 0.05
-"""Standard deviation of a stiffness, and share of records outside its range, above which they are doubtful."""
+LARGE_DEVIATION = 0.5  # of a stiffness, above which it is doubtful
 
 
 def monitored(study: DetectabilityStudy, structure: Structure | None, families: Sequence[str]) -> Section:
@@ -93,12 +92,16 @@ def stiffnesses(report: FitReport) -> list[Html]:
     return [
         paragraphs(
             "Temperature changes the stiffness of parts of the model. The next table says how accurately one record "
-            "determines each of these stiffnesses at best, and how many records gave a stiffness outside its "
-            "bounds."
+            "determines each of these stiffnesses at best"
+            + (
+                f", and how much temperature moves each by itself, beside {share_text(report.prior.common)} together."
+                if report.prior is not None
+                else "."
+            )
         ),
         table(
             "Stiffnesses that the model adjusts to temperature.",
-            ["Parameter", "Smallest possible standard deviation", "Records outside the bounds"],
+            ["Parameter", "Smallest possible standard deviation"] + ["Moved by itself"] * (report.prior is not None),
             _parameters(report),
         ),
         element("h3", "What is doubtful"),
@@ -115,10 +118,13 @@ def _modes(report: FitReport) -> list[list[str]]:
 
 
 def _parameters(report: FitReport) -> list[list[str]]:
-    return [
-        [name, share_text(deviation) if np.isfinite(deviation) else "not determined", share_text(share)]
-        for (name, deviation), share in zip(report.deviations.items(), report.outside, strict=True)
+    rows = [
+        [name, share_text(deviation) if np.isfinite(deviation) else "not determined"]
+        for name, deviation in report.deviations.items()
     ]
+    if report.prior is None:
+        return rows
+    return [[*row, share_text(size)] for row, size in zip(rows, report.prior.own, strict=True)]
 
 
 def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -137,10 +143,6 @@ def _doubts(report: FitReport) -> list[str]:
     for name, deviation in report.deviations.items():
         if not deviation < LARGE_DEVIATION:
             doubts.append(f"Hardly any mode depends on the stiffness {name}, so that its values mean little.")
-        elif report.outside[name] > MANY_OUTSIDE:
-            doubts.append(
-                f"The stiffness {name} is outside its bounds in {share_text(report.outside[name])} of the records."
-            )
     if report.n_unconverged:
         doubts.append(f"The stiffnesses of {counted(report.n_unconverged, 'record')} could not be found exactly.")
     return doubts

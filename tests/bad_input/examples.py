@@ -16,7 +16,7 @@ from sklearn.neighbors import LocalOutlierFactor
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
 from skthermo._tables.arrays import check_bounds, check_prior
 from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
-from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring
+from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring, evaluate_modes
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
 from tests.bad_input.registry import EXAMPLES, FOLDER, LEGAL, NOT_CALLED, UNTRIED, USUAL, Example, fitted, method, use
 from tests.bad_input.values import (
@@ -856,12 +856,7 @@ INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),
     "n_samples": (50, count(1)),
-    "narrow_bounds": (False, flag()),
     "noise": (0.01, NOISE),
-    "dofs": (None, integers(23)),
-    "refine": (2, number(0.5, -1)),
-    "prior": (0.2, PRIOR),
-    "reduce": (False, number(0, 1.0, -1) | bad(1)),
     "memory": (
         None,
         bad(True, 3, b"m", __file__, Path, NAN, ["m"]),
@@ -880,23 +875,39 @@ use(
     X=(F, INVERTED),
     y=(None, {}),
 )
-SHAPED = dict(INVERSE, dofs=DOFS)
+POSTERIOR = surrogate.PosteriorInverse(TRUSS, noise=0.01).fit(F)
+use(
+    "surrogate.PosteriorInverse",
+    lambda X, **a: surrogate.PosteriorInverse(**a).fit_transform(X),
+    usual="model",
+    prior=(0.2, PRIOR),
+    noise=(0.01, NOISE),
+    dofs=(None, integers(23)),
+    reduce=(False, number(0, 1.0, -1) | bad(1)),
+    memory=INVERTING["memory"],
+    n_jobs=(1, jobs()),
+    X=(F, INVERTED),
+)
+SHAPED = np.hstack([NOMINAL, evaluate_modes(TRUSS, np.ones((1, 4)), DOFS)[1].swapaxes(1, 2).reshape(1, -1)])
 EXAMPLES.append(
     Example(
-        "surrogate.InverseSurrogate",
-        surrogate.InverseSurrogate,
-        lambda **a: surrogate.InverseSurrogate(TRUSS, **SHAPED, **a).fit().round_trip(),
+        "surrogate.PosteriorInverse",
+        surrogate.PosteriorInverse,
+        lambda **a: surrogate.PosteriorInverse(TRUSS, dofs=DOFS, noise=0.01, prior=0.1, **a).fit_transform(SHAPED),
         {"shape_noise": 0.01},
         {"shape_noise": by_name(0.01, MODES, wrong=(1.0, 5))},
     )
 )
+for name in ("transform", "invert"):
+    more = {"return_std": (False, flag())} if name == "transform" else {}
+    method(f"surrogate.PosteriorInverse.{name}", POSTERIOR, X=(F, table(F, rows=False, positive=True)), **more)
 use(
     "surrogate.InverseSurrogate.fit",
     lambda **a: surrogate.InverseSurrogate(None, Ridge()).fit(**a).transform(F),
     X=(F, table(F, rows=True, fixed=False, fitting=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, but=("a number",))),
 )
-for name in ("transform", "predict", "invert"):
+for name in ("transform", "predict"):
     more = {"return_std": (False, flag())} if name == "predict" else {}
     method(f"surrogate.InverseSurrogate.{name}", SURROGATE, X=(F, table(F, rows=False, positive=True)), **more)
 method(
@@ -1395,11 +1406,6 @@ use(
     sample_weight=(np.ones(len(F)), vector(np.ones(len(F)), but=("zero inside",))),
 )
 use(
-    "surrogate.InverseSurrogate",
-    lambda **a: surrogate.InverseSurrogate(TRUSS, **INVERSE, **a).fit().transform(F),
-    usual="verbose",
-)
-use(
     "surrogate.DataInformedFEM",
     lambda **a: surrogate.DataInformedFEM(TRUSS, **PARTS, random_state=0, **a).fit(T, F).predict(T),
     usual="verbose",
@@ -1491,7 +1497,7 @@ def folded(cv):
 
 
 def bare():
-    return surrogate.InverseSurrogate(TRUSS, **INVERSE, refine=0).fit(F)
+    return surrogate.InverseSurrogate(TRUSS, **INVERSE).fit(F)
 
 
 def detected(index, onset):
@@ -1649,8 +1655,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ModelUpdater", "shapes half NaN", lambda: updated(shapes=[[NAN] * 6, [1] * 6], dofs=[0, 1]), "row 0"),
     ("ModelUpdater", "a program", lambda: updated([[1.0]], model=ONE_MODE, shapes=[[1.0]], dofs=[0]), "'local_modes'"),
     ("InverseSurrogate", "neither model nor theta", lambda: surrogate.InverseSurrogate().fit(), "theta"),
-    ("InverseSurrogate", "steps without a model", lambda: surrogate.InverseSurrogate(refine=5).fit(F, F), "refine"),
-    ("InverseSurrogate", "inverted without steps", lambda: bare().invert(F), "refine is 0"),
+    ("PosteriorInverse", "no model", lambda: surrogate.PosteriorInverse().fit(F), "model"),
     ("InverseSurrogate", "no deviations", lambda: bare().predict(F, return_std=True), "standard deviations"),
     ("DataInformedFEM", "another index", lambda: chain().fit(T, LATE), "different rows"),
     ("DataInformedFEM", "rad/s", lambda: chain().fit(T, F * 2 * np.pi), "rad/s"),

@@ -15,7 +15,7 @@ from skthermo.detection import MahalanobisDetector, OutlierDetector, Temperature
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import track_parameters
 from skthermo.studies import identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 YEAR = make_truss_campaign(samples_per_year=200, random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -42,7 +42,7 @@ OF_TEMPERATURES = {
 
 
 def chain():
-    inverse = InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=50, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     return DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
 
 

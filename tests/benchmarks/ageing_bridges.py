@@ -8,7 +8,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51, make_kw51_campaign, make_truss, make_truss_campaign
 from skthermo.preprocessing import BiasAligner, LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 OFF = 0.05  # by which stiffnesses of a wrong model are too high and too low in turn
 KW51_NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
@@ -46,7 +46,7 @@ class Truss:
         if wrong:
             model = model.damaged({group: OFF * (-1) ** i for i, group in enumerate(model.groups)})
         aligner = BiasAligner(model) if wrong else "passthrough"
-        return DataInformedFEM(model, inverse=InverseSurrogate(noise=0.01), aligner=aligner, random_state=0)
+        return DataInformedFEM(model, inverse=PosteriorInverse(noise=0.01), aligner=aligner, random_state=0)
 
 
 class KW51:
@@ -78,7 +78,7 @@ class KW51:
         mapper = make_pipeline(LagFeatures(24 // self.every, freq=f"{self.every}h"), TemperatureMapper())
         return DataInformedFEM(
             model,
-            inverse=InverseSurrogate(noise=KW51_NOISE),
+            inverse=PosteriorInverse(noise=KW51_NOISE),
             mapper=mapper,
             aligner=BiasAligner(model),
             random_state=0,

@@ -32,7 +32,6 @@ from joblib import Parallel, delayed
 from scipy.signal import lfilter
 from scipy.stats import spearmanr
 from sklearn.ensemble import RandomForestRegressor
-from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor, LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -41,7 +40,7 @@ from skthermo.datasets import make_kw51_campaign, make_truss, make_truss_campaig
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
 
@@ -136,7 +135,7 @@ class Truss:
         self.T, self.F = self.campaign(first)
         self.weather = self.campaign(other)[0]
         model = wrong.model()
-        inverse = InverseSurrogate(regressor=LinearRegression(), bounds=0.2, noise=self.noise)  # refined: as a network
+        inverse = PosteriorInverse(noise=self.noise)
         aligner = BiasAligner(model, method="scale") if wrong.aligned else "passthrough"
         self.fem = DataInformedFEM(model, inverse=inverse, aligner=aligner, random_state=seed)
         self.fem.fit(self.T, self.F)

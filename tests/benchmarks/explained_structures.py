@@ -15,7 +15,7 @@ from slow_soil import girder as girder_structure
 from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
 from skthermo.fem import Structure, load_affine
 from skthermo.preprocessing import BiasAligner
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 TRAINING_DAYS, LATER_DAYS = 730, 90
 WRONG = 0.05  # relative error of each group's stiffness in a wrong model, up or down by chance
@@ -101,7 +101,7 @@ class Campaign:
         small = model.reduced(box, random_state=0) if self.structure.is_large else model
         return DataInformedFEM(
             model,
-            inverse=InverseSurrogate(small, bounds=box, n_samples=300, noise=self.structure.noise),
+            inverse=PosteriorInverse(small, noise=self.structure.noise),
             aligner=BiasAligner(small, method="scale") if self.wrong else "passthrough",
             reduce=self.structure.is_large,
             random_state=self.seed,

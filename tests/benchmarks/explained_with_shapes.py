@@ -20,7 +20,7 @@ import pandas as pd
 
 from skthermo.datasets import kw51_sensors, kw51_structure, make_kw51
 from skthermo.studies import identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 NAMES = ["E_bot", "E_arc", "E_br"]
 SLOPES = np.array([1e-3, 8e-4, 5e-4])  # of ln theta, 1/K
@@ -92,7 +92,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=2, help="campaigns of each case")
     parser.add_argument("--days", type=int, default=20, help="daily records after the change")
     asked = parser.parse_args()
-    inverse = InverseSurrogate(noise=NOISE, n_samples=300, bounds=0.1)
+    inverse = PosteriorInverse(noise=NOISE)
     fem = DataInformedFEM(bridge(), inverse=inverse, random_state=0).fit(*records(365, 0))
     rows, precision = [], None
     for case in CASES:

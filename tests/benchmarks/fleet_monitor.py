@@ -43,7 +43,7 @@ from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._false_alarms import find_events
 from skthermo.preprocessing import BiasAligner, HingeFeatures, LagFeatures, SensorMeans
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 PER_DAY, LAGS, MEMORY = 4, [0, 2, 8], 60
 DAYS = (15, 30, 60, 120)
@@ -132,7 +132,7 @@ def prepared(bridge, records):
 
 
 def chain_of(bridge, mapper):
-    inverse = InverseSurrogate(noise=0.005)
+    inverse = PosteriorInverse(noise=0.005)
     mapper = make_pipeline(*weather_of(bridge), mapper)
     return DataInformedFEM(bridge.model, inverse=inverse, mapper=mapper, aligner=BiasAligner(), random_state=0)
 

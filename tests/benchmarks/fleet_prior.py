@@ -38,12 +38,12 @@ import numpy as np
 import pandas as pd
 from sklearn.linear_model import RidgeCV
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
 from skthermo.fleet import FleetPrior
 from skthermo.preprocessing import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 DAYS = (15, 30, 60, 120)
 STARTS = {"winter": "2026-01-01", "summer": "2026-07-01"}
@@ -117,10 +117,9 @@ class Chain(Frequencies):
 
     def chain(self, mapper):
         """The chain, as a user would set it up."""
-        quadratic = make_pipeline(StandardScaler(), PolynomialFeatures(2), RidgeCV(np.logspace(-8, 2, 11)))
         return DataInformedFEM(
             self.bridge.model,
-            inverse=InverseSurrogate(regressor=quadratic, refine=3, noise=0.004),
+            inverse=PosteriorInverse(noise=0.004),
             mapper=make_pipeline(SensorMeans(self.bridge.roles), mapper),
             aligner=BiasAligner(method="scale"),
             random_state=0,

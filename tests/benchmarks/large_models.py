@@ -21,7 +21,7 @@ import scipy.sparse
 
 from skthermo.fem import load_affine
 from skthermo.fem.modal import check_supported, count_modes
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 SPAN, WIDTH, DEPTH = 48.0, 12.0, 1.2
 E, POISSON, DENSITY, BEARING = 35e9, 0.2, 2500.0, 5e9
@@ -206,7 +206,7 @@ def main():
     print(f"{reduced.basis_size_} vectors, {len(reduced.snapshot_points_)} snapshots, error {reduced.error_:.1e}")
     if options.days:
         T, F = records(reduced, options.days)
-        inverse = InverseSurrogate(bounds=BOUNDS, n_samples=500, noise=0.001, random_state=0)
+        inverse = PosteriorInverse(noise=0.001)
         chain = DataInformedFEM(model, inverse=inverse, reduce=True, random_state=0)
         timed(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
         timed("predict", lambda: chain.predict(T))

@@ -126,7 +126,7 @@ def surrogates(seed):
         "GaussianProcessRegressor": GaussianProcessRegressor(kernel),
     }.items():
         start = time.perf_counter()
-        inverse = InverseSurrogate(truss, regressor, bounds=0.2, n_samples=200, refine=0, random_state=seed).fit()
+        inverse = InverseSurrogate(truss, regressor, bounds=0.2, n_samples=200, random_state=seed).fit()
         found[name, "learning, s"] = time.perf_counter() - start
         found[name, "error, %"] = 100 * np.abs(np.log(inverse.predict(fresh.frequencies) / fresh.theta)).mean()
     return pd.Series(found)

@@ -26,7 +26,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import add_noise
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
 from detector_recipes import field_detectors
@@ -60,7 +60,7 @@ def detectors_of(targets, chains, whiten, block=None):
 def truss_case(seed):
     """Chains to fit, a baseline, and for each state the weather, the damage and the true records of one repeat."""
     year, later = (make_truss_campaign(noise=NOISE, random_state=2 * seed + i) for i in range(2))
-    inverse = InverseSurrogate(make_truss(), bounds=0.2, noise=NOISE)
+    inverse = PosteriorInverse(make_truss())
     chains = {
         name: DataInformedFEM(make_truss(), inverse=inverse, mapper=mapper, random_state=seed)
         for name, mapper in kinds().items()

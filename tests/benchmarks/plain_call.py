@@ -51,7 +51,7 @@ from skthermo.datasets import (
 )
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, HampelFilter, LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -149,7 +149,7 @@ def settings(case, *, noise, memory=False, updated=False, **parts):
     level = case.noise if noise == "true" else case.remembered(("noise", memory), estimate)
     fem = DataInformedFEM(
         model,
-        inverse=InverseSurrogate(noise=level),
+        inverse=PosteriorInverse(noise=level),
         mapper=case.mapper(memory),
         aligner=BiasAligner(method="scale"),
         reduce=case.is_large,

@@ -7,7 +7,7 @@
 
 Frequencies of the truss follow made-up weather, with noise that is correlated in time, gaps and outliers. Each part and
 size has a process of its own, whose peak memory, without that of its workers, is printed. In the parts "chain" and
-"study", the inverse is a linear regression without refinement, which costs the same for each row and is not measured
+"study", the inverse is a linear regression, which costs the same for each row and is not measured
 here; the part "defaults" has the defaults of all. "service" is a monitor that is fitted to the first tenth of the
 records, a year of ten, and then updated by each of the other days; "fleet" are bridges with a year of hourly records
 each, whose files are updated by a day, in seconds by the clock. The exit code is 1 if a step takes more than three
@@ -113,7 +113,7 @@ def chain(T, F):
 
 
 def quick_chain():
-    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=200, noise=0.005, refine=0, reduce=True)
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=200, noise=0.005)
     return DataInformedFEM(make_truss(), inverse=inverse, imputer=KNNGapImputer(), reduce=True, random_state=0)
 
 

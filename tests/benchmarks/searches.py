@@ -28,8 +28,8 @@ from sklearn.model_selection import GridSearchCV, cross_val_score
 
 from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z24
 from skthermo.preprocessing import BiasAligner, BlockedKFold
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
-from skthermo.surrogate.inverse._refinement import Refinement
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from skthermo.surrogate.inverse._posterior import Posterior
 
 PENALTIES = np.logspace(-2, 3, 12)
 N_FOLDS = 5
@@ -43,7 +43,7 @@ def remembering(fem, memory):
 
 def truss(memory):
     year = make_truss_campaign(random_state=0)
-    inverse = InverseSurrogate(bounds=0.2, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     fem = DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
     return remembering(fem, memory), year.temperatures, year.frequencies
 
@@ -52,7 +52,7 @@ def z24(memory):
     bridge = load_z24(Path(os.environ["SKTHERMO_DATA"]) / "z24" / "z24_monitoring.csv")
     rows = np.flatnonzero(bridge.state == "undamaged")[::8]
     model = make_z24()
-    inverse = InverseSurrogate(noise=0.005, reduce=True)
+    inverse = PosteriorInverse(noise=0.005, reduce=True)
     parts = {"mapper": TemperatureMapper(Ridge()), "aligner": BiasAligner(model)}
     fem = DataInformedFEM(model, inverse=inverse, **parts, reduce=True, random_state=0)
     return remembering(fem, memory), bridge.temperatures.iloc[rows], bridge.frequencies.iloc[rows]
@@ -62,16 +62,16 @@ CASES = {"truss": truss, "Z24": z24}
 
 
 class Inversions:
-    """Counts calls that refine several rows."""
+    """Counts calls that invert several rows."""
 
     def __init__(self):
-        self.n, refined = 0, Refinement.refined
+        self.n, invert = 0, Posterior.invert
 
-        def counted(refinement, inputs, *arguments, **options):
+        def counted(posterior, inputs):
             self.n += len(inputs) > 1
-            return refined(refinement, inputs, *arguments, **options)
+            return invert(posterior, inputs)
 
-        Refinement.refined = counted
+        Posterior.invert = counted
 
 
 def measured(way, inversions):

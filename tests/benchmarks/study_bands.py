@@ -38,7 +38,7 @@ from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import DetectabilityStudy, Scenario
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 CONFIDENCE, WANTED = 0.9, (85, 95)
@@ -162,7 +162,7 @@ class Girder:
 
 def chain(model, noise, T, F):
     """Defaults, with the frequencies' offset removed."""
-    inverse = InverseSurrogate(model, noise=noise, bounds=0.3)
+    inverse = PosteriorInverse(model, noise=noise)
     aligner = BiasAligner(model, method="scale")
     return DataInformedFEM(model, inverse=inverse, aligner=aligner, random_state=0).fit(T, F)
 

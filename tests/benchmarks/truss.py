@@ -19,7 +19,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.fem import add_noise, linearise
 from skthermo.metrics import error_table, minimum_detectable_damage, probability_of_detection
 from skthermo.studies import sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
 
@@ -61,7 +61,7 @@ class SingleRecords:
         if half_year:
             for name in ("temperatures", "frequencies"):
                 self.baseline[name] = self.baseline[name][::2]
-        inverse = InverseSurrogate(self.model, **({"bounds": 0.2, "noise": NOISE} | inverse_options))
+        inverse = PosteriorInverse(self.model, **inverse_options)
         self.fem = DataInformedFEM(self.model, inverse=inverse, random_state=seed)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*(not-converged|(outside-bounds|outside-training-weather))")

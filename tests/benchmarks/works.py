@@ -38,7 +38,7 @@ from skthermo.fem import AffineModel, add_noise, linearise, sample
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
@@ -158,7 +158,7 @@ def kw51_by_hand(clock, quick):
     """Fit of a chain to an hourly year of KW51, complete rows, the reduced model made by hand before."""
     T, F = hourly_year(800 if quick else 8760)
     model = make_kw51().reduced(BOUNDS, random_state=0)
-    inverse = InverseSurrogate(model, noise=0.001)
+    inverse = PosteriorInverse(model, noise=0.001)
     fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
     with clock.work():
         fem.fit(T, F)
@@ -169,7 +169,7 @@ def kw51_damaged(clock, quick):
     """Fit to an hourly year of KW51 and simulation of it in fifteen states of damage, beside 100 full solves."""
     T, F = hourly_year(800 if quick else 8760)
     model = make_kw51()
-    inverse = InverseSurrogate(noise=0.001, reduce=True)
+    inverse = PosteriorInverse(noise=0.001, reduce=True)
     fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
     with clock.work():
         fem.fit(T, F)
@@ -186,7 +186,7 @@ def kw51_with_gaps(clock, quick, *, updated=True):
     """The same as a user writes it: reduce=True, modes missing as in the real file."""
     campaign = make_kw51_campaign(n_hours=1236 + (400 if quick else 8760), retrofit=False, random_state=0)
     T, F = campaign.temperatures[1236:], campaign.frequencies[1236:]
-    inverse = InverseSurrogate(noise=0.002, reduce=True)
+    inverse = PosteriorInverse(noise=0.002, reduce=True)
     fem = DataInformedFEM(make_kw51(updated=updated), inverse=inverse, reduce=True, random_state=0)
     with clock.work():
         fem.fit(T, F)
@@ -194,7 +194,7 @@ def kw51_with_gaps(clock, quick, *, updated=True):
 
 
 def kw51_not_updated(clock, quick):
-    """The same with a model whose modes are 2 to 12 % from the measured ones: parameters lie far outside the bounds."""
+    """The same with a model whose modes are 2 to 12 % from the measured ones."""
     kw51_with_gaps(clock, quick, updated=False)
 
 
@@ -214,7 +214,7 @@ def frame_chain(clock, quick):
     """Fit of a chain to 365 rows of the exported frame, reduce=True."""
     model = building_frame()
     T, F = frame_records(model, 10 if quick else 365)
-    inverse = InverseSurrogate(noise=0.001, reduce=True)
+    inverse = PosteriorInverse(noise=0.001, reduce=True)
     fem = DataInformedFEM(model, inverse=inverse, mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
     with clock.work():
         fem.fit(T, F)
@@ -229,7 +229,7 @@ def grid_search(clock, quick):
     with tempfile.TemporaryDirectory() as memory:
         fem = DataInformedFEM(
             make_truss(),
-            inverse=InverseSurrogate(bounds=0.2, noise=0.01, memory=memory),
+            inverse=PosteriorInverse(noise=0.01, memory=memory),
             mapper=make_pipeline(LagFeatures(freq="1h"), TemperatureMapper(Ridge())),
             random_state=0,
         )
@@ -329,7 +329,7 @@ def drawn_models(clock, quick):
 def truss_chain(clock, quick):
     """Fit and predictions of the truss's chain, a year of daily records."""
     year = make_truss_campaign(random_state=0)
-    fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(bounds=0.2, noise=0.01), random_state=0)
+    fem = DataInformedFEM(make_truss(), inverse=PosteriorInverse(noise=0.01), random_state=0)
     with clock.work():
         fem.fit(year.temperatures, year.frequencies)
         predicted, deviations = fem.predict(year.temperatures, return_std=True)
@@ -342,7 +342,7 @@ def z24_chain(clock, quick):
     data = load_z24(DATA / "z24" / "z24_monitoring.csv")
     T, F = data.temperatures[:2240], data.frequencies[:2240]
     model = make_z24().reduced([[0.4, 4.0]] * 4, random_state=0)
-    inverse, aligner = InverseSurrogate(noise=0.005), BiasAligner(method="scale")
+    inverse, aligner = PosteriorInverse(noise=0.005), BiasAligner(method="scale")
     fem = DataInformedFEM(model, inverse=inverse, aligner=aligner, random_state=0)
     with clock.work():
         predicted = fem.fit(T, F).predict(data.temperatures)
@@ -410,7 +410,7 @@ def truss_years():
     """A fitted chain of the truss, its records, and those of a damaged year."""
     year = make_truss_campaign(random_state=0)
     later = make_truss_campaign(random_state=1, damage={"bottom": 0.2})
-    inverse = InverseSurrogate(bounds=0.2, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(year.temperatures, year.frequencies)
     return fem, year, later
 
@@ -564,7 +564,7 @@ def ten_minutes(clock, quick):
     F = add_noise(model.frequencies(1 - 4e-4 * (T[:, [0, 1, 2, 0]] - 10)), 0.005, random_state=0)
     stamps = pd.date_range("2025", periods=rows, freq="10min")
     T, F = pd.DataFrame(T, stamps).add_prefix("T"), pd.DataFrame(F, stamps).add_prefix("f")
-    fem = DataInformedFEM(model, inverse=InverseSurrogate(noise=0.005), random_state=0)
+    fem = DataInformedFEM(model, inverse=PosteriorInverse(noise=0.005), random_state=0)
     with clock.work():
         predicted = fem.fit(T, F).predict(T)
         fem.simulate(T, noise="fitted", random_state=0)

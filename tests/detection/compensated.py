@@ -2,15 +2,14 @@
 
 import numpy as np
 import pandas as pd
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 TRUSS = make_truss()
 YEAR = make_truss_campaign(2, samples_per_year=100, random_state=0)
@@ -26,8 +25,7 @@ def compensator(estimator=None, **options):
 
 
 def chain(mapper=None):
-    quadratic = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
-    inverse = InverseSurrogate(TRUSS, quadratic, bounds=0.2, n_samples=100, noise=0.01, random_state=0)
+    inverse = PosteriorInverse(TRUSS, noise=0.01)
     return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
 
 

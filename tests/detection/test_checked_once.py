@@ -16,7 +16,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.detection import FusedDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures, check_records
 from skthermo.studies import DetectabilityStudy
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.detection.compensated import MODES, TRUSS, F, T, X
 
 LATER = make_truss_campaign(random_state=3)
@@ -26,7 +26,7 @@ STUCK = X.assign(T1=X["T1"].mask(np.arange(len(X)) >= 160, 20.0))
 
 def chain():
     """One that is fitted fast."""
-    inverse = InverseSurrogate(TRUSS, Ridge(1e-6), bounds=0.2, n_samples=50, noise=0.01, refine=0, random_state=0)
+    inverse = PosteriorInverse(TRUSS, noise=0.01)
     return DataInformedFEM(TRUSS, inverse=inverse, mapper=TemperatureMapper(LinearRegression()))
 
 

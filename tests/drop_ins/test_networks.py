@@ -48,7 +48,7 @@ def with_keras():
 def assert_learns(inverse_network, mapper_network):
     """Both networks explain what they have not seen; M1 is better than a guess, and its refined estimates are exact."""
     fresh = sample(TRUSS, 0.2, 100, random_state=1)
-    inverse = InverseSurrogate(TRUSS, inverse_network, bounds=0.2, n_samples=500, refine=0, random_state=0).fit()
+    inverse = InverseSurrogate(TRUSS, inverse_network, bounds=0.2, n_samples=500, random_state=0).fit()
     assert inverse.score(fresh.frequencies, fresh.theta) > 0.6
     theta = np.exp(-0.002 * YEAR.temperatures.to_numpy() @ [[1, 0.5, 0], [0, 0.5, 1], [0, 0, 0]])[:, :2]
     mapper = TemperatureMapper(mapper_network).fit(YEAR.temperatures[::2], theta[::2])

@@ -14,7 +14,6 @@ SAID = {
     "two modes swapped": "mode-order",
     "a thermometer that died": "mostly-filled",
     "a thermometer that got stuck": "stuck-sensor",
-    "bounds of 0.5 %": "outside-bounds",
     "30 records": "few-rows",
     "kelvin in fit": "look like kelvin",
     "kelvin in predict": "outside-training-weather",

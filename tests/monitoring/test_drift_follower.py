@@ -12,7 +12,7 @@ from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.drift._follower import DELAY
 from skthermo.monitoring.drift._kalman import State
 from skthermo.preprocessing import LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 NOISE, PER_YEAR, FIRST = 0.002, 365, 365
 
@@ -24,7 +24,7 @@ def steady():
 
 @pytest.fixture(scope="module")
 def chain(steady):
-    fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.01), random_state=0)
+    fem = DataInformedFEM(make_truss(), inverse=PosteriorInverse(noise=0.01), random_state=0)
     return fem.fit(steady.temperatures[:FIRST], steady.frequencies[:FIRST])
 
 
@@ -146,7 +146,7 @@ def test_lags_see_the_days_before():
     )
     T, F = hourly.temperatures.tz_localize("Europe/Brussels"), hourly.frequencies.tz_localize("Europe/Brussels")
     mapper = make_pipeline(LagFeatures(5, freq="6h"), TemperatureMapper())
-    fem = DataInformedFEM(make_truss(), inverse=InverseSurrogate(noise=0.01), mapper=mapper, random_state=0)
+    fem = DataInformedFEM(make_truss(), inverse=PosteriorInverse(noise=0.01), mapper=mapper, random_state=0)
     n_first = 4 * 40
     fem.fit(T[:n_first], F[:n_first])
     follower = DriftFollower.of(fem, T[:n_first], F[:n_first])

@@ -18,7 +18,7 @@ from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss
 from skthermo.monitoring import load_monitor
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
 
 ENDINGS = ("joblib", "skops")
@@ -66,7 +66,7 @@ def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
 @pytest.mark.parametrize("ending", ["skops"])
 def test_drift_and_faulty_sensors_go_on_where_they_stopped(records, path):
     baseline, targets = records[:FIRST], [name for name in records if name.startswith("f")]
-    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=200, noise=0.01, refine=10)
+    inverse = PosteriorInverse(noise=0.01)
     fem = DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(LinearRegression()), random_state=0)
     monitor = fitted_monitor(records, fem=fem.fit(baseline.drop(columns=targets), baseline[targets]))
     records = records[FIRST : FIRST + 20].copy()

@@ -13,7 +13,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.fem import AffineModel
 from skthermo.reporting._html import POLICY, SCRIPT
 from skthermo.studies import DetectabilityStudy
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 HOSTILE = "<script>alert(1)</script>"
 QUOTED = "\"onerror='x' & $\\frac{"
@@ -39,7 +39,7 @@ def fitted_chain(n_records=120, index=True, random_state=0):
         days = pd.date_range("2024-01-01", periods=n_records, freq="D")
         T, F = pd.DataFrame(T, days, [SENSOR]), pd.DataFrame(F, days, MODES)
     mapper = TemperatureMapper(random_state=0)
-    inverse = InverseSurrogate(n_samples=200, noise=0.005, random_state=0)
+    inverse = PosteriorInverse(noise=0.005)
     return DataInformedFEM(model, inverse=inverse, mapper=mapper, random_state=0).fit(T, F), T, F
 
 

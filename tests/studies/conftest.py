@@ -1,19 +1,16 @@
 """Chains fitted to one year of the truss, which all tests of studies share; no test changes them."""
 
 import pytest
-from sklearn.linear_model import Ridge
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 
 def fitted(as_arrays=False, **options):
     year = make_truss_campaign(random_state=0)
     records = year.temperatures, year.frequencies
     T, F = (table.to_numpy() for table in records) if as_arrays else records
-    inverse = InverseSurrogate(regressor=make_pipeline(PolynomialFeatures(2), Ridge(1e-6)), n_samples=200, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     return DataInformedFEM(make_truss(), inverse=inverse, random_state=0, **options).fit(T, F)
 
 

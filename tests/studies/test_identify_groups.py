@@ -9,7 +9,7 @@ import pytest
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.studies import DamagePrior, identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures[::10]
@@ -36,7 +36,7 @@ def symmetric():
     random = np.random.RandomState(0)
     T = pd.DataFrame({"T": 10 + 12 * np.sin(np.arange(200) / 30) + random.standard_normal(200)})
     F = model.frequencies(1 - 0.002 * (T.to_numpy() - 10)) * (1 + 0.01 * random.standard_normal((200, 5)))
-    inverse = InverseSurrogate(n_samples=100, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     return DataInformedFEM(model, inverse=inverse, random_state=0).fit(T, F), T[::5]
 
 
@@ -94,7 +94,8 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
     # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     numbers = found.prior.numbers
     expected = numbers[1] / 5 / (numbers[0] + numbers[1] / 5)
-    assert found.table.loc["vertical", "probability"] == pytest.approx(expected, rel=0.5)
+    # which healthy records lower a little, as they show no damage of it
+    assert expected / 3 < found.table.loc["vertical", "probability"] < 1.5 * expected
     assert found.table.loc["vertical", "if_damaged"] == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.6)
     assert (found.draws["vertical"] > 0).any()
     with pytest.raises(ValueError, match=r"no group can be seen; .* vertical "):

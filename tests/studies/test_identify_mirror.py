@@ -5,7 +5,7 @@ import pytest
 
 from skthermo.fem import Beam, Spring, Structure, add_noise
 from skthermo.studies import identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 SECTION = {"E": 33e9, "G": 14e9, "A": 5.0, "I_yy": 1.6, "I_zz": 20.0, "J": 3.0, "density": 2500.0}
 
@@ -26,7 +26,7 @@ def test_mirror_images_are_named_and_share_the_probability():
     model = bridge()
     T = 10 + 10 * np.random.default_rng(0).uniform(-1, 1, (300, 1))
     theta = np.exp((T - 10) * [-0.004, -0.003, -0.003])
-    fem = DataInformedFEM(model, inverse=InverseSurrogate(noise=0.004), random_state=0)
+    fem = DataInformedFEM(model, inverse=PosteriorInverse(noise=0.004), random_state=0)
     fem.fit(T, add_noise(model.frequencies(theta), 0.004, random_state=0))
     records = add_noise(model.damaged({"pier_2": 0.2}).frequencies(theta), 0.004, random_state=1)
     with pytest.warns(UserWarning, match="pier_1 and pier_2.*indistinguishable-groups"):

@@ -7,7 +7,7 @@ from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies import identify_damage
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 TRUSS, GROUPS = make_truss(), ["top", "diagonal"]
 
@@ -15,7 +15,7 @@ TRUSS, GROUPS = make_truss(), ["top", "diagonal"]
 @pytest.fixture(scope="module")
 def fem():
     year = make_truss_campaign(random_state=0)
-    inverse = InverseSurrogate(regressor=LinearRegression(), bounds=0.2, n_samples=100, noise=0.01)
+    inverse = PosteriorInverse(noise=0.01)
     chain = DataInformedFEM(
         TRUSS,
         inverse=inverse,

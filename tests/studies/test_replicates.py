@@ -342,13 +342,12 @@ def test_other_training_records_change_a_chain_as_its_error(fem):
 
 
 def test_a_refitted_chain_finds_the_same_parameters(fem):
-    deviations = fem.inverse_.invert(fem.training_records_[1]).std
-    assert (np.abs(fem.refitted().parameters_ - fem.parameters_) < 0.02 * deviations).all(axis=None)
+    pd.testing.assert_frame_equal(fem.refitted().parameters_, fem.parameters_)
 
 
 @pytest.mark.filterwarnings("ignore:.*hidden-offsets")
 def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
-    plain = clone(fem).set_params(aligner="passthrough").fit(*fem.training_records_)
+    plain = clone(fem).set_params(aligner="passthrough", inverse__prior=0.3).fit(*fem.training_records_)
     refitted = plain.refitted(model=MODELS[0])
     assert refitted.model is MODELS[0]
     bottom = refitted.parameters_["bottom"] / plain.parameters_["bottom"]

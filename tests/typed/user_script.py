@@ -13,7 +13,7 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator, Wind
 from skthermo.fem import AffineModel, add_noise, evaluate, sample
 from skthermo.metrics import error_table, mape, probability_of_detection, time_to_detection
 from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import identifiability
 
 Frame: TypeAlias = pd.DataFrame
@@ -81,6 +81,10 @@ assert_type(theta, Array)
 assert_type(inverse.fit().predict(f), Array)
 assert_type(inverse.inverse_transform(pd.DataFrame(theta, columns=list(model.parameter_names))), Frame)
 assert_type(inverse.inverse_transform(theta), Array)
+posterior = PosteriorInverse(model).fit(F)
+assert_type(posterior.transform(F), Frame)
+assert_type(posterior.transform(f), Array)
+assert_type(posterior.inverse_transform(theta), Array)
 mapper = TemperatureMapper(LinearRegression()).fit(t, theta)
 assert_type(mapper, TemperatureMapper)
 assert_type(mapper.predict(t), Array)

@@ -373,8 +373,8 @@ class StudyFindings:
         >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
                      false_alarms   pod  pod_at_equal_pfa  significantly_worse
         detector
-        Mahalanobis          0.02  0.22              0.21                False
-        forest               0.02  0.18              0.17                False
+        Mahalanobis          0.02  0.22              0.22                False
+        forest               0.01  0.18              0.17                 True
         >>> print(study.summary())
         'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.6%.
         Not significantly worse at 95% confidence: 'forest' (17.8% at 1.6%).

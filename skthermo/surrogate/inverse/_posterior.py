@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Integral, Real
@@ -340,8 +340,8 @@ class PosteriorInverse(TransformerMixin, Estimator):
         Raises
         ------
         ValueError
-            If there is no model, the number of columns is not the model's, a frequency is not positive, or a model that
-            is to be reduced has no method for it.
+            If there is no model, the number of columns is not the model's, a frequency is not positive, a mode is there
+            twice, or a model that is to be reduced has no method for it.
 
         Warns
         -----
@@ -362,6 +362,7 @@ class PosteriorInverse(TransformerMixin, Estimator):
             raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
         self.parameter_names_, self.n_parameters_ = names, len(names)
         inputs, first = self._read(X), self._first(getattr(X, "columns", None))
+        self._check_different(inputs[:, : model.n_modes], column_names(X, "f"))
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         n_records = int((~np.isnan(inputs).all(axis=1)).sum())
@@ -558,6 +559,18 @@ class PosteriorInverse(TransformerMixin, Estimator):
                 "frequencies in Hz, NaN where one is missing"
             )
         return inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
+
+    def _check_different(self, frequencies: Array, names: Sequence[Any]) -> None:
+        """Refuse a mode that is there twice: all its records would count twice."""
+        if len(frequencies) < 2:
+            return
+        _, first, which = np.unique(np.nan_to_num(frequencies), axis=1, return_index=True, return_inverse=True)
+        for column, kind in enumerate(which):
+            if first[kind] != column and not np.isnan(frequencies[:, column]).all():
+                raise ValueError(
+                    f"{names[column]!r} has the values of {names[first[kind]]!r} in all {len(frequencies)} rows; "
+                    "expected each mode once"
+                )
 
     def _column_names(self) -> list[str]:
         modes = [f"f{i + 1}" for i in range(self.model.n_modes)]
