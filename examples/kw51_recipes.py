@@ -96,6 +96,7 @@ EXPECTED_WARNINGS = (
     ".*outside-bounds",
     ".*outside-training-weather",
     ".*not-converged",
+    ".*outside-reduced-model",
     ".*outside-reduced-bounds",
     "Got `batch_size` less than 1",
 )

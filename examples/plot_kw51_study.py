@@ -88,9 +88,9 @@ PredictionDisplay.from_predictions(both["measured"], both["imputed"], labels=lab
 #
 # Two chains
 # ----------
-# One makes the paper's choices: imputed records, and networks for both surrogates. The other imputes nothing, refines
-# the estimates of M1 on the FE model and maps temperatures with piecewise-linear regression. Both see the temperatures
-# of the last day.
+# One makes the paper's choices: imputed records, and networks for both surrogates. The other imputes nothing, solves
+# the FE model for the parameters of each record and maps temperatures with piecewise-linear regression. Both see the
+# temperatures of the last day.
 #
 # .. literalinclude:: kw51_recipes.py
 #    :pyobject: Fitted.by
@@ -140,8 +140,7 @@ true = pd.DataFrame(test.theta, columns=PARAMETERS)
 PredictionDisplay.from_predictions(true, found, labels=("true", "by M1"), kind="scatter", unit="")
 
 # %%
-# Table 5, mean absolute percentage errors. A network alone is a first guess; steps on the FE model make it exact where
-# there is no noise. A few rows have not converged after a hundred steps: a warning counts them, which is silenced here.
+# Table 5, mean absolute percentage errors. Solved for, parameters are exact where there is no noise.
 
 with quiet():
     show(table_5(bridge()))

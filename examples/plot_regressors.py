@@ -27,6 +27,7 @@ from regressors_recipes import (
     BEYOND,
     FULL,
     SMALL,
+    SOLVED,
     STYLES,
     averaged,
     bare_forest_error,

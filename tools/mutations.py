@@ -184,20 +184,21 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/inverse/_refinement.py", "surrogate/test_refinement.py"): [
-        ("width of the prior of a box", "half / np.sqrt(3)", "half"),
-        ("pull of the prior", "+ distance / self.prior.width", "+ distance"),
+    ("surrogate/inverse/_steps.py", "surrogate/test_posterior_inverse.py"): [
+        ("pull of the prior", "pull = x @ self.precision", "pull = x @ self.precision / 2"),
         ("information of missing modes", "np.where(missing, np.inf, self.noise)", "self.noise"),
-        ("limits of estimates", "REACH = 3.0", "REACH = 1.0"),
-        ("parameters at their limits", "held, fixed = held | beyond", "held, fixed = held"),
         ("modes that have crossed", "CLOSE = 0.1", "CLOSE = 0.0"),
         ("steps that fail", "found.put(active[better], there.of(better))", "found.put(active, there)"),
-        ("convergence", "SMALL_STEP = 1e-6", "SMALL_STEP = 1e-3"),
-        ("rows that stall", "np.where(lost, guess, np.exp(local.x))", "np.exp(local.x)"),
-        ("weight of rows with gaps", "((at_best / deviations) ** 2)", "(at_best / deviations)"),
-        ("estimated noise", "/ (n_modes - n_parameters))", "/ n_modes)"),
+        ("convergence", "SMALL_SHARE = 0.001", "SMALL_SHARE = 0.3"),
     ],
-    ("surrogate/inverse/_refinement.py", "surrogate/test_reduced_refinement.py"): [
+    ("surrogate/inverse/_posterior.py", "surrogate/test_posterior_inverse.py"): [
+        ("rows that stall", "np.where(lost, np.nan, np.exp(local.x))", "np.exp(local.x)"),
+        ("weight of rows with gaps", "((at_best / std) ** 2)", "(at_best / std)"),
+    ],
+    ("surrogate/inverse/_prior.py", "surrogate/test_posterior_inverse.py"): [
+        ("the common factor", "return self.common**2 + np.diag(self.own**2)", "return np.diag(self.own**2)"),
+    ],
+    ("surrogate/inverse/_posterior.py", "surrogate/test_reduced_posterior.py"): [
         ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
@@ -216,18 +217,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes = slopes",
         ),
     ],
-    ("surrogate/inverse/_training.py", "surrogate/test_memory.py"): [
-        (
-            "stale inversions in memory",
-            "content_of(replace(refinement, n_jobs=None), inputs, guess)",
-            "content_of(guess)",
-        ),
+    ("surrogate/inverse/_posterior.py", "surrogate/test_memory.py"): [
+        ("stale inversions in memory", "lambda: (replace(self.posterior_, n_jobs=None), inputs)", "lambda: inputs"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_reduce_auto.py"): [
         ("changes of another simulator", "default_factory=KnownChanges, init=False,", "default_factory=KnownChanges,"),
-    ],
-    ("surrogate/inverse/_training.py", "surrogate/test_narrow_bounds.py"): [
-        ("width of a narrower box", "half = np.maximum(highest - lowest,", "half = np.maximum((highest - lowest) / 4,"),
     ],
     ("residuals/weather.py", "test_sensor_regression.py"): [
         ("sensors in unknown weather", "outside = beyond > 0", "outside = beyond > 1e9"),
