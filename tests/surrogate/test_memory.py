@@ -238,7 +238,7 @@ class TestWarnings:
         assert any(text in one for one in first)
 
     def test_of_chains(self, tmp_path):
-        gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.8)
+        gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.4)
         first, again, fresh = (
             self.texts(
                 lambda memory: chain(memory, inverse=inverse(model=None, noise=0.0005, prior=0.3)).fit(T, gaps), memory

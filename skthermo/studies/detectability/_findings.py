@@ -376,11 +376,11 @@ class StudyFindings:
         Mahalanobis          0.02  0.22              0.22                False
         forest               0.01  0.18              0.17                 True
         >>> print(study.summary())
-        'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.6%.
-        Not significantly worse at 95% confidence: 'forest' (17.8% at 1.6%).
+        'Mahalanobis' detects 21.9% of the damaged records at a false-alarm rate of 1.9%.
+        Significantly worse at 95% confidence: 'forest' (18.4% at 1.2%).
         These comparisons include noise only: another year, baseline or FE model may change the order.
-        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 10 within 7 days, 37 within 30 days.
-        'bottom 10 %' is detected within 13 days in 95 of 100 cases; false alarms in that time: 18 of 100.
+        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 12 within 7 days, 41 within 30 days.
+        'bottom 10 %' is detected within 15 days in 95 of 100 cases; false alarms in that time: 22 of 100.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")

@@ -81,6 +81,7 @@ from skthermo.surrogate.chain._stages import (
     ThermalModel,
     Weather,
     frequencies_of,
+    limits_in_weather,
     possible,
     ratio_regressor,
 )
@@ -868,6 +869,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
             sensors=self.sensors_,
             training_range=TrainingRange.of(inputs, records.trained),
+            limits=limits_in_weather(theta),
             parameter_names=self.parameter_names_,
             mode_names=self.mode_names_,
             n_jobs=self.n_jobs,

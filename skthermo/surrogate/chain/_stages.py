@@ -325,6 +325,7 @@ def ratio_regressor() -> TemperatureMapper:
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
 ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
+FARTHEST_UNSEEN = 0.3  # of ln theta, that no record has shown but other weather may
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 
 
@@ -358,7 +359,8 @@ class Weather:
 class ThermalModel(SavesFrames):
     """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
 
-    ``sensors`` and ``training_range`` detect unusual weather.
+    ``sensors`` and ``training_range`` detect unusual weather, in which parameters stay within ``limits``, the least and
+    the largest of each.
     """
 
     mapper: BaseEstimator
@@ -367,6 +369,7 @@ class ThermalModel(SavesFrames):
     discrepancy: Discrepancy
     sensors: SensorRegression
     training_range: TrainingRange
+    limits: Array
     parameter_names: Sequence[str]
     mode_names: Sequence[Any]
     n_jobs: int | None
@@ -374,7 +377,7 @@ class ThermalModel(SavesFrames):
     def learned(self, temperatures: Table) -> Array:
         """What the mapper gives, without its warning of the weather, of which the chain says more."""
         with reported_by_caller({"implausible-temperatures"}):
-            return as_columns(self.mapper.predict(temperatures))
+            return np.clip(as_columns(self.mapper.predict(temperatures)), *self.limits)
 
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
@@ -517,6 +520,15 @@ def frequencies_of(simulator: Simulator, aligner: BaseEstimator, theta: Array, n
     """Frequencies in the measured domain, NaN where theta is impossible, without warnings."""
     frequencies = simulator.frequencies(possible(theta)[0], n_jobs, warn=False, n_rows=len(theta))
     return as_floats(aligner.inverse_transform(frequencies))
+
+
+def limits_in_weather(estimates: Array) -> Array:
+    """The least and the largest value of each parameter in any weather, given what records have shown, (2, n).
+
+    A mapper would carry a bearing that freezes on to any stiffness.
+    """
+    seen = np.nanmin(estimates, axis=0), np.nanmax(estimates, axis=0)
+    return np.stack([np.minimum(np.exp(-FARTHEST_UNSEEN), seen[0]), np.maximum(np.exp(FARTHEST_UNSEEN), seen[1])])
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
