@@ -14,7 +14,7 @@ FROST = 2.0  # pavement below this, in degrees Celsius, may hold ice
 def in_parameters(records):
     """The records with multipliers of the FE model in place of frequencies, and the names of these."""
     model = bridge_model()
-    inverse = PosteriorInverse(model)
+    inverse = PosteriorInverse(model, prior=0.2)  # as far as damage may go; weather moves less
     others = [column for column in records.baseline if column not in FREQUENCIES]
     to_parameters = ColumnTransformer(
         [

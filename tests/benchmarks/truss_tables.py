@@ -56,6 +56,19 @@ def table_3(rates):
     return table.round(2)
 
 
+def beside_the_ratio(mapes, rates):
+    """Means of Tables 2 and 3 by the chain and by the ratio, and their difference, with standard errors over seeds."""
+    of_seed = {
+        "Table 2, %": mapes.groupby(["seed", "source"]).mean().mean(axis=1).unstack(),
+        "Table 3, points": rates.sub(rates["thermo"], axis=0).abs().groupby("seed").mean(),
+    }
+    rows = {}
+    for name, table in of_seed.items():
+        columns = table[["informed", "ratio"]].assign(difference=table["informed"] - table["ratio"])
+        rows[name] = columns.mean().round(3).astype(str) + " ± " + columns.sem().round(3).astype(str)
+    return pd.DataFrame(rows).T
+
+
 def rows_and_alarms(rates, alarms):
     """The worst rows of Table 3, and differences of false alarms between means of many draws of noise."""
     gaps = rates.sub(rates["thermo"], axis=0)
@@ -125,6 +138,7 @@ def main():
         mapes, rates, alarms = run(seeds, **setting)
         print(table_2(mapes), end="\n\n")
         print(table_3(rates).to_string(na_rep=""), end="\n\n")
+        print(beside_the_ratio(mapes, rates), end="\n\n")
     for level in (0.9, 0.95):
         for source in ("thermo", "informed"):
             found = ", ".join(f"{group} {damage:.0f}" for group, damage in detectable(rates, source, level).items())
