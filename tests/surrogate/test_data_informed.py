@@ -17,10 +17,11 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo.datasets import make_truss_campaign
+from skthermo.exceptions import WeatherWarning
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from tests.surrogate.chains import TRUSS, F, Logged, T, chain, fitted, inverse, mapper, trained
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
@@ -334,3 +335,19 @@ def test_large_models_work_in_worker_processes():
     alone, spread = (cross_val_predict(estimator, warm, measured, cv=2, n_jobs=n_jobs) for n_jobs in (1, 2))
     np.testing.assert_array_equal(spread, alone)
     np.testing.assert_allclose(alone, measured, rtol=0.02)
+
+
+def test_parameters_in_unseen_weather_stay_where_records_have_shown_them_or_near_nominal():
+    """A part that froze to four times its stiffness is not carried on; 30 % is allowed to any parameter."""
+    random = np.random.default_rng(0)
+    air = random.permutation(np.linspace(-8, 30, 300))
+    theta = np.column_stack([1 - 0.001 * (air - 10), 1 + 3 / (1 + np.exp((air - 2) / 3))])
+    model = TRUSS.with_parameters(["bottom", "diagonal"]).with_modes(range(5))
+    noisy = model.frequencies(theta) * (1 + 0.002 * random.standard_normal((300, 5)))
+    F = pd.DataFrame(noisy, columns=[f"f{i + 1}" for i in range(5)])
+    fem = DataInformedFEM(model, aligner="passthrough", inverse=PosteriorInverse(noise=0.002, prior=0.5))
+    fem.fit(pd.DataFrame({"air": air}), F)
+    with pytest.warns(WeatherWarning):
+        far = fem.predict_parameters(pd.DataFrame({"air": [-300.0, -12.0, 500.0]}))
+    assert far["diagonal"].iloc[:2].to_numpy() == pytest.approx(fem.parameters_["diagonal"].max())
+    assert far["bottom"].iloc[[0, 2]].to_numpy() == pytest.approx([np.exp(0.3), np.exp(-0.3)], rel=0.1)

@@ -377,7 +377,8 @@ class ThermalModel(SavesFrames):
     def learned(self, temperatures: Table) -> Array:
         """What the mapper gives, without its warning of the weather, of which the chain says more."""
         with reported_by_caller({"implausible-temperatures"}):
-            return np.clip(as_columns(self.mapper.predict(temperatures)), *self.limits)
+            theta = as_columns(self.mapper.predict(temperatures))
+        return np.where(is_possible(theta), np.clip(theta, *self.limits), theta)
 
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
@@ -534,9 +535,14 @@ def limits_in_weather(estimates: Array) -> Array:
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
     theta = as_columns(theta).copy()
-    impossible = ((theta < POSSIBLE[0]) | (theta > POSSIBLE[1])).any(axis=1)
+    impossible = ~(is_possible(theta) | np.isnan(theta)).all(axis=1)
     theta[impossible] = np.nan
     return theta, impossible
+
+
+def is_possible(theta: Array) -> NDArray[np.bool_]:
+    """Which multipliers a model can have."""
+    return (POSSIBLE[0] <= theta) & (theta <= POSSIBLE[1])
 
 
 def factors_of(parameters: Mapping[str, float] | None, names: Sequence[str]) -> Array:

@@ -15,13 +15,12 @@ from sklearn.utils import Bunch, check_random_state
 
 from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, as_floats, check_model, check_noise, check_theta
-from skthermo._tables.frames import column_names, frame_like
+from skthermo._tables.arrays import Array, Bounds, check_model, check_noise, check_theta
+from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     HasMethods,
     Interval,
     StrOptions,
-    TransformerMixin,
     _fit_context,
     check_is_fitted,
     validate_data,
@@ -31,12 +30,13 @@ from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2
 from skthermo.surrogate._regression import MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Box
+from skthermo.surrogate.inverse._base import FrequencyInverse
 
 N_HELD_OUT = 500  # simulations that a score is of
 HELD_OUT_SEED = 20_260_000  # of them: the same for all settings that are compared
 
 
-class InverseSurrogate(TransformerMixin, MultiplierRegressor):
+class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     """Parameters of an FE model from frequencies, learned from simulations; equations (3)-(4).
 
     Draws parameters from a box, solves the FE model, and learns the inverse, M1 ~ FEM^-1 [KCM26]_ [KMH24]_: a regressor
@@ -290,51 +290,6 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         noisy = add_noise(samples.frequencies, self.noise_, random_state=random)
         return complete_r2(np.log(samples.theta), np.log(self._regress(noisy)[0]))
 
-    @overload
-    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Frequencies of given parameters, computed by the FE model.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_parameters)
-            Multipliers.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz; NaN in rows with NaN. A frame, whose columns must be the model's parameters, gives a
-            frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If the estimator has no model, or the parameters are not the model's.
-        """
-        check_is_fitted(self)
-        self._check_has_model()
-        names = getattr(self, "feature_names_in_", [f"f{i + 1}" for i in range(self.model.n_modes)])
-        return frame_like(X, evaluate(self.model, X, n_jobs=self.n_jobs), names)
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the parameters.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Ignored.
-
-        Returns
-        -------
-        ndarray of str
-            The model's parameter names, else y's columns, else theta1, theta2, ...
-        """
-        check_is_fitted(self)
-        numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
-        return np.array(self.parameter_names_ or numbered, dtype=object)
-
     def round_trip(self) -> Array:
         """Relative errors of the model's nominal frequencies after inversion and another solution.
 
@@ -351,10 +306,9 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
             If the estimator has no model.
         """
         check_is_fitted(self)
-        self._check_has_model()
-        state = np.ones((1, self.n_parameters_))
-        nominal = evaluate(self.model, state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
-        return (evaluate(self.model, self._regress(nominal)[0]) / nominal - 1)[0]
+        model, state = self._checked_model(), np.ones((1, self.n_parameters_))
+        nominal = evaluate(model, state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
+        return (evaluate(model, self._regress(nominal)[0]) / nominal - 1)[0]
 
     def _simulated(self, random: np.random.RandomState) -> tuple[Array, Array]:
         """Noisy frequencies and parameters of simulations in the box."""
@@ -383,18 +337,6 @@ class InverseSurrogate(TransformerMixin, MultiplierRegressor):
         if found != self.model.n_modes:
             raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}")
 
-    def _check_has_model(self) -> None:
-        if self.model is None:
-            raise ValueError("InverseSurrogate has no model; expected an FE model to turn parameters into frequencies")
-
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         check_is_fitted(self)
-        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
-        inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=False)
-        if self.inputs_.log and (inputs <= 0).any():
-            row, column = np.argwhere(inputs <= 0)[0]
-            raise ValueError(
-                f"row {row} of {column_names(X, 'f')[column]!r} is {inputs[row, column]:g}; expected positive "
-                "frequencies in Hz, NaN where one is missing"
-            )
-        return self._regress(inputs, return_std)
+        return self._regress(self._positive(X, None if self.inputs_.log else 0), return_std)

@@ -19,7 +19,6 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
 from skthermo._tables.arrays import (
     Array,
-    as_floats,
     check_flag,
     check_model,
     check_noise,
@@ -33,7 +32,6 @@ from skthermo._validation import (
     HasMethods,
     Interval,
     StrOptions,
-    TransformerMixin,
     _fit_context,
     check_is_fitted,
     validate_data,
@@ -41,6 +39,7 @@ from skthermo._validation import (
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, evaluate
 from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.inverse._base import FrequencyInverse
 from skthermo.surrogate.inverse._prior import FIRST_NOISE, LinearRecords, ThermalPrior, least_noise
 from skthermo.surrogate.inverse._shapes import ShapeInputs
 from skthermo.surrogate.inverse._steps import Linearise, Objective, Refined, information, minimise, refine
@@ -212,7 +211,7 @@ def _repeated(solved: tuple[Array, ...], theta: Array) -> tuple[Array, ...]:
     return tuple(np.repeat(one, len(theta), axis=0) for one in solved)
 
 
-class PosteriorInverse(TransformerMixin, Estimator):
+class PosteriorInverse(FrequencyInverse, Estimator):
     """Parameters of an FE model as the posterior mode given frequencies and mode shapes; equations (3)-(4) solved.
 
     Steps on the model, from its nominal state, minimise squared misfits in standard deviations of the noise plus those
@@ -348,11 +347,10 @@ class PosteriorInverse(TransformerMixin, Estimator):
         UserWarning
             If there are few records to learn from.
         """
-        if self.model is None:
-            raise ValueError("PosteriorInverse has no model; expected an FE model")
-        check_model(self.model)
-        tolerance(self.model, self.reduce)
-        model, names = self.model, list(self.model.parameter_names)
+        model = self._checked_model()
+        check_model(model)
+        tolerance(model, self.reduce)
+        names = list(model.parameter_names)
         self.shape_inputs_ = None if self.dofs is None else ShapeInputs.of(model, self.dofs, self.shape_noise)
         n_columns = model.n_modes if self.shape_inputs_ is None else self.shape_inputs_.n_columns
         found = validate_data(self, X).shape[1]
@@ -481,52 +479,6 @@ class PosteriorInverse(TransformerMixin, Estimator):
                 "outside-reduced-model",
             )
 
-    @overload
-    def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
-    @overload
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def inverse_transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """Frequencies and, with ``dofs``, shapes of given parameters, computed by the FE model.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_parameters)
-            Multipliers.
-
-        Returns
-        -------
-        ndarray or DataFrame of shape (n_samples, n_features)
-            Frequencies in Hz, followed by components of shapes with a root mean square of 1; NaN in rows with NaN. A
-            frame, whose columns must be the model's parameters, gives a frame on its own index.
-
-        Raises
-        ------
-        ValueError
-            If the parameters are not the model's.
-        """
-        check_is_fitted(self)
-        if self.shape_inputs_ is None:
-            values = evaluate(self.model, X, n_jobs=self.n_jobs)
-        else:
-            values = self.shape_inputs_.of_parameters(self.model, as_floats(X), self.n_jobs)
-        return frame_like(X, values, getattr(self, "feature_names_in_", self._column_names()))
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the parameters.
-
-        Parameters
-        ----------
-        input_features : array-like of str, optional
-            Ignored.
-
-        Returns
-        -------
-        ndarray of str
-            The model's parameter names.
-        """
-        check_is_fitted(self)
-        return np.array(self.parameter_names_, dtype=object)
-
     @property
     def n_runs_(self) -> int:
         """How often a program without derivatives was run."""
@@ -549,15 +501,7 @@ class PosteriorInverse(TransformerMixin, Estimator):
 
     def _read(self, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
-        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
-        inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=False)
-        frequencies = inputs[:, : self.model.n_modes]
-        if (frequencies <= 0).any():
-            row, column = np.argwhere(frequencies <= 0)[0]
-            raise ValueError(
-                f"row {row} of {column_names(X, 'f')[column]!r} is {frequencies[row, column]:g}; expected positive "
-                "frequencies in Hz, NaN where one is missing"
-            )
+        inputs = self._positive(X, self.model.n_modes)
         return inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
 
     def _check_different(self, frequencies: Array, names: Sequence[Any]) -> None:
@@ -571,11 +515,6 @@ class PosteriorInverse(TransformerMixin, Estimator):
                     f"{names[column]!r} has the values of {names[first[kind]]!r} in all {len(frequencies)} rows; "
                     "expected each mode once"
                 )
-
-    def _column_names(self) -> list[str]:
-        modes = [f"f{i + 1}" for i in range(self.model.n_modes)]
-        dofs = () if self.shape_inputs_ is None else self.shape_inputs_.dofs
-        return modes + [f"shape{i + 1}_dof{dof}" for i in range(self.model.n_modes) for dof in dofs]
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
