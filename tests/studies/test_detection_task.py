@@ -266,7 +266,7 @@ def test_halving_takes_a_parameter_as_its_resource(fem):
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"windowedalarm__window": ["1D", "7D"]}
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(weather-of-one-fold|not-predicted)")
+        warnings.filterwarnings("ignore", ".*(weather-of-one-fold|not-predicted|trend)")
         search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     with pytest.warns(UserWarning, match="search-refits"):
         best = task.refit(search)
