@@ -217,7 +217,7 @@ def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warn
     """The bridge as it was; it is not healthy, because nothing is known of it."""
     standing = dict(outcome.standing)
     if outcome.is_watched:
-        standing["state"] = "alarm" if standing["n_open"] else "not evaluated"
+        standing["state"] = "alarm" if standing["state"] == "alarm" else "not evaluated"
     return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
 
 

@@ -383,16 +383,17 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         str
-            "alarm" while a damage event is open, else "watch" while an event of that kind is, else "healthy" or "not
-            evaluated", as the newest record was.
+            "alarm" while an event of damage, or of "measurement or structure", is open, else "watch" while an event of
+            that kind is, else "healthy" or "not evaluated", as the newest record was.
         """
         check_is_fitted(self)
-        if self.status_.log.is_open(DAMAGE):
+        if self.status_.log.is_open(DAMAGE) or self.status_.has_set_aside:
             return "alarm"
         if self.status_.log.is_open(WATCH):
             return "watch"
         evaluations = self.status_.evaluations
-        return evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
+        newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
+        return "not evaluated" if newest == "alarm" else newest  # what was set aside has been acknowledged
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
         """The state at a time, and the facts behind it, for machines.

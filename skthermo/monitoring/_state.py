@@ -89,6 +89,12 @@ class MonitorState(SavesFrames):
         return [one.time for one in by_peak.values() if one.harmless]
 
     @property
+    def has_set_aside(self) -> bool:
+        """Whether an event of responses set aside is open that nobody has acknowledged as harmless."""
+        opened = [one.start for one in self.log.events if one.kind == MEASUREMENT and one.end is None]
+        return any(all(time < start for time in self.acknowledged) for start in opened)
+
+    @property
     def counts(self) -> dict[str, int]:
         n_outside = self.n_too_late + len(self.store.ahead)
         n_records, n_evaluated, n_left_out = (
@@ -176,7 +182,8 @@ class MonitorState(SavesFrames):
         for row in range(len(known), len(raw)):
             reasons[row] = "; ".join(filter(None, [reasons[row], *(text for text, at in remarks.items() if at[row])]))
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
-        answers = _answers(raw.index, index, active.threshold, (modes, effects), reasons, numbers, is_held)
+        shown = np.where((modes == "") & seen.is_held, seen.held, modes)
+        answers = _answers(raw.index, index, active.threshold, (shown, effects), reasons, numbers, is_held)
         state = replace(
             self,
             checkpoints=tuple(_since([*self.checkpoints[:place], *points], store.last - store.max_delay)),
@@ -395,7 +402,8 @@ def _answers(
     is_held: NDArray[np.bool_],
 ) -> pd.DataFrame:
     has_index, number = ~np.isnan(index), numbers[DAMAGE]
-    is_alarm = has_index & (number > 0)
+    has_changed = is_held & (numbers.get(MEASUREMENT, np.zeros(len(index))) > 0)
+    is_alarm = (has_index & (number > 0)) | has_changed
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
     for kind in (STIFFENING, MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))

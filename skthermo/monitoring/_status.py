@@ -28,7 +28,8 @@ class MonitorStatus:
     Parameters
     ----------
     state : {"healthy", "watch", "alarm", "not evaluated"}
-        "alarm" while a damage event is open, "watch" while the index is raised and none is open. Nothing is healthy if
+        "alarm" while an event of damage, or of "measurement or structure", is open, "watch" while the index is raised
+        and none is open. Nothing is healthy if
         the newest record is too old, of a time to come, or was not evaluated.
     reason : str
         Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.

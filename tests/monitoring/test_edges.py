@@ -117,12 +117,15 @@ def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
 def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back():
     monitor = fitted("2D")
     answers = monitor.update(changed({"f3": 0.6}, 10))
-    assert set(answers["state"]) == {"not evaluated"}
+    assert answers["state"].tolist() == 2 * ["not evaluated"] + (len(answers) - 2) * ["alarm"]
+    assert answers["modes"].iloc[2:].eq("f3").all()
     assert answers["reason"].str.contains("f3").all()
+    assert monitor.state() == "alarm"
     event = monitor.events_.loc[1]
     assert (event["kind"], event["modes"], event["peak"]) == ("measurement or structure", "f3", 1.0)
     other = pickle.loads(pickle.dumps(monitor))
     monitor.acknowledge(1, harmless=True, note="loose cable")
+    assert monitor.state() != "alarm"
     parts = [monitor.update(changed({"f3": 0.6}, 1, start=day)) for day in range(10, 14)]
     assert set(pd.concat(parts)["state"]) == {"healthy"}
     assert pd.concat(parts)["reason"].str.contains("f3 is left out").all()

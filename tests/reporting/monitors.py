@@ -105,7 +105,7 @@ class FakeMonitor:
     def state(self):
         opened = set(self.events_.loc[self.events_["end"].isna(), "kind"])
         newest = "watch" if "watch" in opened else str(self.evaluations_["state"].iloc[-1])
-        return "alarm" if "damage" in opened else newest
+        return "alarm" if opened & {"damage", "measurement or structure"} else newest
 
     def transitions(self, after=0):
         return []

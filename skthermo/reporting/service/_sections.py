@@ -177,7 +177,7 @@ def _what_to_do(standing: Standing) -> list[str]:
         steps.append("Look at the raw records and at the weather, and wait for the next days.")
     if standing.state == "attention":
         steps.append("Ask an engineer to look at the parts that have lost stiffness.")
-    if standing.state == "alarm":
+    if len(standing.opened("damage")):
         parts = listed(list(dict.fromkeys(filter(None, standing.opened("damage")["groups"]))))
         first = parts or "what the modes named above depend on"
         steps.append(
@@ -186,8 +186,8 @@ def _what_to_do(standing: Standing) -> list[str]:
         )
     if len(standing.opened("measurement or structure")):
         steps.append(
-            "Find out whether the sensors or the structure have changed where a response was set aside. If it is the "
-            "sensors, acknowledge the event as harmless: the other responses are evaluated from then on."
+            "The sensor or the structure has changed where a response was set aside: look at both. If it is the "
+            "sensor, acknowledge the event as harmless: the other responses are evaluated from then on."
         )
     if standing.status.is_late or standing.status.is_ahead or standing.error or not standing.has_records:
         steps.append("Check the data logger, its clock, and the job that hands records to the monitor.")

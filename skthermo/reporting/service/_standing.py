@@ -12,6 +12,7 @@ import pandas as pd
 from skthermo._tables.frames import as_moment
 from skthermo._tables.text import SPACE, counted, counted_number, duration_text, listed, percent
 from skthermo.monitoring import Monitor, MonitorStatus
+from skthermo.monitoring._events import ALARMS
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
@@ -81,9 +82,8 @@ class Standing:
 
     def headline(self) -> str:
         if self.state == "alarm":
-            opened = self.opened("damage")
-            since = opened["start"].min() if len(opened) else self.last
-            return f"Alarm since {moment(since)}"
+            starts = [self.opened(kind)["start"].min() for kind in ALARMS if len(self.opened(kind))]
+            return f"Alarm since {moment(min(starts, default=self.last))}"
         if self.state == "watch":
             return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
         if self.state == "healthy":
@@ -99,6 +99,8 @@ class Standing:
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
             )
+            if not len(self.opened("damage")) and len(self.opened("measurement or structure")):
+                text = "A response moved too far to be evaluated. The sensor or the structure has changed: look at both"
             if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
             return f"{text} {self.error}." if self.error else text
