@@ -100,7 +100,7 @@ class Standing:
                 "an engineer should look at the structure and at the records."
             )
             if not len(self.opened("damage")) and len(self.opened("measurement or structure")):
-                text = "A response moved too far to be evaluated. The sensor or the structure has changed: look at both"
+                text = "A response moved too far to be evaluated. Its sensor or the structure has changed."
             if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
             return f"{text} {self.error}." if self.error else text
