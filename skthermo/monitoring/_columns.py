@@ -1,23 +1,21 @@
-"""Which columns of a baseline are temperatures and which responses, in which units, and values that none can have."""
+"""Which columns of a baseline are temperatures and which responses, in which units, and which can be used."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import make_pipeline
 
-from skthermo._tables.arrays import robust_deviation
 from skthermo._tables.frames import positions_of
 from skthermo._validation import check_is_fitted
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
-from skthermo.preprocessing.checks import gross_errors
-
-TIMES_DEVIATION, TIMES_LEVEL = 1000, 10  # robust deviations and medians, from which a response is no measurement
+from skthermo.preprocessing.checks import SetAside, set_aside
 
 
 @dataclass(frozen=True)
@@ -95,32 +93,50 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     return wanted
 
 
-def refuse_meaningless(
-    baseline: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], exclude: Collection[str] = ()
-) -> None:
-    """Raise an error that lists all that makes records useless for training: gross errors, responses of another size.
+@dataclass(frozen=True)
+class UsableBaseline:
+    """What can be used of a baseline, by which detector and columns; ``given`` are the columns that came."""
 
-    ``exclude`` are kinds of gross errors that do no harm.
-    """
-    F, T = baseline[targets], baseline.drop(columns=targets)
-    unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
-    wrong = []
-    try:
-        gross_errors(T if len(T.columns) else None, F, unit=unit).refuse_meaningless(exclude=exclude)
-    except ValueError as error:
-        wrong.append(str(error))
-    values = F.to_numpy()
-    if not len(values):
-        return
-    level, deviation = np.nanmedian(values, axis=0), robust_deviation(values)
-    limit = np.where(deviation > 0, np.maximum(TIMES_DEVIATION * deviation, TIMES_LEVEL * np.abs(level)), np.inf)
-    far = np.abs(values - level) > limit
-    for column in np.flatnonzero(far.any(axis=0)):
-        rows = np.flatnonzero(far[:, column])
-        wrong.append(
-            f"{targets[column]!r} is {values[rows[0], column]:.4g} at {F.index[rows[0]]}"
-            + (f", and as far off in {len(rows) - 1} other records" if len(rows) > 1 else "")
-            + f"; expected values near its median {level[column]:.4g}, and NaN where a value is wrong"
+    records: pd.DataFrame
+    detector: BaseEstimator
+    columns: Columns
+    given: list[Any]
+    found: SetAside
+
+    @classmethod
+    def of(cls, monitor: Any, baseline: pd.DataFrame) -> UsableBaseline:
+        """Without values that cannot be, and without columns that are left out."""
+        given = list(baseline.columns)
+        detector = default_detector(monitor, given) if monitor.detector is None else clone(monitor.detector)
+        columns = Columns.of(monitor, detector, given)
+        records, found = without_what_cannot_be(baseline, columns.targets, columns.units)
+        if not found.left_out:
+            return cls(records, detector, columns, given, found)
+        records = records.drop(columns=list(found.left_out))
+        if monitor.fem is not None:
+            raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
+        wanted = SimpleNamespace(
+            fem=None,
+            reference=[name for name in columns.reference if name in records],
+            targets=[name for name in columns.targets if name in records],
+            units={name: unit for name, unit in columns.units.items() if name in records},
         )
-    if wrong:
-        raise ValueError("; ".join(wrong))
+        if monitor.detector is None:
+            detector = default_detector(wanted, list(records.columns))
+        for part in detector.get_params(deep=True).values() if monitor.detector is not None else ():
+            if isinstance(part, TemperatureCompensator):
+                part.set_params(targets=wanted.targets)
+        if isinstance(detector, TemperatureCompensator):
+            detector.set_params(targets=wanted.targets)
+        return cls(records, detector, Columns.of(wanted, detector, list(records.columns)), given, found)
+
+
+def without_what_cannot_be(
+    records: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], exclude: Collection[str] = ()
+) -> tuple[pd.DataFrame, SetAside]:
+    """Records with NaN where a value cannot be, and what was set aside; ``exclude`` are kinds that do no harm."""
+    T, F = records.drop(columns=targets), records[targets]
+    unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
+    found = set_aside(T if len(T.columns) else None, F, unit=unit, exclude=exclude)
+    tables = [table for table in (found.temperatures, found.frequencies) if table is not None]
+    return pd.concat(tables, axis=1)[list(records.columns)], found

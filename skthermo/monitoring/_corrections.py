@@ -109,7 +109,7 @@ class Corrections:
             T_seen, F_seen = self._masked(state, T, F)
             drift = self.drift.advance(drift, T_seen, F_seen.where(F_seen > 0))
         if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
-            seen = raw if day is raw else raw.mask(day.isna() & raw.isin(MARKERS))
+            seen = raw if day is raw else raw.mask(day.isna() & (raw.isin(MARKERS) | np.isinf(raw)))
             sensors = self.sensors.advance(sensors, seen[self.temperatures], seen[self.targets])
         return CorrectionState(sensors, drift)
 

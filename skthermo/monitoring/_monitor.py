@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._estimators.warnings import warn_user
+from skthermo._estimators.warnings import warn_each, warn_user
 from skthermo._tables.arrays import check_flag, is_real
 from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp
 from skthermo._tables.saved_frames import SavesFrames
@@ -28,9 +28,9 @@ from skthermo._validation import (
     seed_parts,
     seeded,
 )
-from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
+from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._columns import Columns, default_detector, refuse_meaningless
+from skthermo.monitoring._columns import UsableBaseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
@@ -266,8 +266,16 @@ class Monitor(SavesFrames, Estimator):
 
     @property
     def faults_(self) -> pd.DataFrame:
-        """Sensors that have failed."""
-        return self.active_.corrections.faults(self.status_.corrections)
+        """Sensors that have failed, those of columns that are left out first."""
+        found = self.active_.corrections.faults(self.status_.corrections)
+        if not self.left_out_:
+            return found
+        first, last = self.baseline_.index[[0, -1]]
+        out = pd.DataFrame(
+            [(name, "left out", first, last, pd.NaT, reason) for name, reason in self.left_out_.items()],
+            columns=["column", "kind", "since", "detected", "until", "detail"],
+        )
+        return pd.concat([out, found], ignore_index=True) if len(found) else out
 
     @property
     def drift_(self) -> pd.DataFrame | None:
@@ -322,15 +330,15 @@ class Monitor(SavesFrames, Estimator):
             even large changes of a response.
         """
         max_delay, max_jump, retention = self._checked_times()
-        baseline = _read_baseline(X)
-        detector = default_detector(self, list(baseline.columns)) if self.detector is None else clone(self.detector)
+        usable = UsableBaseline.of(self, _read_baseline(X))
+        warn_each(usable.found.warnings())
+        baseline, detector, columns = usable.records, usable.detector, usable.columns
         seed_parts(detector, seeded(self.random_state))
-        columns = Columns.of(self, detector, list(baseline.columns))
         self.targets_, self.units_ = columns.targets, columns.units
+        self.columns_, self.left_out_ = usable.given, usable.found.left_out
+        self.set_aside_ = usable.found.table
         corrections = self._corrections(baseline, columns.reference, self.fem)
-        trained = _without_markers(baseline, corrections)
-        refuse_meaningless(trained, self.targets_, self.units_)
-        trained = trained if len(columns.inputs) == trained.shape[1] else trained[columns.inputs]
+        trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
         active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)
         active.check()
         store = RecordStore.of(baseline, max_delay, max_jump, retention)
@@ -370,7 +378,7 @@ class Monitor(SavesFrames, Estimator):
             If new records are not evaluated: how many, and why.
         """
         check_is_fitted(self)
-        records = read_records(new, self.baseline_.columns, self.baseline_.index.tz)
+        records = self._read(new)
         intake = self.status_.store.sort_in(records, check_flag(confirm, "confirm"))
         state, answers = self.status_.taken_in(self.active_, intake)
         _warn_of_not_evaluated(answers)
@@ -615,9 +623,9 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         if records is not None:
-            records = read_records(records, self.baseline_.columns, self.baseline_.index.tz)
-            records = self.active_.corrections.cleaned(records)
-            refuse_meaningless(records, self.targets_, self.units_, exclude=OF_TRAINING)
+            records = self.active_.corrections.cleaned(self._read(records))
+            records, found = without_what_cannot_be(records, self.targets_, self.units_, OF_TRAINING)
+            warn_each(found.warnings())
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
@@ -657,6 +665,10 @@ class Monitor(SavesFrames, Estimator):
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
+
+    def _read(self, records: pd.DataFrame) -> pd.DataFrame:
+        """Records in the columns of `fit`, without those that are left out."""
+        return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
     def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta | None, pd.Timedelta]:
         """``max_delay``, ``max_jump`` and ``retention``; an error for parameters that contradict each other."""
@@ -757,20 +769,6 @@ def _read_baseline(X: pd.DataFrame) -> pd.DataFrame:
         again = baseline.index[baseline.index.duplicated()]
         raise ValueError(f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once")
     return baseline
-
-
-def _without_markers(baseline: pd.DataFrame, corrections: Corrections) -> pd.DataFrame:
-    """The baseline without numbers that stand for missing ones, of which it warns."""
-    cleaned = corrections.cleaned(baseline)
-    n_markers = int((cleaned.isna() & baseline.notna()).to_numpy().sum())
-    if n_markers:
-        warn_user(
-            f"{n_markers} of {baseline.size} values of the baseline are codes for missing values, such as -999. They "
-            "count as missing. Put NaN there",
-            RecordsWarning,
-            "placeholders",
-        )
-    return cleaned
 
 
 def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:

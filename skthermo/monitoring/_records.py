@@ -51,13 +51,6 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
         X = X.loc[:, list(columns)]
     refuse_no_table(X, "the table of records", least_rows=0)
     values = as_floats(with_nan(X))
-    infinite = np.argwhere(np.isinf(values))
-    if len(infinite):
-        row, column = infinite[0]
-        raise ValueError(
-            f"{len(infinite)} of {values.size} values are infinite, the first at {X.index[row]} in column "
-            f"{X.columns[column]!r}; expected numbers, and NaN where a value is missing"
-        )
     stamps = X.index.as_unit("ns")
     stamps.freq = None  # that of one batch is not that of its parts
     frame = pd.DataFrame(values, stamps, X.columns)

@@ -7,7 +7,14 @@ from skthermo.preprocessing._lags import LagFeatures
 from skthermo.preprocessing._memory import ExponentialMeans, MemoryFindings, find_memory
 from skthermo.preprocessing._mode_tracker import ModeTracker
 from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.preprocessing.checks import RecordFindings, check_records, gross_errors, residual_trend
+from skthermo.preprocessing.checks import (
+    RecordFindings,
+    SetAside,
+    check_records,
+    gross_errors,
+    residual_trend,
+    set_aside,
+)
 
 __all__ = [
     "BiasAligner",
@@ -21,8 +28,10 @@ __all__ = [
     "ModeTracker",
     "RecordFindings",
     "SensorMeans",
+    "SetAside",
     "check_records",
     "find_memory",
     "gross_errors",
     "residual_trend",
+    "set_aside",
 ]

@@ -346,19 +346,46 @@ def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_mar
     assert list(faults.index) == [name]
 
 
+@pytest.mark.filterwarnings("ignore:.*filled-temperatures")
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
-def test_a_baseline_with_values_that_are_no_measurements_is_one_error_that_names_them_all(scale):
+def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(scale):
     wrong = truss()[:N_BASELINE].copy()
     wrong[MODES] = scale * (wrong[MODES] - (0 if scale == 1 else wrong[MODES].mean()))  # also of responses about zero
     places = {"T1": (100, 1e6), "f2": (200, 1e6), "f5": (300, -1e9)}
     for name, (row, value) in places.items():
         wrong.iloc[row, wrong.columns.get_loc(name)] = value
+    missing = wrong.copy()
+    for name, (row, _) in places.items():
+        missing.iloc[row, missing.columns.get_loc(name)] = np.nan
     for last in (detector(MODES), MahalanobisDetector()):
-        with pytest.raises(ValueError, match="expected") as caught:
-            Monitor(last, targets=MODES).fit(wrong)
-        for name, (row, _) in places.items():
-            assert f"{name!r} is" in str(caught.value)
-            assert f"{wrong.index[row]:%Y-%m-%d}" in str(caught.value)
+        with pytest.warns(UserWarning, match="set-aside") as caught:
+            monitor = Monitor(last, targets=MODES, random_state=0).fit(wrong)
+        (said,) = (str(one.message) for one in caught if "set-aside" in str(one.message))
+        assert said.startswith("3 values")
+        assert monitor.set_aside_[["column", "n_rows", "from"]].to_numpy().tolist() == [
+            [name, 1, wrong.index[row]] for name, (row, _) in places.items()
+        ]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            expected = Monitor(last, targets=MODES, random_state=0).fit(missing)
+        assert monitor.threshold_ == expected.threshold_
+
+
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records|few-excursions)")
+def test_a_column_that_says_nothing_is_left_out_and_named():
+    records = truss()
+    baseline = records[:N_BASELINE].assign(f2=records["f2"].iloc[0], T1=np.where(np.arange(N_BASELINE) % 4, 484.6, 5))
+    with pytest.warns(UserWarning, match="left-out"):
+        monitor = Monitor(detector(MODES), targets=MODES, random_state=0).fit(baseline)
+    assert list(monitor.left_out_) == ["T1", "f2"]
+    assert monitor.faults_["column"].tolist() == ["T1", "f2"]
+    assert {one["column"] for one in monitor.status().faults} == {"T1", "f2"}
+    assert monitor.targets_ == [name for name in MODES if name != "f2"]
+    answers = monitor.update(records[N_BASELINE : N_BASELINE + 40].assign(f2=np.inf))
+    assert (answers["state"] == "healthy").all()
+    others = [name for name in records if name not in ("T1", "f2")]
+    alone = Monitor(detector([name for name in MODES if name != "f2"]), random_state=0).fit(baseline[others])
+    pd.testing.assert_frame_equal(answers, alone.update(records[N_BASELINE : N_BASELINE + 40][others]))
 
 
 def test_a_baseline_in_kelvin_is_refused():

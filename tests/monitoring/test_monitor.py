@@ -319,10 +319,6 @@ def with_text(records):
     return records.astype({"f1": object}).assign(f1="5 Hz")
 
 
-def infinite(records):
-    return records.assign(T2=np.inf)
-
-
 def without_stamps(records):
     return records.reset_index(drop=True)
 
@@ -336,7 +332,6 @@ def renamed(records):
     [
         (renamed, r"lack the columns \['T2'\] of the baseline, and have \['T9'\]"),
         (without_stamps, "expected a DatetimeIndex"),
-        (infinite, "5 of 30 values are infinite, the first at .* in column 'T2'"),
         (with_text, "5 Hz"),
         (shifted_zone, "time zone UTC, the baseline None"),
         (pd.DataFrame.to_numpy, "of type ndarray; expected a frame"),

@@ -98,8 +98,8 @@ class TestValues:
 
     def test_values_far_from_others_are_named_where_no_weather_is_given(self):
         far = changed(F, [17], 2, 250.0)
-        assert only(gross_errors(None, far))[:3] == ("implausible-values", "f3", 1)
-        assert kinds(check_records(T, far)) == {"frequency-outliers"}
+        assert only(gross_errors(None, far))[:3] == ("another-level", "f3", 1)
+        assert kinds(check_records(T, far)) == {"another-level"}
 
 
 class TestUnits:
@@ -196,7 +196,7 @@ class TestTables:
 
     def test_an_array_beside_a_frame_has_its_times(self):
         found = check_records(T[::-1], changed(F, [10], 0, 30.0).to_numpy()[::-1])
-        assert kinds(found) == {"unsorted-stamps", "frequency-outliers"}
+        assert kinds(found) == {"unsorted-stamps", "another-level"}
         assert np.argwhere(found.outliers.to_numpy()).tolist() == [[354, 0]]
         assert found.table.iloc[1]["from"] == T.index[10]
 

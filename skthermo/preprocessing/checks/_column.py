@@ -15,8 +15,10 @@ from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._signs import equal_runs
 
 LOGGED = (*MARKERS, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
+APART, GAP = 8.0, 5.0  # standard deviations of the narrowest half: from its middle, and between two levels
 FEW_LEVELS, MANY_VALUES = 3, 5  # different values that repeat, far from so many others
 FEW_VALUES, LEAST_KNOWN = 4, 50  # different values of a column of so many
+HALF = 1.349  # standard deviations of a normal distribution in its narrowest half
 AMONG = np.ones(3)  # rows, of which the middle one is as doubtful as the two others
 
 
@@ -68,6 +70,31 @@ class Column:
             for ends, gap in ((slice(None, number), gaps[number - 1]), (slice(-number, None), gaps[-number])):
                 isolated[ends] |= gap and repeated[ends].all()
         return levels[isolated]
+
+    def levels_apart(self) -> Array:
+        """Values at another level than the others: beyond a gap of half of all that the column spans.
+
+        The narrowest half of the values says how far they scatter. Where it does not, or few are known, none are.
+        """
+        known, half = self.ordered, len(self.ordered) // 2
+        apart: list[Array] = []
+        if len(known) < LEAST_KNOWN:
+            return known[:0]
+        widths = known[half:] - known[: len(known) - half]
+        first = int(widths.argmin())
+        middle, scatter = known[first : first + half + 1].mean(), widths[first] / HALF
+        levels = self.levels
+        while scatter > 0 and len(levels) > 1:
+            gaps = np.diff(levels)
+            place = int(gaps.argmax())
+            side = levels[: place + 1] if levels[place] < middle else levels[place + 1 :]
+            if gaps[place] < max(GAP * scatter, (levels[-1] - levels[0]) / 2) or (
+                np.abs(side - middle).min() < APART * scatter
+            ):
+                break
+            apart.append(side)
+            levels = levels[~np.isin(levels, side)]
+        return np.sort(np.concatenate([known[:0], *apart]))
 
     def is_poor(self) -> bool:
         """Whether the column is empty or constant, or says little because it has few values; and say so."""

@@ -236,10 +236,13 @@ def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
         if column.is_poor():
             continue
         middle, width = column.quantile(0.5), column.quantile(0.9) - column.quantile(0.1)
-        isolated = column.isolated_levels(BEYOND * width)
+        isolated, apart = column.isolated_levels(BEYOND * width), column.levels_apart()
         if in_hertz:
-            isolated = isolated[(isolated > OTHER_MODE * middle) | (isolated < middle / OTHER_MODE)]
+            isolated, apart = (
+                one[(one > OTHER_MODE * middle) | (one < middle / OTHER_MODE)] for one in (isolated, apart)
+            )
         column.put_aside("isolated-level", isolated if width > 0 else isolated[:0], unit)
+        column.put_aside("another-level", apart[~np.isin(apart, isolated)], unit)
         deviation = QUARTILES * (column.quantile(0.75) - column.quantile(0.25))
         far = np.abs(column.levels - column.quantile(0.5)) > IMPLAUSIBLE * deviation
         if deviation > 0 and not beside_weather:

@@ -39,6 +39,8 @@ WARNINGS = {
     "placeholders": "values stand for missing ones: {}. They would be learned as if they were measured. Put NaN there",
     "isolated-level": "values far from all others repeat exactly: {}. They may stand for missing values, and would be "
     "learned as if they were measured. Put NaN there if they do",
+    "another-level": "values are far from all others: {}. They widen every spread and so hide damage. Put NaN where a "
+    "value is wrong",
     "implausible-values": "values are implausible: {}. They widen every spread and so hide damage. Put NaN where a "
     "value is wrong",
     "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "
@@ -95,6 +97,17 @@ ARE_MEANINGLESS = frozenset(
     }
 )
 """Kinds with which no result of a fit means anything."""
+
+SET_ASIDE = frozenset(
+    {
+        *("infinite-values", "placeholders", "isolated-level", "another-level", "implausible-values", "not-positive"),
+        *("stuck-sensor", "stuck-mode"),
+    }
+)
+"""Kinds of values that cannot be, which count as missing."""
+
+LEFT_OUT = frozenset({"missing-column", "constant"})
+"""Kinds of columns that say nothing."""
 
 
 class Finding(NamedTuple):

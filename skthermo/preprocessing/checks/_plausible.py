@@ -51,7 +51,7 @@ class Plausible:
     def implausible(self, values: Array) -> NDArray[np.bool_]:
         """Which values no sensor measures."""
         is_marker = np.isin(values, MARKERS) & ~((values >= self.least) & (values <= self.most))
-        return is_marker | (values < self.lowest) | (values > self.highest)
+        return is_marker | np.isinf(values) | (values < self.lowest) | (values > self.highest)
 
 
 def _range(values: Array) -> tuple[Array, Array]:

@@ -86,7 +86,7 @@ class RecordFindings(SavesFrames):
         """
         for kind, rows in self.table.groupby("what", sort=False):
             if kind not in UNWARNED.union(exclude):
-                yield RecordsWarning(WARNINGS[kind].format(_listed(rows["detail"])), kind)
+                yield RecordsWarning(WARNINGS[kind].format(listed_details(rows["detail"])), kind)
 
     def refuse_meaningless(self, *, exclude: Collection[str] = ()) -> None:
         """Raise an error that lists everything with which results of a fit would be meaningless.
@@ -104,7 +104,7 @@ class RecordFindings(SavesFrames):
         severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(exclude))]
         if len(severe):
             kinds = severe.groupby("what", sort=False)
-            texts = [WARNINGS[kind].format(_listed(rows["detail"])) for kind, rows in kinds]
+            texts = [WARNINGS[kind].format(listed_details(rows["detail"])) for kind, rows in kinds]
             raise ValueError(". ".join(text[0].upper() + text[1:] if n else text for n, text in enumerate(texts)))
 
 
@@ -114,7 +114,7 @@ def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _listed(details: pd.Series) -> str:
+def listed_details(details: pd.Series) -> str:
     """Details of findings one after the other, not more than a reader can take in."""
     rest = len(details) - MOST_NAMED
     return "; ".join([*details[:MOST_NAMED], *([f"and {rest} more"] if rest > 0 else [])])

@@ -62,6 +62,7 @@ def _put_no_temperatures_aside(column: Column) -> None:
         column.put_aside("kelvin", kelvin)
         column.put_aside("placeholders", others)
     column.put_aside("isolated-level", column.isolated_levels(JUMP))
+    column.put_aside("another-level", column.levels_apart())
 
 
 def _stand_apart(levels: Array, some: tuple[float, ...]) -> NDArray[np.bool_]:

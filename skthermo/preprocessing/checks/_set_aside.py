@@ -1,0 +1,175 @@
+"""Values that cannot be count as missing, and columns of which most are such, or that say nothing, are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._tables.frames import Table, frame_like
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing.checks._gross import CleanedRecords
+from skthermo.preprocessing.checks._kinds import LEFT_OUT, MEANINGLESS, SET_ASIDE, Finding
+from skthermo.preprocessing.checks._reading import Reading
+from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table, listed_details
+from skthermo.preprocessing.checks._signs import stuck_runs
+
+MOST, MANY = 0.5, 0.2
+"""Shares of the values of a column, with more than which set aside the rest is not trusted: of any kind, and of values
+at another level, of which it is not certain which level is right."""
+
+
+@dataclass(frozen=True)
+class SetAside(SavesFrames):
+    """Tables of records without values that cannot be, and what has become of them.
+
+    Parameters
+    ----------
+    temperatures, frequencies : array-like or DataFrame, or None
+        The tables as they were given, NaN where a value was set aside.
+    table : DataFrame
+        A row for each finding, as in `RecordFindings`: which values count as missing, and why.
+    left_out : dict
+        Columns that cannot be used at all, each with the reason.
+    """
+
+    temperatures: Table | None
+    frequencies: Table | None
+    table: pd.DataFrame
+    left_out: dict[Hashable, str]
+
+    def warnings(self) -> Iterator[RecordsWarning]:
+        """One warning that counts and names the values, and one that names the columns that are left out.
+
+        Yields
+        ------
+        RecordsWarning
+            Of kind "set-aside" or "left-out".
+        """
+        values = self.table[self.table["what"].isin(SET_ASIDE) & ~self.table["column"].isin(list(self.left_out))]
+        if len(values):
+            yield RecordsWarning(
+                f"{values['n_rows'].sum():,} values cannot be measurements, and count as missing: "
+                f"{listed_details(values['detail'])}. Repair these sensors, or put NaN there",
+                "set-aside",
+            )
+        if self.left_out:
+            yield RecordsWarning(
+                f"columns are left out, and nothing is said of them: {'; '.join(self.left_out.values())}. Repair these "
+                "sensors, or drop the columns",
+                "left-out",
+            )
+
+
+def set_aside(
+    temperatures: Any = None,
+    frequencies: Any = None,
+    *,
+    unit: str = "Hz",
+    model: Any = None,
+    exclude: Collection[str] = (),
+) -> SetAside:
+    """Records without values that cannot be.
+
+    Infinite values, numbers that loggers write for a missing one, frequencies that are not positive, values at another
+    level far from all others, and those of a sensor that is stuck become NaN. A column is left out if it has no value,
+    a single one, if more than half of its values are set aside, or more than a fifth as another level.
+
+    Parameters
+    ----------
+    temperatures : array-like or DataFrame of shape (n_samples, n_sensors), optional
+        In degrees Celsius; NaN is allowed.
+    frequencies : array-like or DataFrame of shape (n_samples, n_modes), optional
+        Or responses of another kind; NaN is allowed.
+    unit : str, default="Hz"
+        Unit of the second table. Values in Hz have to be positive.
+    model : FEModel, optional
+        To whose nominal frequencies those in Hz are compared.
+    exclude : collection of str, default=()
+        Kinds of findings that do no harm to what is done with the records.
+
+    Returns
+    -------
+    SetAside
+        The tables, what was set aside, and which columns are left out.
+
+    Raises
+    ------
+    ValueError
+        If what is left is meaningless as a whole: tables of other units, of different rows, or exchanged; text; no
+        record; or no column of a table that can be used.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.preprocessing import set_aside
+    >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.loc["2025-03", "T1"] = 484.667
+    >>> found = set_aside(year.temperatures, year.frequencies)
+    >>> found.table[["what", "column", "n_rows"]]
+               what column  n_rows
+    0  placeholders     T1      31
+    >>> int(found.temperatures["T1"].isna().sum())
+    31
+    """
+    tables = {"temperatures": temperatures, "frequencies": frequencies}
+    given = {what: table for what, table in tables.items() if table is not None}
+    records = CleanedRecords.of(given, unit=unit, model=model)
+    findings = findings_table(records.findings)
+    harmless = SET_ASIDE | LEFT_OUT | set(exclude)
+    severe = findings[(findings["severity"] == MEANINGLESS) & ~findings["what"].isin(harmless)]
+    if len(severe):
+        RecordFindings(severe, records.n_rows).refuse_meaningless()
+    left_out: dict[Hashable, str] = {}
+    for reading in records.readings:
+        _set_runs_aside(reading)
+        own = dict(_left_out(reading, exclude))
+        if own and len(own) == len(reading.columns):
+            raise ValueError(
+                f"no column of the {reading.what} can be used: {'; '.join(own.values())}; expected measurements"
+            )
+        left_out |= own
+    found = [finding for reading in records.readings for finding in reading.findings]
+    cleaned = {one.what: _as_given(one, given[one.what]) for one in records.readings}
+    return SetAside(
+        cleaned.get("temperatures"),
+        cleaned.get("frequencies"),
+        findings_table(one for one in found if one.what in SET_ASIDE | LEFT_OUT),
+        left_out,
+    )
+
+
+def _set_runs_aside(reading: Reading) -> None:
+    what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
+    for place, name in enumerate(reading.columns):
+        column = reading.values[:, place]
+        for rows in stuck_runs(column):
+            if rows[0] > 0:  # a lag of another column begins with copies of its first value
+                reading.found(what, name, rows, f"{name!r} is {column[rows[0]]:.6g} in {reading.share(rows)}")
+                column[rows] = np.nan
+
+
+def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hashable, str]]:
+    """Columns that have no value or one, and those of which most values were set aside, each with a reason."""
+    known = np.count_nonzero(reading.were_known, axis=0)
+    set_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
+    for place, name in enumerate(reading.columns):
+        own: list[Finding] = [found for found in reading.findings if found.column == name]
+        elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
+        if set_aside[place] > MOST * known[place] or elsewhere > MANY * known[place]:
+            yield name, "; ".join(found.detail for found in own if found.what in SET_ASIDE)
+        else:
+            useless = [found.detail for found in own if found.what in LEFT_OUT and found.what not in exclude]
+            if useless:
+                yield name, useless[0]
+
+
+def _as_given(reading: Reading, table: Any) -> Table:
+    """The cleaned values in the rows of a table."""
+    values = np.empty_like(reading.values)
+    values[reading.order] = reading.values
+    return frame_like(table, values, reading.columns)
