@@ -88,9 +88,55 @@ def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, window, t
     answers = monitor.update(changed(factors, n_days, start))[SETTLED:]
     assert set(answers["state"]) <= {"alarm", "not evaluated"}
     assert answers.loc[answers["state"] == "not evaluated", "reason"].ne("").all()
-    assert monitor.state() != "healthy"
+    assert monitor.state() == "alarm"
     opened = monitor.events_[monitor.events_["end"].isna()]
     assert set(opened["kind"]) & KINDS
+
+
+@cache
+def about_zero():
+    """The truss's records as responses of any sign, about 0 mm."""
+    records = truss().copy()
+    records[MODES] = 3 * (records[MODES] / records[MODES].mean() - 1)
+    return records
+
+
+@cache
+def saved_about_zero(options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        monitor = Monitor(targets=MODES, units="mm", **dict(options)).fit(about_zero()[:N_BASELINE])
+    return pickle.dumps(monitor)
+
+
+@pytest.mark.one_case
+@pytest.mark.parametrize("options", [(), (("sensors", False),)], ids=["with sensors", "without"])
+@settings(
+    max_examples=18, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+)
+@given(
+    shifts=st.dictionaries(
+        st.sampled_from(MODES),
+        st.builds(
+            lambda sign, size: sign * float(np.exp(size)), st.sampled_from([-1, 1]), st.floats(0.5, np.log(1000))
+        ),
+        min_size=1,
+    ),
+    start=st.integers(0, 300),
+    n_days=st.integers(4, 20),
+)
+def test_responses_of_any_sign_that_move_by_up_to_a_thousand_times_their_range_are_in_alarm(
+    options, shifts, start, n_days
+):
+    monitor, records = pickle.loads(saved_about_zero(options)), about_zero()
+    begin, baseline = N_BASELINE + PER_DAY * start, records[:N_BASELINE]
+    usual = baseline.max() - baseline.min()
+    new = records[begin : begin + PER_DAY * n_days].copy()
+    for name, shift in shifts.items():
+        new[name] += shift * usual[name]
+    answers = monitor.update(new)[SETTLED:]
+    assert set(answers["state"]) <= {"alarm", "not evaluated"}
+    assert monitor.state() == "alarm"
 
 
 @pytest.mark.one_case
@@ -346,7 +392,7 @@ def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_mar
     assert list(faults.index) == [name]
 
 
-@pytest.mark.filterwarnings("ignore:.*filled-temperatures")
+@pytest.mark.filterwarnings("ignore:.*(filled-temperatures|undetected-changes)")
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
 def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(scale):
     wrong = truss()[:N_BASELINE].copy()
