@@ -13,13 +13,13 @@ from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
 from skthermo._estimators.warnings import explain_rows, explained_rows, warn_each, warn_user
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import Table, frame_like, row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.detection._origin import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.preprocessing import gross_errors
+from skthermo.preprocessing.checks import measurements
 
 OF_ORDER = {"repeated-stamps", "unsorted-stamps"}  # which only what looks at earlier records depends on
 
@@ -74,11 +74,11 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     def __init__(self, contamination: float = 0.02):
         self.contamination = contamination
 
-    def _check_baseline(self, F: Table) -> None:
-        """Hook: refuse gross errors of a baseline, and warn of what is doubtful."""
-        findings = gross_errors(frequencies=F, unit="")
-        findings.refuse_meaningless()
-        warn_each(findings.warnings(exclude=OF_ORDER))
+    def _measurements(self, F: Table) -> Array:
+        """Hook: a baseline without values that cannot be, with warnings; what is meaningless is refused."""
+        found = measurements(frequencies=F, unit="")
+        warn_each(found.others.warnings(exclude=OF_ORDER))
+        return as_floats(found.frequencies)
 
     def _records(self, X: Any, F: Array) -> Any:
         """Hook: preprocess validated rows."""
@@ -151,8 +151,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             the indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
         F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
-        self._check_baseline(frame_like(X, F))
-        records = self._baseline(X, F)
+        records = self._baseline(X, self._measurements(frame_like(X, F)))
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_

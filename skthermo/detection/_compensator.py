@@ -46,7 +46,7 @@ from skthermo._validation import (
 from skthermo.detection._complete_rows import Regression, has_lags_behind
 from skthermo.detection._origin import Changes, Origin, mean_log_density, with_origin
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.preprocessing import RecordFindings, check_records, gross_errors
+from skthermo.preprocessing import RecordFindings, check_records, set_aside
 from skthermo.residuals.extrapolation import FEWEST, Extrapolation
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.local_covariance import rows_near_in_time
@@ -423,10 +423,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         names = _check_feature_names_in(self, None)
         named = pd.DataFrame(values, getattr(X, "index", None), names, copy=False)
         T, F = named.drop(columns=names[self.targets_]), named[names[self.targets_]]
-        refuse_gross_errors(named, list(T))
+        usable = measured(named, list(T))
         warn_each(misplaced_columns(T, F))
         findings = findings_of(partial(check_records, unit=""), T, F)
-        return *split_columns(X, values, self.targets_), findings
+        return *split_columns(X, as_floats(usable), self.targets_), findings
 
     def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> tuple[Array, PredictionError]:
         """Learn from all rows; residuals of each from a clone fitted on the other folds, and the errors of those."""
@@ -550,11 +550,14 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     return temperatures, frequencies
 
 
-def refuse_gross_errors(baseline: pd.DataFrame, inputs: list[Hashable]) -> None:
-    """Refuse a baseline with values that are no measurements of any quantity; an input that is constant does no harm.
+def measured(baseline: pd.DataFrame, inputs: list[Hashable]) -> pd.DataFrame:
+    """A baseline without values that cannot be; an error where nothing can be learned from it.
 
-    Inputs need not be temperatures: those that look like kelvin, say, are only warned of.
+    Inputs need not be temperatures, and one that is constant does no harm.
     """
-    found = gross_errors(frequencies=baseline, unit="")
-    harmless = (found.table["what"] == "constant") & found.table["column"].isin(inputs)
-    replace(found, table=found.table[~harmless]).refuse_meaningless()
+    found = set_aside(frequencies=baseline, unit="")
+    harmless = [name for name in inputs if baseline[name].notna().any()]
+    useless = [reason for name, reason in found.left_out.items() if name not in harmless]
+    if useless:
+        raise ValueError(f"columns cannot be used: {'; '.join(useless)}; expected measurements. Leave these out")
+    return found.frequencies

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 
 from skthermo._estimators.warnings import checked_once, explain_rows, explained_rows, warnings_once
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, as_floats
 from skthermo._validation import _BaseComposition, last_step
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._thresholds import conformal_threshold
@@ -80,8 +80,9 @@ class FusedDetector(DamageDetector, _BaseComposition):
     def set_params(self, **params: Any) -> FusedDetector:  # also of the detectors, by their names
         return self._set_params("detectors", **params)
 
-    def _check_baseline(self, F: Any) -> None:
+    def _measurements(self, F: Any) -> Array:
         """Its detectors check what they are given, which may hold temperatures, too."""
+        return as_floats(F)
 
     def _records(self, X: ArrayLike, F: Array) -> ArrayLike:
         return X

@@ -42,7 +42,8 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import HingeFeatures, gross_errors
+from skthermo.preprocessing import HingeFeatures
+from skthermo.preprocessing.checks import measurements
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
@@ -367,7 +368,8 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        gross_errors(frame_like(X, T)).refuse_meaningless(exclude={"no-rows"})
+        found = measurements(frame_like(X, T), exclude={"no-rows"})
+        T = np.asarray(found.temperatures)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)

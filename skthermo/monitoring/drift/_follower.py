@@ -26,7 +26,7 @@ from skthermo.monitoring.drift._observations import (
     MISLEARNED,
     DailyRecords,
     GroupEffects,
-    check_records,
+    checked_records,
     observation,
     with_time,
 )
@@ -114,7 +114,7 @@ class DriftFollower:
                 f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
             )
         T, F = T[temperatures], F[list(fem.mode_names_)]
-        check_records(fem, T, F)
+        T, F = checked_records(fem, T, F)
         records, memory, days = DailyRecords.of(fem, T), Memory.of(fem.mapper_), calendar(F.index, "1D")
         daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups).without_even()
         noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)

@@ -20,7 +20,8 @@ from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
-from skthermo.preprocessing import ExponentialMeans, gross_errors
+from skthermo.preprocessing import ExponentialMeans
+from skthermo.preprocessing.checks import measurements
 from skthermo.residuals.weather import WeatherFunctions
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
@@ -183,8 +184,8 @@ def with_mirror_images(slopes: Array, nominal: Array) -> Array:
     return slopes @ (images / images.sum(axis=0))
 
 
-def check_records(fem: Any, T: Any, F: Any) -> None:
-    """Raise an error for what is no fitted chain, or no records of it with times."""
+def checked_records(fem: Any, T: Any, F: Any) -> tuple[Any, Any]:
+    """Records without values that cannot be; an error for what is no fitted chain, or no records of it with times."""
     if isinstance(fem, type) or not hasattr(fem, "simulator_"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
@@ -197,7 +198,8 @@ def check_records(fem: Any, T: Any, F: Any) -> None:
         raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
-    gross_errors(T, F, model=fem.model).refuse_meaningless(exclude=OF_TRAINING)
+    found = measurements(T, F, model=fem.model, exclude=OF_TRAINING)
+    return found.temperatures, found.frequencies
 
 
 def length_of(freq: str) -> float:

@@ -22,7 +22,7 @@ from skthermo.monitoring.drift._observations import (
     MISLEARNED,
     DailyRecords,
     GroupEffects,
-    check_records,
+    checked_records,
     length_of,
     observation,
     shapes_of_time,
@@ -101,7 +101,7 @@ def track_parameters(
     >>> history.has_drift, history.rates["per_year"].idxmin()
     (True, 'bottom')
     """
-    check_records(fem, T, F)
+    T, F = checked_records(fem, T, F)
     check_probability(significance, "significance")
     random = as_random_state(random_state)
     length_of(freq)

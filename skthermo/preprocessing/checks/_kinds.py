@@ -34,23 +34,19 @@ WARNINGS = {
     "sort_index()",
     "missing-column": "a column has no value: {}. Nothing can be learned from it. Leave it out, or check why it is "
     "empty",
-    "infinite-values": "values are infinite or too large to be squared: {}. No mean and no spread can be calculated. "
-    "Put NaN there",
-    "placeholders": "values stand for missing ones: {}. They would be learned as if they were measured. Put NaN there",
-    "isolated-level": "values far from all others repeat exactly: {}. They may stand for missing values, and would be "
-    "learned as if they were measured. Put NaN there if they do",
-    "another-level": "values are far from all others: {}. They widen every spread and so hide damage. Put NaN where a "
-    "value is wrong",
-    "implausible-values": "values are implausible: {}. They widen every spread and so hide damage. Put NaN where a "
-    "value is wrong",
+    "infinite-values": "values are infinite or too large to be squared: {}. They count as missing. Put NaN there",
+    "placeholders": "values stand for missing ones: {}. They count as missing. Put NaN there",
+    "isolated-level": "values far from all others repeat exactly: {}. They count as missing. Put NaN there",
+    "another-level": "values are far from all others: {}. They count as missing. Put NaN there",
+    "implausible-values": "values are implausible: {}. They count as missing. Put NaN there",
     "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "
     "infinite. Leave it out",
     "few-values": "a column has very few different values: {}. Its resolution hides the effect of the weather. Check "
     "rounding and the settings of the logger",
     "equal-columns": "columns are equal: {}. One channel counts twice, and another is missing. Keep one of them, and "
     "check where the other was read from",
-    "not-positive": "frequencies are zero or negative: {}. No structure has such frequencies. Put NaN where a mode "
-    "was not identified",
+    "not-positive": "frequencies are zero or negative: {}. They count as missing. Put NaN where a mode was not "
+    "identified",
     "kelvin": "temperatures look like kelvin: {}. Bounds and reports are in degrees Celsius. Subtract 273.15",
     "fahrenheit": "temperatures look like degrees Fahrenheit: {}. Frost and reports would be wrong by many degrees. "
     "Convert them by (T - 32) / 1.8",
@@ -68,10 +64,8 @@ WARNINGS = {
     "wrong by that factor. Convert them to Hz",
     "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as those of another mode or "
     "unit. Convert it to Hz, or order the columns as the model's modes",
-    "stuck-sensor": "values of a sensor only repeat: {}. The last value would be learned as weather. Put NaN where it "
-    "is stuck",
-    "stuck-mode": "values of a mode only repeat: {}. The mode would seem to ignore the weather. Put NaN where it is "
-    "stuck",
+    "stuck-sensor": "values of a sensor only repeat: {}. They count as missing. Put NaN where it is stuck",
+    "stuck-mode": "values of a mode only repeat: {}. They count as missing. Put NaN where it is stuck",
     "no-thermal-effect": "the temperatures explain nothing of the frequencies: {}. Nothing can be compensated by "
     "them. Check whether the rows of both tables belong together",
     "time-shift": "temperatures of other rows explain the frequencies better: {}. The weather of another time would "
@@ -92,8 +86,8 @@ WARNINGS = {
 ARE_MEANINGLESS = frozenset(
     {
         *("no-table", "no-numbers", "column-names", "different-rows", "no-rows", "missing-stamps", "equal-stamps"),
-        *("stamps-from-numbers", "missing-column", "infinite-values", "placeholders", "constant", "not-positive"),
-        *("kelvin", "exchanged-tables", "temperatures-are-frequencies", "number-of-modes", "unit-of-frequencies"),
+        *("stamps-from-numbers", "missing-column", "constant", "kelvin", "exchanged-tables", "number-of-modes"),
+        *("temperatures-are-frequencies", "unit-of-frequencies"),
     }
 )
 """Kinds with which no result of a fit means anything."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._estimators.warnings import warn_each
 from skthermo._tables.frames import Table, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
@@ -35,12 +36,15 @@ class SetAside(SavesFrames):
         A row for each finding, as in `RecordFindings`: which values count as missing, and why.
     left_out : dict
         Columns that cannot be used at all, each with the reason.
+    others : RecordFindings
+        What else was found, which is doubtful.
     """
 
     temperatures: Table | None
     frequencies: Table | None
     table: pd.DataFrame
     left_out: dict[Hashable, str]
+    others: RecordFindings
 
     def warnings(self) -> Iterator[RecordsWarning]:
         """One warning that counts and names the values, and one that names the columns that are left out.
@@ -63,6 +67,18 @@ class SetAside(SavesFrames):
                 "sensors, or drop the columns",
                 "left-out",
             )
+
+    def refuse_left_out(self) -> None:
+        """Raise an error if columns cannot be used.
+
+        Raises
+        ------
+        ValueError
+            If columns are left out, with their names.
+        """
+        if self.left_out:
+            reasons = "; ".join(self.left_out.values())
+            raise ValueError(f"columns cannot be used: {reasons}; expected measurements. Leave these columns out")
 
 
 def set_aside(
@@ -140,6 +156,7 @@ def set_aside(
         cleaned.get("frequencies"),
         findings_table(one for one in found if one.what in SET_ASIDE | LEFT_OUT),
         left_out,
+        RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows),
     )
 
 
@@ -173,3 +190,18 @@ def _as_given(reading: Reading, table: Any) -> Table:
     values = np.empty_like(reading.values)
     values[reading.order] = reading.values
     return frame_like(table, values, reading.columns)
+
+
+def measurements(
+    temperatures: Any = None,
+    frequencies: Any = None,
+    *,
+    unit: str = "Hz",
+    model: Any = None,
+    exclude: Collection[str] = (),
+) -> SetAside:
+    """As `set_aside`, with its warnings, for what needs every column."""
+    found = set_aside(temperatures, frequencies, unit=unit, model=model, exclude=exclude)
+    found.refuse_left_out()
+    warn_each(found.warnings())
+    return found

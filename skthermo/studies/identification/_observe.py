@@ -22,7 +22,7 @@ from skthermo.exceptions import (
     SkthermoWarning,
     UnevaluatedRowsWarning,
 )
-from skthermo.preprocessing import gross_errors
+from skthermo.preprocessing.checks import measurements
 from skthermo.residuals.weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import FrequencyShift, measured_shift, outlying, record_shifts, scatter_of
 
@@ -210,8 +210,8 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    gross_errors(T, F, model=fem.model).refuse_meaningless(exclude={"no-rows", "missing-column", "constant"})
-    return frequencies
+    found = measurements(T, F, model=fem.model, exclude={"no-rows", "missing-column", "constant"})
+    return as_floats(found.frequencies)
 
 
 def _named_as_in_fit(fem: Any, T: Any) -> Any:

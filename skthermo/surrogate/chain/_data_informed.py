@@ -63,7 +63,7 @@ from skthermo._validation import (
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, gross_errors
+from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, set_aside
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.misplaced import misplaced_columns
 from skthermo.residuals.weather import SensorRegression, TrainingRange
@@ -285,12 +285,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             One, with counts, for each kind of doubtful data in ``report_``, and for what
             `~skthermo.preprocessing.check_records` finds.
         """
-        T, F = self._read_records(X, y)
+        given = self._read_records(X, y)
+        found = set_aside(*given, model=self.model)
+        found.refuse_left_out()
+        T, F = found.temperatures, found.frequencies
         inverse = self._begin(F, shapes)
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
-        findings = self._look_at(T, F)
+        findings = self._look_at(T, F, given)
         filled, usable = frame_like(T, self.sensors_.fill(T)[0]), without_outliers(findings, F)
         stages = Stages(self, 5, X, y)
         with stages.stage("noise"):
@@ -803,7 +806,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         if self.y_is_vector_:
             y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
         F = frame_like(y, check_array(y, **options))
-        gross_errors(T, F, model=self.model).refuse_meaningless()
         return T, F
 
     def _begin(self, F: Table, shapes: ArrayLike | None) -> ChainInverse:
@@ -816,10 +818,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
         return inverse
 
-    def _look_at(self, T: Table, F: Table) -> RecordFindings:
+    def _look_at(self, T: Table, F: Table, given: tuple[Table, Table]) -> RecordFindings:
         """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
         mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
-        findings = findings_of(self._findings, T, F, mended=mended)
+        findings = findings_of(self._findings, *given, mended=mended)
         warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
         self.sensors_ = SensorRegression.of(T)
