@@ -28,16 +28,18 @@ def changed(table, column, value, rows=slice(None)):
     return copy
 
 
-OF_FREQUENCIES = {  # what is done, and what the error names
+OF_FREQUENCIES = {  # what is done to a table or a column, and what the error names
     "'f1' is NaN": lambda table: changed(table, "f1", np.nan),
     "'f2' is 7": lambda table: changed(table, "f2", 7.0),
-    "'f3' is inf": lambda table: changed(table, "f3", np.inf, [5]),
-    "'f4' is -999": lambda table: changed(table, "f4", -999.0, [3, 8]),
 }
 OF_TEMPERATURES = {
-    "'T1' is -999": lambda table: changed(table, "T1", -999.0, [3]),
     "'T2' lies": lambda table: changed(table, "T2", table["T2"] + 273.15),
     "'T3' is NaN": lambda table: changed(table, "T3", np.nan),
+}
+VALUES = {  # what is done to values, which are set aside, and what the warning names
+    "'f3' is inf": lambda table: changed(table, "f3", np.inf, [5]),
+    "'f4' is -999": lambda table: changed(table, "f4", -999.0, [3, 8]),
+    "'f5' is 1e+06": lambda table: changed(table, "f5", 1e6, [12]),
 }
 
 
@@ -84,6 +86,31 @@ def test_detectors_and_compensators_list_all_errors(estimator, names):
     X = T.join(frequencies) if isinstance(estimator, TemperatureCompensator) else frequencies
     text = error_of(estimator.fit, X)
     assert all(name in text for name in names)
+
+
+@pytest.mark.parametrize("name", VALUES)
+@pytest.mark.parametrize(
+    "estimator",
+    [MahalanobisDetector(), OutlierDetector(IsolationForest(n_estimators=10, random_state=0)), compensator(), chain()],
+    ids=lambda e: type(e).__name__,
+)
+def test_values_that_cannot_be_are_as_missing_ones(estimator, name):
+    given, missing = VALUES[name](F), F.where(VALUES[name](F) == F)
+    tables = []
+    for frequencies in (given, missing):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            if isinstance(estimator, DataInformedFEM):
+                fitted = estimator.fit(T, frequencies).predict(T)
+            elif isinstance(estimator, TemperatureCompensator):
+                fitted = estimator.fit(T.join(frequencies)).transform(T.join(F))
+            else:
+                fitted = estimator.fit(frequencies).damage_index(F)
+        tables.append((np.asarray(fitted), [str(one.message) for one in caught]))
+    np.testing.assert_array_equal(tables[0][0], tables[1][0])
+    column = name.split()[0]
+    assert any(column in text for text in tables[0][1])
+    assert not any(column in text for text in tables[1][1])
 
 
 @pytest.mark.one_case

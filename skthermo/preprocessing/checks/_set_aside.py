@@ -14,7 +14,7 @@ from skthermo._tables.frames import Table, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._gross import CleanedRecords
-from skthermo.preprocessing.checks._kinds import LEFT_OUT, MEANINGLESS, SET_ASIDE, Finding
+from skthermo.preprocessing.checks._kinds import LEFT_OUT, SET_ASIDE, Finding
 from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table, listed_details
 from skthermo.preprocessing.checks._signs import stuck_runs
@@ -68,18 +68,6 @@ class SetAside(SavesFrames):
                 "left-out",
             )
 
-    def refuse_left_out(self) -> None:
-        """Raise an error if columns cannot be used.
-
-        Raises
-        ------
-        ValueError
-            If columns are left out, with their names.
-        """
-        if self.left_out:
-            reasons = "; ".join(self.left_out.values())
-            raise ValueError(f"columns cannot be used: {reasons}; expected measurements. Leave these columns out")
-
 
 def set_aside(
     temperatures: Any = None,
@@ -88,6 +76,7 @@ def set_aside(
     unit: str = "Hz",
     model: Any = None,
     exclude: Collection[str] = (),
+    needs_all: bool = False,
 ) -> SetAside:
     """Records without values that cannot be.
 
@@ -107,6 +96,8 @@ def set_aside(
         To whose nominal frequencies those in Hz are compared.
     exclude : collection of str, default=()
         Kinds of findings that do no harm to what is done with the records.
+    needs_all : bool, default=False
+        Whether columns that would be left out are an error.
 
     Returns
     -------
@@ -117,7 +108,7 @@ def set_aside(
     ------
     ValueError
         If what is left is meaningless as a whole: tables of other units, of different rows, or exchanged; text; no
-        record; or no column of a table that can be used.
+        record; or no column of a table that can be used. All of it is listed.
 
     Examples
     --------
@@ -136,10 +127,9 @@ def set_aside(
     given = {what: table for what, table in tables.items() if table is not None}
     records = CleanedRecords.of(given, unit=unit, model=model)
     findings = findings_table(records.findings)
-    harmless = SET_ASIDE | LEFT_OUT | set(exclude)
-    severe = findings[(findings["severity"] == MEANINGLESS) & ~findings["what"].isin(harmless)]
-    if len(severe):
-        RecordFindings(severe, records.n_rows).refuse_meaningless()
+    harmless = SET_ASIDE | (set() if needs_all else LEFT_OUT) | set(exclude)
+    others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
+    others.refuse_meaningless()
     left_out: dict[Hashable, str] = {}
     for reading in records.readings:
         _set_runs_aside(reading)
@@ -149,6 +139,8 @@ def set_aside(
                 f"no column of the {reading.what} can be used: {'; '.join(own.values())}; expected measurements"
             )
         left_out |= own
+    if needs_all and left_out:
+        raise ValueError(f"columns cannot be used: {'; '.join(left_out.values())}; expected measurements in each")
     found = [finding for reading in records.readings for finding in reading.findings]
     cleaned = {one.what: _as_given(one, given[one.what]) for one in records.readings}
     return SetAside(
@@ -156,7 +148,7 @@ def set_aside(
         cleaned.get("frequencies"),
         findings_table(one for one in found if one.what in SET_ASIDE | LEFT_OUT),
         left_out,
-        RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows),
+        others,
     )
 
 
@@ -201,7 +193,6 @@ def measurements(
     exclude: Collection[str] = (),
 ) -> SetAside:
     """As `set_aside`, with its warnings, for what needs every column."""
-    found = set_aside(temperatures, frequencies, unit=unit, model=model, exclude=exclude)
-    found.refuse_left_out()
+    found = set_aside(temperatures, frequencies, unit=unit, model=model, exclude=exclude, needs_all=True)
     warn_each(found.warnings())
     return found

@@ -286,8 +286,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             `~skthermo.preprocessing.check_records` finds.
         """
         given = self._read_records(X, y)
-        found = set_aside(*given, model=self.model)
-        found.refuse_left_out()
+        found = set_aside(*given, model=self.model, needs_all=True)
         T, F = found.temperatures, found.frequencies
         inverse = self._begin(F, shapes)
         weights = row_weights(sample_weight, X)
