@@ -19,7 +19,7 @@ from skthermo._validation import Estimator, Interval, _fit_context, check_is_fit
 from skthermo.detection._origin import log_volumes, mean_log_density
 from skthermo.detection._thresholds import warn_of_blindness
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 
 OF_ORDER = {"repeated-stamps", "unsorted-stamps"}  # which only what looks at earlier records depends on
 
@@ -76,7 +76,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
 
     def _measurements(self, F: Table) -> Array:
         """Hook: a baseline without values that cannot be, with warnings; what is meaningless is refused."""
-        found = measurements(frequencies=F, unit="")
+        found = set_aside(frequencies=F, unit="", needs_all=True)
         warn_each(found.others.warnings(exclude=OF_ORDER))
         return as_floats(found.frequencies)
 

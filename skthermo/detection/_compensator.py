@@ -555,9 +555,6 @@ def measured(baseline: pd.DataFrame, inputs: list[Hashable]) -> pd.DataFrame:
 
     Inputs need not be temperatures, and one that is constant does no harm.
     """
-    found = set_aside(frequencies=baseline, unit="")
-    harmless = [name for name in inputs if baseline[name].notna().any()]
-    useless = [reason for name, reason in found.left_out.items() if name not in harmless]
-    if useless:
-        raise ValueError(f"columns cannot be used: {'; '.join(useless)}; expected measurements. Leave these out")
-    return found.frequencies
+    F = set_aside(frequencies=baseline.drop(columns=inputs), unit="", needs_all=True).frequencies
+    T = set_aside(frequencies=baseline[inputs], unit="", exclude={"constant"}, needs_all=True).frequencies
+    return pd.concat([T, F], axis=1)[list(baseline)]

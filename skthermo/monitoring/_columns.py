@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -132,11 +132,11 @@ class UsableBaseline:
 
 
 def without_what_cannot_be(
-    records: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], exclude: Collection[str] = ()
+    records: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], **options: Any
 ) -> tuple[pd.DataFrame, SetAside]:
-    """Records with NaN where a value cannot be, and what was set aside; ``exclude`` are kinds that do no harm."""
+    """Records with NaN where a value cannot be, and what was set aside, by options of `set_aside`."""
     T, F = records.drop(columns=targets), records[targets]
     unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
-    found = set_aside(T if len(T.columns) else None, F, unit=unit, exclude=exclude)
+    found = set_aside(T if len(T.columns) else None, F, unit=unit, **options)
     tables = [table for table in (found.temperatures, found.frequencies) if table is not None]
     return pd.concat(tables, axis=1)[list(records.columns)], found

@@ -17,8 +17,6 @@ from skthermo.monitoring._false_alarms import EventRule, EventState
 DAMAGE, STIFFENING, MEASUREMENT, WATCH = "damage", "stiffening", "measurement or structure", "watch"
 """Kinds of events; the third is that of responses set aside as implausible or stuck, the last of a raised index."""
 
-ALARMS = (DAMAGE, MEASUREMENT)  # kinds of events that put a structure in alarm
-
 MATTERS = 2.0  # standard deviations from which a mode, or a damage group, drives an alarm
 MOST_NAMED = 3  # of them
 

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._estimators.warnings import warn_each, warn_user
+from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import check_flag, is_real
 from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp
 from skthermo._tables.saved_frames import SavesFrames
@@ -144,6 +144,14 @@ class Monitor(SavesFrames, Estimator):
         Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
+    left_out_ : dict
+        Columns of the baseline that cannot be used, each with the reason; nothing is said of them, and `faults_` lists
+        them, too.
+    set_aside_ : DataFrame
+        Values of the baseline that cannot be, and count as missing: a row for each finding, as in
+        `~skthermo.preprocessing.SetAside`.
+    columns_ : list
+        Names of the columns that `fit` saw, which `update` expects.
     trained_ : DataFrame
         What the detector in charge was fitted on: the baseline, or what `refit` or `rebaseline` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
@@ -331,7 +339,6 @@ class Monitor(SavesFrames, Estimator):
         """
         max_delay, max_jump, retention = self._checked_times()
         usable = UsableBaseline.of(self, _read_baseline(X))
-        warn_each(usable.found.warnings())
         baseline, detector, columns = usable.records, usable.detector, usable.columns
         seed_parts(detector, seeded(self.random_state))
         self.targets_, self.units_ = columns.targets, columns.units
@@ -624,8 +631,8 @@ class Monitor(SavesFrames, Estimator):
         check_is_fitted(self)
         if records is not None:
             records = self.active_.corrections.cleaned(self._read(records))
-            records, found = without_what_cannot_be(records, self.targets_, self.units_, OF_TRAINING)
-            warn_each(found.warnings())
+            options = {"exclude": OF_TRAINING, "is_baseline": False}
+            records, _ = without_what_cannot_be(records, self.targets_, self.units_, **options)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)

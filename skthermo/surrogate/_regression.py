@@ -42,8 +42,7 @@ from skthermo._validation import (
     validate_data,
 )
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import HingeFeatures
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import HingeFeatures, set_aside
 
 NETWORKS: dict[str, dict[str, Any]] = {
     "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
@@ -368,7 +367,7 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        found = measurements(frame_like(X, T), exclude={"no-rows"})
+        found = set_aside(frame_like(X, T), exclude={"no-rows"}, needs_all=True, is_baseline=False)
         T = np.asarray(found.temperatures)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:

@@ -21,6 +21,7 @@ from tests.detection.compensated import MODES, TRUSS, F, T, X
 
 LATER = make_truss_campaign(random_state=3)
 LATER = LATER.temperatures.join(LATER.frequencies)[::5]
+STUCK_TEXT = "'T1' is 20 in 40 of 200 rows"
 STUCK = X.assign(T1=X["T1"].mask(np.arange(len(X)) >= 160, 20.0))
 
 
@@ -60,6 +61,11 @@ def said(function, *arguments):
     return result, [str(warning.message) for warning in caught]
 
 
+def times_said(texts):
+    """How often the values that are stuck are named."""
+    return sum(STUCK_TEXT in text for text in texts)
+
+
 def without(rows, columns, records=LATER):
     holed = records.copy()
     holed.iloc[rows, [records.columns.get_loc(column) for column in columns]] = np.nan
@@ -80,8 +86,7 @@ class TestChecks:
     def test_the_outermost_estimator_checks_and_warns_once(self, estimator, n_checks):
         _, texts = said(detector(estimator).fit, STUCK)
         assert n_checks() == 1
-        assert len(texts) == 1
-        assert "'T1' is 20 in 40 rows" in texts[0]
+        assert times_said(texts) == 1
 
     @pytest.mark.nightly
     def test_a_chain_within_reports_what_was_found(self):
@@ -93,7 +98,7 @@ class TestChecks:
         parts = [("lines", detector(LinearRegression())), ("ridge", detector(Ridge())), ("chain", detector(chain()))]
         _, texts = said(FusedDetector(parts).fit, STUCK)
         assert n_checks() == 1
-        assert len(texts) == 1
+        assert times_said(texts) == 1
 
     def test_a_study_checks_the_baseline_of_its_detectors_once(self, n_checks):
         fem, _ = said(chain().fit, STUCK[list(T)], STUCK[MODES])
@@ -102,7 +107,7 @@ class TestChecks:
         before = n_checks()
         _, texts = said(study.run, T)
         assert n_checks() == before + 1
-        assert sum("'T1' is 20 in 40 rows" in text for text in texts) == 1
+        assert times_said(texts) == 0  # the chain has set these values aside, and said so
 
     def test_other_records_are_checked_too(self, n_checks):
         few = TemperatureCompensator(Ridge(), targets=MODES[:2])
@@ -110,11 +115,11 @@ class TestChecks:
             said(TemperatureCompensator(Ridge(), targets=MODES).fit, STUCK)
             _, texts = said(few.fit, STUCK.drop(columns=MODES[2:]))
         assert n_checks() == 2
-        assert len(texts) == 1
+        assert times_said(texts) == 1
 
     def test_every_fit_of_its_own_is_checked(self, n_checks):
         for _ in range(2):
-            assert len(said(detector(Ridge()).fit, STUCK)[1]) == 1
+            assert times_said(said(detector(Ridge()).fit, STUCK)[1]) == 1
         assert n_checks() == 2
 
     def test_an_error_leaves_nothing_behind(self, n_checks):
@@ -125,7 +130,7 @@ class TestChecks:
         before = n_checks()
         _, texts = said(chain().fit, STUCK[list(T)], STUCK[MODES])
         assert n_checks() == before + 1
-        assert any("'T1' is 20 in 40 rows" in text for text in texts)
+        assert any(STUCK_TEXT in text for text in texts)
 
     @pytest.mark.nightly
     @pytest.mark.parametrize("backend", ["loky", "threading"])
@@ -134,7 +139,7 @@ class TestChecks:
         with parallel_config(backend, n_jobs=2):
             fitted, texts = said(detector(chain()).fit, STUCK)
         assert n_checks() == 2
-        assert len(texts) == 1
+        assert times_said(texts) == 1
         np.testing.assert_array_equal(fitted[0].folds_, alone[0].folds_)
 
     def test_findings_of_an_estimator_around_are_those_of_its_parts(self):
@@ -142,7 +147,8 @@ class TestChecks:
             assert findings_of(None, T, F) == "what was found"
         with pytest.raises(ValueError, match="broken"), reported_by_caller([], "what was found"):
             raise ValueError("broken")
-        assert said(findings_of, check_records, STUCK[list(T)], F)[1]
+        outlying = F.assign(f1=F["f1"].where(np.arange(len(F)) != 50, 1.3 * F["f1"]))
+        assert said(findings_of, check_records, T, outlying)[1]
 
 
 class TestRows:

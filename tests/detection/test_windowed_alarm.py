@@ -124,9 +124,9 @@ def test_a_mode_without_a_value_is_refused(rule):
 def test_implausible_records_of_the_baseline_are_reported_once_by_name(rule):
     baseline = X.copy()
     baseline.iloc[700, 1] = 900.0
-    with pytest.warns(match="implausible-values") as record:
+    with pytest.warns(match="set-aside") as record:
         WindowedAlarm(8, rule=rule).fit(baseline)
-    assert ["'f2' is 900" in str(one.message) for one in record if "are implausible" in str(one.message)] == [True]
+    assert ["'f2' is 900" in str(one.message) for one in record if "[set-aside]" in str(one.message)] == [True]
 
 
 @each_rule

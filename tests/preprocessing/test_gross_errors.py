@@ -265,8 +265,8 @@ class TestFindings:
         found = gross_errors(wrong, changed(F.assign(f3=F["f1"]), [8], 1, 0.0))
         with pytest.raises(ValueError, match="kelvin") as error:
             found.refuse_meaningless()
-        assert all(name in str(error.value) for name in ("'T1'", "'T2'", "'f2'", "2025-01-09"))
-        assert "'f3'" not in str(error.value)
+        assert "'T2'" in str(error.value)
+        assert not any(name in str(error.value) for name in ("'T1'", "'f2'", "'f3'"))
         gross_errors(T, F.assign(f3=F["f1"])).refuse_meaningless()
 
     def test_values_that_were_put_aside_count_as_outliers_and_tables_stay_as_they_are(self):

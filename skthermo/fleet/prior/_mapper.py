@@ -27,7 +27,7 @@ from skthermo.fleet.prior._information import FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 from skthermo.residuals.weather import TrainingRange, parts, warn_of_implausible
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
@@ -316,7 +316,7 @@ class FleetMapper(RegressorMixin, Estimator):
         values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
-        found = measurements(frame_like(X, inputs), exclude={"no-rows", "constant"})
+        found = set_aside(frame_like(X, inputs), exclude={"no-rows", "constant"}, needs_all=True, is_baseline=False)
         inputs = np.asarray(found.temperatures)
         self._check_inputs(X)
         self.y_is_vector_ = values.ndim == 1

@@ -20,7 +20,7 @@ from skthermo._tables.frames import (
     row_times,
 )
 from skthermo._validation import check_array, check_is_fitted
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 
 MOST_ROWS = 20_000
 TYPICAL = 0.02  # standard deviation of the logarithm of a frequency, as which those of linear quantities count
@@ -197,7 +197,7 @@ def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     values = as_columns(check_array(Y, ensure_2d=False, **options))
     check_same_rows(T, Y, ("temperatures", "quantities"))
     inputs = as_columns(inputs)
-    found = measurements(frame_like(T, inputs), exclude={"no-rows"})
+    found = set_aside(frame_like(T, inputs), exclude={"no-rows"}, needs_all=True, is_baseline=False)
     inputs = np.asarray(found.temperatures)
     if isinstance(Y, pd.Series):
         names = ["f1" if Y.name is None else Y.name]

@@ -16,7 +16,7 @@ from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
 from skthermo.monitoring._records import OF_TRAINING
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 
 CONFIDENCE = 0.95  # of the bands
 N_ERRORS = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
@@ -226,7 +226,7 @@ class ParameterHistory(Sentences):
                 f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
-        found = measurements(frequencies=F, exclude=OF_TRAINING)
+        found = set_aside(frequencies=F, exclude=OF_TRAINING, needs_all=True, is_baseline=False)
         warn_each(found.others.warnings())
         F = found.frequencies
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)

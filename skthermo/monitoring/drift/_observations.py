@@ -20,8 +20,7 @@ from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
-from skthermo.preprocessing import ExponentialMeans
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import ExponentialMeans, set_aside
 from skthermo.residuals.weather import WeatherFunctions
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
@@ -198,7 +197,7 @@ def checked_records(fem: Any, T: Any, F: Any) -> tuple[Any, Any]:
         raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
-    found = measurements(T, F, model=fem.model, exclude=OF_TRAINING)
+    found = set_aside(T, F, model=fem.model, exclude=OF_TRAINING, needs_all=True, is_baseline=False)
     return found.temperatures, found.frequencies
 
 

@@ -5,7 +5,7 @@ from skthermo.preprocessing.checks._gross import gross_errors
 from skthermo.preprocessing.checks._kinds import Finding
 from skthermo.preprocessing.checks._plausible import Plausible
 from skthermo.preprocessing.checks._record_findings import RecordFindings
-from skthermo.preprocessing.checks._set_aside import SetAside, measurements, set_aside
+from skthermo.preprocessing.checks._set_aside import SetAside, set_aside
 from skthermo.preprocessing.checks._signs import equal_runs, residual_trend
 
 __all__ = [
@@ -16,7 +16,6 @@ __all__ = [
     "check_records",
     "equal_runs",
     "gross_errors",
-    "measurements",
     "residual_trend",
     "set_aside",
 ]

@@ -55,7 +55,7 @@ class Column:
             named = texts_of(levels) if len(levels) <= FEW_LEVELS else f"{levels[0]:.6g} to {levels[-1]:.6g}"
             self.found(what, levels, f"is {named}{unit}")
             wrong = np.isin(np.arange(len(self.reading.values)), self._rows(levels))
-            self.reading.values[wrong | binary_closing(wrong, AMONG), self.place] = np.nan
+            self.reading.set_aside(what, np.flatnonzero(wrong | binary_closing(wrong, AMONG)), self.place)
             self._sort()
 
     def _rows(self, levels: Array) -> NDArray[np.intp]:

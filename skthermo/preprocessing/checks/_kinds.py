@@ -100,6 +100,9 @@ SET_ASIDE = frozenset(
 )
 """Kinds of values that cannot be, which count as missing."""
 
+IMPOSSIBLE = frozenset({"infinite-values", "placeholders", "not-positive"})
+"""Those which cannot be in any state of a structure."""
+
 LEFT_OUT = frozenset({"missing-column", "constant"})
 """Kinds of columns that say nothing."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,6 +36,7 @@ class Reading:
     is_frame: bool = False
     useless: set[int] = field(default_factory=set)
     order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    aside: list[tuple[str, NDArray[np.intp], int, Array]] = field(default_factory=list)
 
     @classmethod
     def of(cls, table: Any, what: str) -> Reading:
@@ -89,6 +90,17 @@ class Reading:
     def found(self, *args: Any, **options: Any) -> None:
         self.findings.append(self.finding(*args, **options))
 
+    def set_aside(self, what: str, rows: NDArray[np.intp], place: int) -> None:
+        """Make values of a column NaN."""
+        self.aside.append((what, rows, place, self.values[rows, place].copy()))
+        self.values[rows, place] = np.nan
+
+    def restore(self, kinds: Collection[str]) -> None:
+        """Put values back that were set aside for other reasons than these."""
+        for what, rows, place, values in reversed(self.aside):
+            if what not in kinds:
+                self.values[rows, place] = values
+
     def _read_array(self, table: Any) -> None:
         try:
             values = np.array(as_floats(table))
@@ -136,7 +148,7 @@ class Reading:
             rows = np.flatnonzero(infinite[:, column])
             name, value = self.columns[column], self.values[rows[0], column]
             self.found("infinite-values", name, rows, f"{name!r} is {value:g} in {self.share(rows)}")
-            self.values[rows, column] = np.nan
+            self.set_aside("infinite-values", rows, int(column))
 
 
 def _frame_values(table: pd.DataFrame, reading: Reading) -> Array:

@@ -10,11 +10,11 @@ import pandas as pd
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._memory import MemoryFindings
-from skthermo.preprocessing.checks._kinds import MEANINGLESS, WARNINGS, Finding
+from skthermo.preprocessing.checks._kinds import MEANINGLESS, SET_ASIDE, WARNINGS, Finding
 
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
 MOST_NAMED = 12  # findings of one kind that a sentence lists
-UNWARNED = frozenset({"few-rows"})  # estimators that need more warn of them
+UNWARNED = SET_ASIDE | {"few-rows"}  # estimators set values aside, or need more records, and warn of that
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,7 +44,7 @@ class RecordFindings(SavesFrames):
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
     stuck-sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
-        The last value would be learned as weather. Put NaN where it is stuck
+        They count as missing. Put NaN where it is stuck
     """
 
     table: pd.DataFrame

@@ -14,7 +14,7 @@ from skthermo._tables.frames import Table, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._gross import CleanedRecords
-from skthermo.preprocessing.checks._kinds import LEFT_OUT, SET_ASIDE, Finding
+from skthermo.preprocessing.checks._kinds import IMPOSSIBLE, LEFT_OUT, SET_ASIDE, Finding
 from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table, listed_details
 from skthermo.preprocessing.checks._signs import stuck_runs
@@ -38,6 +38,18 @@ class SetAside(SavesFrames):
         Columns that cannot be used at all, each with the reason.
     others : RecordFindings
         What else was found, which is doubtful.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.preprocessing import set_aside
+    >>> year = make_truss_campaign(random_state=0)
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     found = set_aside(year.temperatures, year.frequencies.assign(f2=5.0))
+    >>> list(found.left_out)
+    ['f2']
     """
 
     temperatures: Table | None
@@ -77,6 +89,7 @@ def set_aside(
     model: Any = None,
     exclude: Collection[str] = (),
     needs_all: bool = False,
+    is_baseline: bool = True,
 ) -> SetAside:
     """Records without values that cannot be.
 
@@ -98,6 +111,9 @@ def set_aside(
         Kinds of findings that do no harm to what is done with the records.
     needs_all : bool, default=False
         Whether columns that would be left out are an error.
+    is_baseline : bool, default=True
+        Whether the records are of one healthy state. In others, damage may move values to another level, so that only
+        those are set aside that are infinite, stand for a missing one, or are frequencies that are not positive.
 
     Returns
     -------
@@ -110,13 +126,21 @@ def set_aside(
         If what is left is meaningless as a whole: tables of other units, of different rows, or exchanged; text; no
         record; or no column of a table that can be used. All of it is listed.
 
+    Warns
+    -----
+    UserWarning
+        One that counts and names the values, and one that names the columns.
+
     Examples
     --------
+    >>> import warnings
     >>> from skthermo.datasets import make_truss_campaign
     >>> from skthermo.preprocessing import set_aside
     >>> year = make_truss_campaign(random_state=0)
     >>> year.temperatures.loc["2025-03", "T1"] = 484.667
-    >>> found = set_aside(year.temperatures, year.frequencies)
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     found = set_aside(year.temperatures, year.frequencies)
     >>> found.table[["what", "column", "n_rows"]]
                what column  n_rows
     0  placeholders     T1      31
@@ -127,12 +151,14 @@ def set_aside(
     given = {what: table for what, table in tables.items() if table is not None}
     records = CleanedRecords.of(given, unit=unit, model=model)
     findings = findings_table(records.findings)
+    kinds = SET_ASIDE if is_baseline else IMPOSSIBLE
     harmless = SET_ASIDE | (set() if needs_all else LEFT_OUT) | set(exclude)
     others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
     others.refuse_meaningless()
     left_out: dict[Hashable, str] = {}
     for reading in records.readings:
         _set_runs_aside(reading)
+        reading.restore(kinds)
         own = dict(_left_out(reading, exclude))
         if own and len(own) == len(reading.columns):
             raise ValueError(
@@ -143,13 +169,15 @@ def set_aside(
         raise ValueError(f"columns cannot be used: {'; '.join(left_out.values())}; expected measurements in each")
     found = [finding for reading in records.readings for finding in reading.findings]
     cleaned = {one.what: _as_given(one, given[one.what]) for one in records.readings}
-    return SetAside(
+    result = SetAside(
         cleaned.get("temperatures"),
         cleaned.get("frequencies"),
-        findings_table(one for one in found if one.what in SET_ASIDE | LEFT_OUT),
+        findings_table(one for one in found if one.what in LEFT_OUT.union(kinds)),
         left_out,
         others,
     )
+    warn_each(result.warnings())
+    return result
 
 
 def _set_runs_aside(reading: Reading) -> None:
@@ -159,7 +187,7 @@ def _set_runs_aside(reading: Reading) -> None:
         for rows in stuck_runs(column):
             if rows[0] > 0:  # a lag of another column begins with copies of its first value
                 reading.found(what, name, rows, f"{name!r} is {column[rows[0]]:.6g} in {reading.share(rows)}")
-                column[rows] = np.nan
+                reading.set_aside(what, rows, place)
 
 
 def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hashable, str]]:
@@ -172,9 +200,9 @@ def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hash
         if set_aside[place] > MOST * known[place] or elsewhere > MANY * known[place]:
             yield name, "; ".join(found.detail for found in own if found.what in SET_ASIDE)
         else:
-            useless = [found.detail for found in own if found.what in LEFT_OUT and found.what not in exclude]
+            useless = [found for found in own if found.what in LEFT_OUT and found.what not in exclude]
             if useless:
-                yield name, useless[0]
+                yield name, f"{useless[0].detail} ({useless[0].what})"
 
 
 def _as_given(reading: Reading, table: Any) -> Table:
@@ -182,17 +210,3 @@ def _as_given(reading: Reading, table: Any) -> Table:
     values = np.empty_like(reading.values)
     values[reading.order] = reading.values
     return frame_like(table, values, reading.columns)
-
-
-def measurements(
-    temperatures: Any = None,
-    frequencies: Any = None,
-    *,
-    unit: str = "Hz",
-    model: Any = None,
-    exclude: Collection[str] = (),
-) -> SetAside:
-    """As `set_aside`, with its warnings, for what needs every column."""
-    found = set_aside(temperatures, frequencies, unit=unit, model=model, exclude=exclude, needs_all=True)
-    warn_each(found.warnings())
-    return found

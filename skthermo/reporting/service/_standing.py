@@ -12,10 +12,11 @@ import pandas as pd
 from skthermo._tables.frames import as_moment
 from skthermo._tables.text import SPACE, counted, counted_number, duration_text, listed, percent
 from skthermo.monitoring import Monitor, MonitorStatus
-from skthermo.monitoring._events import ALARMS
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
+
+SET_ASIDE = "measurement or structure"  # the kind of events of responses that moved too far
 
 
 class Doubt(NamedTuple):
@@ -82,7 +83,7 @@ class Standing:
 
     def headline(self) -> str:
         if self.state == "alarm":
-            starts = [self.opened(kind)["start"].min() for kind in ALARMS if len(self.opened(kind))]
+            starts = [self.opened(kind)["start"].min() for kind in ("damage", SET_ASIDE) if len(self.opened(kind))]
             return f"Alarm since {moment(min(starts, default=self.last))}"
         if self.state == "watch":
             return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
@@ -99,7 +100,7 @@ class Standing:
                 "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
                 "an engineer should look at the structure and at the records."
             )
-            if not len(self.opened("damage")) and len(self.opened("measurement or structure")):
+            if not len(self.opened("damage")) and len(self.opened(SET_ASIDE)):
                 text = "A response moved too far to be evaluated. Its sensor or the structure has changed."
             if self.status.is_late:
                 text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."

@@ -28,7 +28,7 @@ from skthermo._tables.arrays import (
 from skthermo._tables.frames import Table, column_names, has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
 from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
@@ -524,7 +524,7 @@ def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
     records = pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
     is_sensor = np.asarray(known) < n_sensors
     T, F = (records.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
-    found = measurements(T, F, model=fem.model if len(names) == records.shape[1] else None)
+    found = set_aside(T, F, model=fem.model if len(names) == records.shape[1] else None, needs_all=True)
     warn_each(found.others.warnings())
     tables = [table for table in (found.temperatures, found.frequencies) if table is not None]
     return pd.concat(tables, axis=1)[list(records)]

@@ -22,7 +22,7 @@ from skthermo.exceptions import (
     SkthermoWarning,
     UnevaluatedRowsWarning,
 )
-from skthermo.preprocessing.checks import measurements
+from skthermo.preprocessing import set_aside
 from skthermo.residuals.weather import FAR_OUTSIDE
 from skthermo.studies.identification._shift import FrequencyShift, measured_shift, outlying, record_shifts, scatter_of
 
@@ -210,7 +210,9 @@ def _read_frequencies(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    found = measurements(T, F, model=fem.model, exclude={"no-rows", "missing-column", "constant"})
+    found = set_aside(
+        T, F, model=fem.model, exclude={"no-rows", "missing-column", "constant"}, needs_all=True, is_baseline=False
+    )
     return as_floats(found.frequencies)
 
 

@@ -325,7 +325,7 @@ def ratio_regressor() -> TemperatureMapper:
 
 LARGE_FACTOR = 10.0  # factor of a parameter that was perhaps meant in percent
 ALIGNED = 0.01  # relative change of frequencies for the slope of an aligner; exact for shifts and scales
-FARTHEST_UNSEEN = 0.3  # of ln theta, that no record has shown but other weather may
+FARTHEST_BEYOND = 0.3  # of ln theta, that no record has shown but other weather may
 POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
 
 
@@ -529,7 +529,7 @@ def limits_in_weather(estimates: Array) -> Array:
     A mapper would carry a bearing that freezes on to any stiffness.
     """
     seen = np.nanmin(estimates, axis=0), np.nanmax(estimates, axis=0)
-    return np.stack([np.minimum(np.exp(-FARTHEST_UNSEEN), seen[0]), np.maximum(np.exp(FARTHEST_UNSEEN), seen[1])])
+    return np.stack([np.minimum(np.exp(-FARTHEST_BEYOND), seen[0]), np.maximum(np.exp(FARTHEST_BEYOND), seen[1])])
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
