@@ -77,7 +77,7 @@ def test_rates_of_readmes_study_are_those_of_true_years():
         rates.append(pd.DataFrame(alarms).mean())
     true, simulated = pd.DataFrame(rates).mean(), study.ranking()["pod"]
     assert (true - simulated).abs().max() < 0.05
-    assert simulated.index[0] == true.idxmax() == "temperature removed"
+    assert simulated.index[0] == true.idxmax() == "directions of damage"
 
 
 def test_the_home_page_shows_readmes_code_and_figure():
