@@ -330,3 +330,32 @@ def as_duration(value: Any, name: str, *, may_be_zero: bool = False) -> np.timed
         expected = "a duration of zero or more" if may_be_zero else "a positive duration"
         raise ValueError(f"{name} is {value!r}; expected {expected} with its unit, such as '1h'")
     return duration
+
+
+def midnights(stamps: pd.DatetimeIndex) -> pd.DatetimeIndex:
+    """The first moment of the calendar day of each stamp: midnight, or later where the clocks are set forward then."""
+    return _localized(stamps.tz_localize(None).normalize(), stamps.tz)
+
+
+def midnight(stamp: pd.Timestamp) -> pd.Timestamp:
+    """The first moment of the calendar day of a stamp."""
+    return midnights(pd.DatetimeIndex([stamp]))[0]
+
+
+def midnights_between(first: pd.Timestamp, last: pd.Timestamp) -> pd.DatetimeIndex:
+    """The first moment of each calendar day from that of one stamp to that of another."""
+    ends = (stamp.tz_localize(None).normalize() for stamp in (first, last))
+    return _localized(pd.date_range(*ends, freq="D"), first.tz).as_unit(first.unit)
+
+
+def days_later(midnight: pd.Timestamp, number: int) -> pd.Timestamp:
+    """The first moment of the calendar day that comes so many days after one."""
+    later = midnight.tz_localize(None).normalize() + number * DAY
+    return _localized(pd.DatetimeIndex([later]), midnight.tz)[0]
+
+
+def _localized(days: pd.DatetimeIndex, zone: Any) -> pd.DatetimeIndex:
+    """Days in a time zone; of a midnight that comes twice, the first."""
+    if zone is None:
+        return days
+    return days.tz_localize(zone, nonexistent="shift_forward", ambiguous=np.ones(len(days), dtype=bool))

@@ -15,7 +15,7 @@ from sklearn.base import clone
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import check_flag, is_real
-from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp
+from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, midnight
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import (
     Estimator,
@@ -485,7 +485,7 @@ class Monitor(SavesFrames, Estimator):
         days = self.days_
         evaluated = days.index[days["n_evaluated"] > 0]
         if since is not None:
-            evaluated = evaluated[evaluated >= check_stamp(since, self.baseline_.index, "since").floor("D")]
+            evaluated = evaluated[evaluated >= midnight(check_stamp(since, self.baseline_.index, "since"))]
         if not len(evaluated):
             return 0.0
         steps = np.diff(evaluated.as_unit("ns").asi8) / DAY.value

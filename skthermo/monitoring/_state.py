@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import midnight, midnights, midnights_between
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
@@ -68,7 +69,7 @@ class MonitorState(SavesFrames):
         times, end = store.baseline.index.asi8, store.last
         start = active.memory.start(times, len(times), int(times[-1]) + 1)
         nothing = not_evaluated(store.baseline.index[:0])
-        checkpoint = Checkpoint(end.normalize(), active.corrections.start(), EventLog())
+        checkpoint = Checkpoint(midnight(end), active.corrections.start(), EventLog())
         memory = active.corrections.cleaned(store.baseline.iloc[start:])[list(active.trained.columns)]
         days = _days_of(nothing, np.zeros(0, dtype=np.int64))
         return cls(store, memory, (checkpoint,), checkpoint.log, nothing, days, ((end, active.estimate),))
@@ -249,7 +250,7 @@ class MonitorState(SavesFrames):
             new = store.kept[~kept.isin(known.index)]
             together = pd.concat([known, new]).sort_index()
             return replace(self.before, store=replace(store, kept=together)), new.index
-        if len(self.days) and self.days.index[0] >= self.store.kept.index[0].normalize():
+        if len(self.days) and self.days.index[0] >= midnight(self.store.kept.index[0]):
             nothing = replace(store, kept=store.kept.iloc[:0])
             return replace(MonitorState.of(active, nothing), store=store), kept
         raise ValueError(
@@ -277,7 +278,7 @@ class MonitorState(SavesFrames):
         self, corrections: Corrections, begin: Checkpoint, raw: pd.DataFrame
     ) -> tuple[dict[pd.Timestamp, CorrectionState], Corrected]:
         """States before each day from a checkpoint to the last record, and the records as the detector sees them."""
-        days = list(pd.date_range(begin.day, raw.index[-1].normalize(), freq="D"))
+        days = list(midnights_between(begin.day, raw.index[-1]))
         bounds = [*raw.index.searchsorted(pd.DatetimeIndex(days)), len(raw)]
         parts = [raw.iloc[start:stop] for start, stop in pairwise(bounds)]
         states = [begin.corrections]
@@ -428,7 +429,7 @@ def _days_of(answers: pd.DataFrame, n_left_out: NDArray[np.int64]) -> pd.DataFra
     ``n_records``, of which ``n_evaluated`` and ``n_alarms``; ``n_left_out`` values; ``index_median`` and ``index_max``,
     NaN where there is none.
     """
-    days = answers.index.normalize().rename("day")
+    days = midnights(answers.index).rename("day")
     begins = np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[:1] - 1))
     state, index = (answers[name].to_numpy() for name in ("state", "index"))
     known = [one[~np.isnan(one)] for one in np.split(index, begins[1:])] if len(begins) else []

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import days_later, midnight, midnights_between
 from skthermo.plotting._display import (
     AMBER,
     BLACK,
@@ -308,7 +309,7 @@ def _between(table: pd.DataFrame, start: Time, end: Time) -> pd.DataFrame:
 def _by_day(days: pd.DataFrame) -> pd.DataFrame:
     """A row for each calendar day, those without a record included."""
     if len(days):
-        days = days.reindex(pd.date_range(days.index[0], days.index[-1], freq="D"))
+        days = days.reindex(midnights_between(days.index[0], days.index[-1]))
     columns = {"index": days["index_max"], "median": days["index_median"], "is_alarm": days["n_alarms"].fillna(0) > 0}
     return pd.DataFrame(columns).astype({"index": float, "median": float})
 
@@ -325,7 +326,7 @@ def _thresholds(monitor: Monitor, times: pd.DatetimeIndex, length: pd.Timedelta)
 
 def _overlapping(table: pd.DataFrame, begin: str, end: str, times: pd.DatetimeIndex) -> pd.DataFrame:
     """Rows whose time, from one column to the other, has some of the days from the first to the last of these times."""
-    first, last = times[0].normalize(), times[-1].normalize() + pd.Timedelta("1D")
+    first, last = midnight(times[0]), days_later(midnight(times[-1]), 1)
     keep = [
         begins < last and (pd.isna(ends) or ends >= first)
         for begins, ends in zip(table[begin], table[end], strict=True)

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
+from skthermo._tables.frames import DAY, midnight, midnights_between
 from skthermo.residuals.weather import WeatherFunctions
 
 
@@ -85,5 +86,8 @@ def _means(values: Array, of_day: NDArray[np.intp], n_days: int) -> Array:
 
 def calendar(times: pd.DatetimeIndex, freq: Any) -> pd.DatetimeIndex:
     """Beginnings of the days from the first record to the last."""
-    first = times.min().floor("D") if pd.Timedelta(freq) >= pd.Timedelta("1D") else times.min().floor(freq)
+    length = pd.Timedelta(freq)
+    if length >= DAY and not length % DAY:
+        return midnights_between(times.min(), times.max())[:: length // DAY].rename(times.name)
+    first = midnight(times.min()) if length >= DAY else times.min().tz_convert("UTC").floor(freq).tz_convert(times.tz)
     return pd.date_range(first, times.max(), freq=freq, name=times.name)

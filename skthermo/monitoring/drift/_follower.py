@@ -14,7 +14,7 @@ from scipy import stats
 from skthermo._effects import ALL_GROUPS
 from skthermo._estimators.warnings import warnings_once, without_warnings
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, as_index
+from skthermo._tables.frames import DAY, YEAR, as_index, days_later, midnights_between
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import check_is_fitted
 from skthermo.monitoring._memory import Memory
@@ -42,7 +42,6 @@ RATE = 0.02  # standard deviation of the yearly change of a group that is expect
 WALK = 0.005  # standard deviation of what a year adds to a group's stiffness beside its steady rate
 TURN = 0.01  # standard deviation of what a year adds to the yearly rate
 A_DAY = DAY / YEAR
-ONE_DAY = pd.DateOffset(days=1)
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class FollowerState(SavesFrames):
 
     @property
     def day(self) -> pd.Timestamp:
-        return self.learned + len(self.sudden) * ONE_DAY
+        return days_later(self.learned, len(self.sudden))
 
 
 @dataclass(frozen=True)
@@ -142,8 +141,7 @@ class DriftFollower:
         """
         if not len(F):
             return state
-        today = F.index[-1].normalize()
-        days = pd.date_range(state.day, today, freq="D")[1:]
+        days = midnights_between(state.day, F.index[-1])[1:]
         if not len(days):
             return state
         for _ in days[:-1]:
@@ -272,7 +270,7 @@ class DriftFollower:
             return state
         return replace(
             state,
-            learned=state.learned + ONE_DAY,
+            learned=days_later(state.learned, 1),
             known=self.next_day(state.known, None if sudden[0] else observation(waiting, 0, self.noise, self.slopes)),
             waiting=waiting[1:],
             sudden=sudden[1:],

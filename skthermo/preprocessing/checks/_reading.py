@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import HUGE, Array, as_floats
-from skthermo._tables.frames import as_stamps
+from skthermo._tables.frames import as_stamps, midnight
 from skthermo.preprocessing.checks._kinds import Finding
 
 NUMBERED = pd.Timestamp("1970-03-01")  # before which numbers that are read as nanoseconds fall
@@ -185,7 +185,7 @@ def label_of(label: Any) -> str:
     """How a sentence names a row: by its date, by its time, or by its label."""
     if not isinstance(label, pd.Timestamp) or label is pd.NaT:
         return f"row {label}"
-    return f"{label:%Y-%m-%d}" if label == label.normalize() else f"{label:%Y-%m-%d %H:%M}"
+    return f"{label:%Y-%m-%d}" if label == midnight(label) else f"{label:%Y-%m-%d %H:%M}"
 
 
 def stamp_findings(index: pd.Index) -> list[Finding]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from skthermo._tables.frames import midnight, midnights_between
 from skthermo._tables.text import counted, percent, significant
 from skthermo.fem import Structure
 from skthermo.plotting import MonitorDisplay, StructureDisplay
@@ -35,12 +36,12 @@ def draw_days(standing: Standing) -> list[Html]:
     """Highest and median damage index of each day in the last year and, where service is longer, in all of it."""
     drawn = []
     whole = standing.monitor.days_.index[0]
-    spans = {"The last year, by day": max(standing.last - YEAR, whole).normalize()}
+    spans = {"The last year, by day": midnight(max(standing.last - YEAR, whole))}
     if standing.last - whole > LONGEST:
         spans["All of the service, by day"] = whole
     for title, start in spans.items():
         days = standing.monitor.days_[standing.monitor.days_.index >= start]
-        n_days = (standing.last.normalize() - days.index[0]).days + 1
+        n_days = len(midnights_between(days.index[0], standing.last))
         n_without = n_days - int((days["n_evaluated"] > 0).sum())
         alt = (
             f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import pandas as pd
 
-from skthermo._tables.frames import as_moment
+from skthermo._tables.frames import as_moment, midnight
 from skthermo._tables.text import SPACE, counted, counted_number, duration_text, listed, percent
 from skthermo.monitoring import Monitor, MonitorStatus
 
@@ -191,4 +191,4 @@ def moment(time: Time, *, is_short: bool = False) -> str:
     stamp = pd.Timestamp(time)
     month = stamp.month_name()[: 3 if is_short else None]
     day = SPACE.join([str(stamp.day), month, str(stamp.year)])
-    return day if stamp == stamp.normalize() else f"{day}, {stamp:%H:%M}"
+    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
 from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, row_times
+from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import capital
 from skthermo._validation import last_step, offers, reach_of
@@ -516,7 +516,7 @@ def _labels(T: Table, rows: NDArray[np.intp]) -> list[str]:
     if not has_stamps(T):
         return [f"row {row}" for row in rows]
     stamps = T.index[rows]
-    at_midnight = (T.index == T.index.normalize()).all()
+    at_midnight = (T.index == midnights(T.index)).all()
     return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
 
 

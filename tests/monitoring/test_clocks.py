@@ -1,0 +1,72 @@
+"""Clocks that are set forward or back, in every time zone: days have a first moment, and monitors go on."""
+
+import itertools
+import pickle
+import warnings
+import zoneinfo
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skthermo._tables.frames import days_later, midnight, midnights, midnights_between
+from skthermo.datasets import make_truss_campaign
+from skthermo.monitoring import Monitor
+
+ZONES = sorted(zoneinfo.available_timezones())
+MODES = [f"f{i + 1}" for i in range(6)]
+AT_MIDNIGHT = ("Africa/Cairo",)
+PER_DAY, N_BASELINE = 4, 4 * 365
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+@given(zone=st.sampled_from(ZONES), start=st.integers(0, 20_000), hours=st.integers(1, 400))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_each_stamp_lies_in_the_day_that_its_midnight_begins(unit, zone, start, hours):
+    first = pd.Timestamp("1975-01-01", tz="UTC") + pd.Timedelta(days=start)
+    stamps = pd.date_range(first, periods=hours, freq="h").as_unit(unit).tz_convert(zone)
+    days = midnights(stamps)
+    assert (days <= stamps).all()
+    assert (days.tz_localize(None).normalize() == stamps.tz_localize(None).normalize()).all()
+    between = midnights_between(stamps[0], stamps[-1])
+    assert between.is_monotonic_increasing
+    assert set(days) <= set(between)
+    assert between[0] == midnight(stamps[0])
+    for one, following in itertools.pairwise(between):
+        assert days_later(one, 1) == following
+
+
+@cache
+def campaign():
+    two = make_truss_campaign(2, samples_per_year=N_BASELINE, samples_per_day=PER_DAY, noise=0.003, random_state=0)
+    return two.temperatures.join(two.frequencies)
+
+
+def in_zone(zone):
+    """The campaign with stamps every six hours from 2025 on."""
+    stamps = pd.date_range("2025-01-01", periods=len(campaign()), freq="6h", tz="UTC").tz_convert(zone)
+    return campaign().set_axis(stamps)
+
+
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-excursion|not-evaluated)")
+@pytest.mark.parametrize(
+    "zone",
+    [pytest.param(zone, marks=() if zone in AT_MIDNIGHT else pytest.mark.nightly) for zone in ZONES[::7]]
+    + [pytest.param(zone) for zone in AT_MIDNIGHT if zone not in ZONES[::7]],
+)
+def test_a_year_of_records_gives_the_same_in_one_batch_as_in_many(zone):
+    records = in_zone(zone)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        saved = pickle.dumps(Monitor(targets=MODES, random_state=0).fit(records[:N_BASELINE]))
+    whole, parts = pickle.loads(saved), pickle.loads(saved)
+    expected = whole.update(records[N_BASELINE:])
+    cuts = [N_BASELINE, N_BASELINE + 251, N_BASELINE + 602, N_BASELINE + 1001, len(records)]
+    said = [parts.update(records[a:b]) for a, b in itertools.pairwise(cuts)]
+    np.testing.assert_array_equal(pd.concat(said)["index"], expected["index"])
+    assert whole.days_["n_records"].sum() == len(records) - N_BASELINE
+    assert (whole.days_.index == parts.days_.index).all()
+    assert whole.status(now=records.index[-1]).state == whole.state()
