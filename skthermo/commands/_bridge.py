@@ -59,7 +59,7 @@ class Done:
 
     def failed(self, error: Exception, what: str = "") -> None:
         """Note an error, which does not hide an alarm."""
-        self.errors.append(f"{what}{error}")
+        self.errors.append(f"{what}{sentence(error)}")
         self.code = self.code if self.code == ALARM else FAILED
 
     def facts(self) -> dict[str, Any]:
@@ -185,6 +185,15 @@ class Bridge:
             done.failed(error, f"{page} was not written: ")
 
 
+def sentence(error: Exception) -> str:
+    """What is wrong, in words: an error of the operating system names its file."""
+    if isinstance(error, FileNotFoundError) and error.filename:
+        return f"there is no file {error.filename}"
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error) or type(error).__name__
+
+
 def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done, Exception | None]:
     """Do the work of a command on one bridge, which fails alone."""
     done = Done(bridge.file.stem)
@@ -193,7 +202,7 @@ def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done,
         work(bridge, done)
     except Exception as error:  # Python's own exit code of an error would be that of an alarm
         done.code, done.lines, done.state = FAILED, [], None
-        done.errors.append(str(error) or type(error).__name__)
+        done.errors.append(sentence(error))
         return done, error
     return done, None
 
@@ -279,7 +288,7 @@ def _tried(done: Done, file: Path, read: Callable[..., Any], *arguments: Any) ->
     try:
         return read(*arguments)
     except (OSError, ValueError) as error:
-        done.failed(error if str(file) in str(error) else ValueError(f"{file}: {error}"))
+        done.failed(error if str(file) in str(error) else ValueError(f"{file}: {sentence(error)}"))
         return None
 
 
@@ -387,9 +396,10 @@ def report(bridge: Bridge, done: Done) -> None:
     """Write the page for the owner."""
     monitor = bridge.load()
     bridge.described(monitor, done)
+    done.code = HEALTHY
     bridge.write_page(monitor, done)
     if not done.written and not done.errors:
-        raise ValueError(f"{bridge.file} names no page; expected --report with the name of a file")
+        raise ValueError(f"{bridge.file} names no page; expected --out with the name of a file")
 
 
 def acknowledge(bridge: Bridge, done: Done) -> None:

@@ -6,7 +6,7 @@
     skthermo update bridge/monitor.toml            evaluate what is new in the folder bridge/new
     skthermo update bridge/monitor.toml NEW.csv    evaluate the records of a file
     skthermo status bridge/monitor.toml            say how things stand
-    skthermo report bridge/monitor.toml            write the owner's page
+    skthermo report bridge/monitor.toml --out PAGE write the owner's page
     skthermo acknowledge bridge/monitor.toml 3 --harmless --note "a special transport"
     skthermo rebaseline bridge/monitor.toml --since 2027-05-01
     skthermo refit bridge/monitor.toml             learn anew, the records since the fit included
@@ -15,16 +15,17 @@
 The folder stands for the monitor.toml in it, and the file of a monitor alone, .skops or .joblib, for settings. Several
 settings in one call are a fleet.
 
-Exit codes of update, status and report: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an
-error, and the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its page
-cannot be written. Of several bridges: 1 if one is in alarm, else 3 if one failed, else 2 if one is not evaluated.
-check: 0 no finding, 1 findings. All others: 0 done, 3 an error.
+Exit codes of update and status: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an error, and
+the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its page cannot be
+written. Of several bridges: 1 if one is in alarm, else 3 if one failed, else 2 if one is not evaluated. check: 0 no
+finding, 1 findings. All others: 0 done, 3 an error.
 """
 
 from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 import traceback
 import warnings
@@ -40,7 +41,7 @@ import skthermo
 from skthermo._io import ReadWhenAsked
 from skthermo._tables.text import capital
 from skthermo.commands import _bridge
-from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt
+from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
 from skthermo.commands._outputs import as_json, write_metrics
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
@@ -78,14 +79,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 facts["exit_code"] = options.command(options, facts)
             except Exception as error:  # Python's own exit code of an error would be that of an alarm
                 _complain(error)
-                facts["errors"].append(str(error))
+                facts["errors"].append(sentence(error))
             logger.info("%s ends with exit code %s", options.name, facts["exit_code"])
     except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        facts["errors"].append(str(error))
+        print(f"error: {sentence(error)}", file=sys.stderr)
+        facts["errors"].append(sentence(error))
     if options.json:
-        print(as_json(facts))
+        _print(as_json(facts))
     return facts["exit_code"]
+
+
+def _print(text: str) -> None:
+    """Print a text, or nothing more once its reader has gone, as ``head`` does."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
@@ -122,7 +131,7 @@ def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
 def _complain(error: Exception, what: str = "") -> None:
     if not isinstance(error, EXPLAINED):
         traceback.print_exception(error)
-    logger.error("%s%s", what, error)
+    logger.error("%s%s", what, sentence(error))
 
 
 def _parser() -> Parser:
@@ -175,7 +184,8 @@ def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
     one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
     one.add_argument("--now", metavar="TIME", help="as of this time (default: that of the clock)")
     if name in ("update", "status", "report"):
-        one.add_argument("--report", type=Path, metavar="HTML", help="page for the owner, or of the fleet")
+        page = "--out" if name == "report" else "--report"
+        one.add_argument(page, dest="report", type=Path, metavar="PAGE", help="HTML for the owner, or of the fleet")
         one.add_argument("--title", help="heading of the page")
         one.add_argument("--fdr", type=float, default=0.1, help="false discovery rate of a fleet (default: 0.1)")
     if name not in ("status", "report"):
@@ -251,7 +261,7 @@ def _settings_in(path: Path) -> Path:
 def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:
     where = f"{done.name}: " if number > 1 else ""
     if not options.json and done.lines:
-        print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
+        _print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
     for text in done.errors:
         logger.error("%s%s", where, text)
     if error is not None and not isinstance(error, EXPLAINED):
@@ -283,7 +293,7 @@ def _as_fleet(
             facts["fleet"]["summary"] += f"\n{found.summary()}"
             facts["fleet"]["discoveries"] = found.table.to_dict("records")
         if not options.json:
-            print(facts["fleet"]["summary"])
+            _print(facts["fleet"]["summary"])
         if options.report is not None:
             from skthermo.reporting import owner_report
 
@@ -297,7 +307,7 @@ def _as_fleet(
 def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> int:
     """Say that something beside the monitors failed; the exit code, which stays that of an alarm."""
     _complain(error, what)
-    facts["errors"].append(f"{what}{error}")
+    facts["errors"].append(f"{what}{sentence(error)}")
     return code if code == ALARM else FAILED
 
 
@@ -307,7 +317,7 @@ def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     found = Proposal.of(options)
     facts["findings"] = found.findings.table.to_dict("records")
     if not options.json:
-        print("\n".join([*found.account(), found.findings.summary()]))
+        _print("\n".join([*found.account(), found.findings.summary()]))
     return HEALTHY if found.findings.table.empty else ALARM
 
 
@@ -319,6 +329,6 @@ def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
     if not options.json:
         chosen = [f"chosen: {found.detectors[0]}", f"written: {file}"]
-        print("\n".join([*found.account(), found.findings.summary(), *chosen]))
-        print(f"read it, then: skthermo fit {file}")
+        _print("\n".join([*found.account(), found.findings.summary(), *chosen]))
+        _print(f"read it, then: skthermo fit {file}")
     return HEALTHY

@@ -1,7 +1,10 @@
 """A bridge by commands alone: from two CSV files to a page, night by night."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 from importlib.resources import files
 from itertools import pairwise
 
@@ -168,7 +171,9 @@ def test_a_monitor_of_another_version_is_refused_by_name(bridge, records):
 
 def test_commands_that_an_engineer_uses(bridge, records):
     now = write_day(records, bridge, FIRST, DAMAGED + 30)
-    run("update", settings(bridge), "--now", now)
+    assert run("update", settings(bridge), "--now", now).code == ALARM
+    written = run("report", settings(bridge), "--now", now, "--out", bridge / "alarm.html", "--json")
+    assert (written.code, valid(written.json)["bridges"][0]["state"]) == (0, "alarm")
     status = run("status", settings(bridge), "--now", now, "--json")
     opened = valid(status.json)["bridges"][0]["status"]["events"]
     (event,) = [one for one in opened if one["kind"] == "damage"]
@@ -180,7 +185,7 @@ def test_commands_that_an_engineer_uses(bridge, records):
         True,
     )
     assert run("status", settings(bridge), "--now", now).code != ALARM
-    report = run("report", settings(bridge), "--now", now, "--report", bridge / "other.html", "--json")
+    report = run("report", settings(bridge), "--now", now, "--out", bridge / "other.html", "--json")
     assert valid(report.json)["bridges"][0]["written"] == [str(bridge / "other.html")]
 
 
@@ -337,7 +342,7 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
     monitor = load_monitor(bridge / "monitor.joblib")
     assert monitor.drift_ is not None
     assert set(monitor.smallest_changes_.groups) == {"bottom", "top", "diagonal", "vertical"}
-    assert run("report", settings(bridge)).code != FAILED
+    assert run("report", settings(bridge)).code == 0
     assert "Drawing of the structure. Smallest losses" in (bridge / "status.html").read_text()
     edit(settings(bridge), "make_structure", "make_strcture")
     failed = run("report", settings(bridge))
@@ -345,6 +350,22 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
     edit(settings(bridge), "make_model", "make_modl")
     failed = run("fit", settings(bridge), "--replace")
     assert (failed.code, "make_modl" in failed.err) == (FAILED, True)
+
+
+def test_a_reader_that_has_gone_changes_neither_output_nor_exit_code(fitted):
+    reads, writes = os.pipe()
+    os.close(reads)
+    with os.fdopen(writes, "w") as gone:
+        command = [sys.executable, "-m", "skthermo", "status", str(settings(fitted)), "--json"]
+        done = subprocess.run(command, stdout=gone, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (NOT_EVALUATED, "")
+
+
+@pytest.mark.parametrize("command", ["fit", "update", "status", "report", "check"])
+def test_a_missing_file_is_named_in_words(command, tmp_path):
+    missing = [tmp_path / "nowhere.toml"] if command != "check" else [tmp_path / "T.csv", tmp_path / "F.csv"]
+    done = run(command, *missing)
+    assert (done.code, str(missing[0]) in done.err, "Errno" in done.err) == (FAILED, True, False)
 
 
 def test_numbers_are_read_to_the_last_bit(bridge, records):

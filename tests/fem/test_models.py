@@ -10,6 +10,7 @@ from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from skthermo.datasets import make_truss
+from skthermo.exceptions import ModelWarning
 from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, mac, sample
 
 
@@ -160,3 +161,11 @@ def test_mac_does_not_depend_on_the_scale(scale):
     phi = np.array([[0.5, 0.1], [1.0, -0.2], [-0.3, 0.9]])
     np.testing.assert_allclose(mac(phi * scale, phi[:, ::-1] * scale), mac(phi, phi[:, ::-1]), rtol=1e-3)
     np.testing.assert_allclose(mac(phi * [scale, 1.0], phi), mac(phi, phi), rtol=1e-3)
+
+
+def test_a_small_model_gives_all_its_modes_and_a_larger_one_its_lowest_six():
+    stiffness = 2 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
+    with pytest.warns(ModelWarning) as caught:
+        small = AffineModel({("k",): stiffness[:3, :3]}, np.eye(3))
+    assert (small.n_modes, [one.message.kind for one in caught]) == (3, ["fewer-modes"])
+    assert AffineModel({("k",): stiffness}, np.eye(8)).n_modes == 6

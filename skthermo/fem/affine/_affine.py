@@ -7,6 +7,7 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
+from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import (
     Array,
     Bounds,
@@ -17,6 +18,8 @@ from skthermo._tables.arrays import (
     check_theta,
     positive_integer,
 )
+from skthermo._tables.text import counted
+from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
 from skthermo.fem.affine._base import (
     AffineBase,
@@ -41,6 +44,7 @@ FULL_DENSE, FULL_SPARSE = (0.05, 1.6e-4), (6.0, 0.008)
 """Milliseconds of frequencies and derivatives: of a dense model, in all and per squared degree of freedom; of a sparse
 one, in all and per degree of freedom."""
 
+USUAL_MODES = 6  # as few as vibration tests of bridges usually identify
 VECTORS_PER_PARAMETER = 12  # a basis has about as many vectors for each parameter, and for one more
 REDUCED = (0.06, 5e-5)  # milliseconds of a reduced solve, in all and per squared number of basis vectors
 BASIS_SOLVES, BASIS_PER_VECTOR = (20, 4), 2.0
@@ -62,8 +66,8 @@ class AffineModel(AffineBase):
         constant part; a name may occur in a key more than once. Pairs, unlike a mapping, may repeat a key.
     mass : matrix, mapping or sequence of pairs
         Mass in kg, as ``stiffness``; a single matrix is constant. It may be singular (massless degrees of freedom).
-    n_modes : int, default=6
-        How many of the lowest modes the model gives.
+    n_modes : int, optional
+        How many of the lowest modes the model gives. By default six, or all if there are fewer.
     parameter_names : sequence of str, optional
         Columns of theta. By default the names in the order of the terms.
     groups : mapping of str to list of (tuple of str or int), optional
@@ -119,7 +123,7 @@ class AffineModel(AffineBase):
         stiffness: Terms,
         mass: MatrixLike | Terms,
         *,
-        n_modes: int = 6,
+        n_modes: int | None = None,
         parameter_names: Sequence[str] | None = None,
         groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
         track: bool = False,
@@ -130,13 +134,13 @@ class AffineModel(AffineBase):
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=stiffness_matrices[0].shape[0])
         self._parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self._parameter_names, stiffness_keys)
-        n_modes = positive_integer(n_modes, "n_modes")
+        wanted = USUAL_MODES if n_modes is None else positive_integer(n_modes, "n_modes")
         if contents and len(contents) != len(stiffness_keys):
             raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
         self._contents = tuple(map(tuple, contents))
 
         terms: type[AffineTerms] = (
-            SparseTerms if are_sparse(stiffness_matrices + mass_matrices, n_modes) else DenseTerms
+            SparseTerms if are_sparse(stiffness_matrices + mass_matrices, wanted) else DenseTerms
         )
         stiffness_terms = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
         mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
@@ -144,12 +148,20 @@ class AffineModel(AffineBase):
         nominal = nominal_theta(len(self._parameter_names))
         self._dofs = check_labels(dofs, n_dof)
         check_supported(stiffness_terms.assemble(nominal)[0], self._dofs)
-        available = count_modes(mass_terms.assemble(nominal)[0], at_least=n_modes)
+        available = count_modes(mass_terms.assemble(nominal)[0], at_least=1 if n_modes is None else wanted)
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
+        if n_modes is None and available < wanted:
+            warn_user(
+                f"the model has {counted(available, 'mode')}, and gives them all; without n_modes a larger one gives "
+                f"its lowest {wanted}",
+                ModelWarning,
+                "fewer-modes",
+            )
+            wanted = available
         self._core = AffineCore.from_terms(
             stiffness_terms,
             mass_terms,
-            ranks=range(n_modes),
+            ranks=range(wanted),
             track=check_flag(track, "track"),
             available=min(available, solvable),
         )

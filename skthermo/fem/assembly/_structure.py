@@ -195,7 +195,7 @@ class Structure:
         parameters: Sequence[str] | Mapping[str, str | Binding],
         *,
         groups: Sequence[str] | Mapping[str, str | Binding] | None = None,
-        n_modes: int = 6,
+        n_modes: int | None = None,
         track: bool = False,
     ) -> AffineModel:
         """The structure as an FE model.
@@ -210,8 +210,8 @@ class Structure:
         groups : sequence of str, or mapping of str to group or (property, group), optional
             What can be damaged: the whole stiffness of a group, or the part of it that one property multiplies, as in
             ``{"torsion": ("G", "girder")}``. By default all groups of the structure.
-        n_modes : int, default=6
-            Number of modes.
+        n_modes : int, optional
+            How many of the lowest modes the model gives. By default six, or all if there are fewer.
         track : bool, default=False
             Whether a column follows its mode rather than its rank.
 

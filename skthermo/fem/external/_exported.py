@@ -92,7 +92,7 @@ def load_affine(
     mass: str | None = None,
     total: Total = None,
     factor: float | Mapping[str, float] | None = None,
-    n_modes: int = 6,
+    n_modes: int | None = None,
     parameter_names: Sequence[str] | None = None,
     groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
     track: bool = False,
@@ -121,8 +121,8 @@ def load_affine(
     factor : float or mapping of str to float, optional
         Matrices are not terms but whole stiffness matrices, each with one parameter multiplied by this factor; the
         total is the one as built. `difference_terms` makes the terms and checks them.
-    n_modes : int, default=6
-        How many of the lowest modes the model gives.
+    n_modes : int, optional
+        How many of the lowest modes the model gives. By default six, or all if there are fewer.
     parameter_names : sequence of str, optional
         Columns of theta. By default in the order of the file; a folder is read in the order of its names,
         E_2 before E_10.

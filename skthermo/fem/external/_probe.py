@@ -88,7 +88,7 @@ def probe(
     assemble: Callable[[Array], tuple[MatrixLike, MatrixLike]],
     parameter_names: Sequence[str],
     *,
-    n_modes: int = 6,
+    n_modes: int | None = None,
     track: bool = False,
     n_checks: int = 3,
     random_state: RandomState = None,
@@ -105,8 +105,8 @@ def probe(
         each dense or SciPy sparse of shape (n_dof, n_dof).
     parameter_names : sequence of str
         Columns of theta.
-    n_modes : int, default=6
-        How many of the lowest modes the model gives.
+    n_modes : int, optional
+        How many of the lowest modes the model gives. By default six, or all if there are fewer.
     track : bool, default=False
         Whether a column follows its mode rather than its rank.
     n_checks : int, default=3
