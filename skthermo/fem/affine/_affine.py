@@ -139,9 +139,7 @@ class AffineModel(AffineBase):
             raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
         self._contents = tuple(map(tuple, contents))
 
-        terms: type[AffineTerms] = (
-            SparseTerms if are_sparse(stiffness_matrices + mass_matrices, wanted) else DenseTerms
-        )
+        terms: type[AffineTerms] = SparseTerms if are_sparse(stiffness_matrices + mass_matrices, wanted) else DenseTerms
         stiffness_terms = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self._parameter_names))
         mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self._parameter_names))
         n_dof = stiffness_terms.n_dof
