@@ -76,7 +76,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
 
     def _measurements(self, F: Table) -> Array:
         """Hook: a baseline without values that cannot be, with warnings; what is meaningless is refused."""
-        found = set_aside(frequencies=F, unit="", needs_all=True)
+        found = set_aside(frequencies=F, unit=f"(the input of {type(self).__name__})", needs_all=True)
         warn_each(found.others.warnings(exclude=OF_ORDER))
         return as_floats(found.frequencies)
 

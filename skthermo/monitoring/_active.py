@@ -30,7 +30,13 @@ from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._direction import Direction
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, leading
-from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms, release_level
+from skthermo.monitoring._false_alarms import (
+    QUIET,
+    EventRule,
+    FalseAlarmEstimate,
+    estimate_false_alarms,
+    release_level,
+)
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
@@ -156,16 +162,19 @@ class ActiveDetector(SavesFrames):
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind, release = None, {DAMAGE: index}, release_level(index, DAY, persistence)
+        direction, by_kind = None, {DAMAGE: index}
         if monitor.direction == "softening":
             direction = Direction.of(detector, trained[columns], targets)
-            is_high, stiffer = index > release, direction.of_rows(trained[columns]) < 0
+            is_high, stiffer = (
+                index > release_level(index, DAY, persistence, QUIET),
+                direction.of_rows(trained[columns]) < 0,
+            )
             by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         index_of = partial(_index_of, detector, columns)
         changes = LoweredIndices.of(index_of, trained, targets, usual[1], within, _losses_of(detector))
-        options = {"hold": DAY, "persistence": persistence, "release": release}
+        options = {"hold": DAY, "persistence": persistence, "every": index}
         estimates = {
             kind: estimate_false_alarms(
                 one,
@@ -180,7 +189,9 @@ class ActiveDetector(SavesFrames):
                 per_year = monitor.watch_per_year
                 watch = estimate_false_alarms(by_kind[DAMAGE], per_year, **options, name="watch_per_year")
             lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)
-            estimates[WATCH] = replace(watch, rule=replace(watch.rule, threshold=lower))
+            estimates[WATCH] = replace(
+                watch, rule=replace(watch.rule, threshold=lower, release=min(lower, watch.rule.release))
+            )
         parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)
         return cls(detector, trained, *parts)
 

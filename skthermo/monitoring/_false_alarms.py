@@ -28,6 +28,8 @@ NEAR = 15  # days of the year, up to which a record stands for the season around
 SEASON = 30  # days of the year, before and after each, whose records give its scale
 LEAST_INDEX = 0.1  # share of the median index, as which smaller ones count for the scale of a season
 FEWEST_PEAKS = 3
+QUIET, CLOSES = 0.5, 0.98  # shares of the days of a baseline that stay within a level: what lies above is an excursion,
+# and an event that is open ends
 DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
 HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
@@ -232,14 +234,16 @@ def _quantiles(k: int) -> Array:
     return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
 
 
-def release_level(index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1) -> float:
-    """The level that a healthy structure stays within for the time of ``hold``, as often as not."""
+def release_level(
+    index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1, share: float = CLOSES
+) -> float:
+    """The level that a healthy structure stays within for the time of ``hold``, in this share of such times."""
     hold, known = pd.Timedelta(hold), index.dropna()
     stamps = known.index.as_unit("ns").asi8
     whole = stamps - stamps[:1] >= hold.value
     level = pd.Series(levels(known.to_numpy(), persistence)[0], known.index)
     highest = level.rolling(hold, closed="both").max().to_numpy()
-    return float(np.median(highest[whole] if whole.any() else highest))
+    return float(np.quantile(highest[whole] if whole.any() else highest, share))
 
 
 def seasonal_scale(index: pd.Series) -> pd.Series:
@@ -266,17 +270,17 @@ def estimate_false_alarms(
     *,
     hold: str | pd.Timedelta = "1D",
     persistence: int = 1,
-    release: float | None = None,
+    every: pd.Series | None = None,
     smallest_at: Callable[[float], SmallestChanges] | None = None,
     name: str = "false_alarms_per_year",
 ) -> FalseAlarmEstimate:
     """The rule by which a healthy structure has so many events in a year, from a baseline's out-of-fold indices.
 
-    An excursion lasts from the first level above the release level until all levels of ``hold`` have stayed within
-    it. As that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds
-    it, and the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only
-    departures of one kind count, ``release`` should be the `release_level` of all. ``smallest_at`` gives the smallest
-    changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
+    An excursion lasts from the first level above the usual one until all levels of ``hold`` have stayed within it. As
+    that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds it, and
+    the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only departures of
+    one kind count, ``every`` has the indices of all. ``smallest_at`` gives the smallest changes that a threshold sees,
+    for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     infinite = known.index[np.isinf(known)]
@@ -298,8 +302,11 @@ def estimate_false_alarms(
         warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-excursions")
     asked = per_year * found.n_years
     tail = Tail.of(found.squares, asked, found.scales)
-    release = release_level(known, hold, persistence) if release is None else release
-    rule = EventRule(max(tail.threshold(asked), release), release, hold, persistence)
+    usual, release = (
+        release_level(known if every is None else every, hold, persistence, share) for share in (QUIET, CLOSES)
+    )
+    threshold = max(tail.threshold(asked), usual)
+    rule = EventRule(threshold, min(release, threshold), hold, persistence)
     lowest, highest = tail.numbers(asked, found.n_years)
     method = (
         f"from the {tail.k + 1} highest of {len(found.squares)} excursions of the damage index in {found.years} of "
@@ -327,7 +334,7 @@ class Excursions:
         """Of indices in order of time, all of them finite."""
         scale = seasonal_scale(known)
         standard = known / np.sqrt(scale)
-        quiet = release_level(standard, hold, persistence)
+        quiet = release_level(standard, hold, persistence, QUIET)
         table = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
         table["index"] = table["peak"] * np.sqrt(scale[table["peak_time"]].to_numpy())
         scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)

@@ -38,18 +38,17 @@ def together(records):
     return records.temperatures.join(records.frequencies)
 
 
-def structures(options):
+def structures(seed, n_bridges, per_day=PER_DAY):
     """Name, model, baseline and another healthy year."""
-    seed = options.first_seed
     years = [
-        make_truss_campaign(samples_per_year=365 * PER_DAY, samples_per_day=PER_DAY, random_state=s)
+        make_truss_campaign(samples_per_year=365 * per_day, samples_per_day=per_day, random_state=s)
         for s in (seed, seed + 1)
     ]
     baseline, later = map(together, years)
     yield "truss", make_truss(), baseline, later.set_index(later.index + pd.Timedelta("365D"))
-    for name, bridge in make_fleet(options.bridges, atypical=0.0, random_state=seed).items():
+    for name, bridge in make_fleet(n_bridges, atypical=0.0, random_state=seed).items():
         baseline, later = (
-            together(bridge.records(365, start, samples_per_day=PER_DAY)) for start in ("2024-01-01", "2025-01-01")
+            together(bridge.records(365, start, samples_per_day=per_day)) for start in ("2024-01-01", "2025-01-01")
         )
         yield name, bridge.model, baseline, later
     bridge = blind_bridge.Bridge(seed)
@@ -112,7 +111,7 @@ def main():
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     random, rows = np.random.RandomState(options.first_seed), []
-    for name, model, baseline, later in structures(options):
+    for name, model, baseline, later in structures(options.first_seed, options.bridges):
         targets = [column for column in baseline if str(column).startswith("f")]
         fitted = {what: monitor.fit(baseline) for what, monitor in monitors(model, targets).items()}
         first = later.index[0] + pd.Timedelta("10D")

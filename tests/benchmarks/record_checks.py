@@ -13,6 +13,7 @@ import collections
 import os
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,8 @@ import pandas as pd
 from slow_soil import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
-from skthermo.preprocessing import HampelFilter, check_records, checks
+from skthermo.preprocessing import HampelFilter, check_records, checks, set_aside
+from skthermo.preprocessing.checks._kinds import SET_ASIDE
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
@@ -105,21 +107,25 @@ def faults(T, F, seed):
     at_20, stuck = T.copy(), F.copy()
     at_20.iloc[month, 0] = 20.0
     stuck.iloc[month, 0] = float(F.iloc[:, 0].mean())
-    yield "stuck sensor", "thermometer stuck at 20 degrees for a month", (at_20, F)
-    yield "stuck mode", "mode stuck for a month", (T, stuck)
-    yield "time shift", "temperatures 60 rows late", (T, F.shift(-60))
-    yield "time shift", "temperatures 60 rows early", (T, F.shift(60))
+    yield "stuck-sensor", "thermometer stuck at 20 degrees for a month", (at_20, F)
+    yield "stuck-mode", "mode stuck for a month", (T, stuck)
+    yield "time-shift", "temperatures 60 rows late", (T, F.shift(-60))
+    yield "time-shift", "temperatures 60 rows early", (T, F.shift(60))
     shuffled = T.iloc[random.permutation(n_rows)].set_axis(T.index)
-    yield "weather", "temperatures shuffled", (shuffled, F)
+    yield "no-thermal-effect", "temperatures shuffled", (shuffled, F)
     if F.shape[1] > 3:
         for share in (0.5, 0.1, 0.02):
             rows, swapped = random.random(n_rows) < share, F.to_numpy().copy()
             swapped[np.ix_(rows, [2, 3])] = swapped[np.ix_(rows, [3, 2])]
-            yield "exchanged modes", f"modes 3 and 4 exchanged in {share:.0%}", (T, table_like(F, swapped))
+            yield "exchanged-modes", f"modes 3 and 4 exchanged in {share:.0%}", (T, table_like(F, swapped))
     for share in (0.01, 0.003):
         wrong = random.random(F.shape) < share
         wrong[n_rows // 2, 0] = True
-        yield "outliers", f"outliers, {share:.1%}", (T, F * np.where(wrong, random.choice(OUTLIERS, F.shape), 1.0))
+        yield (
+            "frequency-outliers",
+            f"outliers, {share:.1%}",
+            (T, F * np.where(wrong, random.choice(OUTLIERS, F.shape), 1.0)),
+        )
     drift = 1 + 0.03 * np.linspace(0, 1, n_rows)[:, np.newaxis]
     yield "trend", "frequencies drift by 3 %", (T, F * drift)
 
@@ -309,6 +315,21 @@ def gross_found(T, F):
     return {what for pair in tables for what in checks.gross_errors(*pair).table["what"]}
 
 
+def print_set_aside(records):
+    """Values set aside in healthy records, and columns left out; returns the number of those columns."""
+    rows = {}
+    for name, (T, F) in records:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            cleaned = set_aside(T, F, exclude={"no-rows"})
+        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(SET_ASIDE), 0).sum()
+        rows.setdefault(name, []).append((n_values, len(cleaned.left_out), np.size(T) + np.size(F)))
+    for name, counts in rows.items():
+        n_values, n_left_out, n_all = np.sum(counts, axis=0)
+        print(f"  {name}: {n_values} of {n_all:,} values set aside; columns left out: {n_left_out}", flush=True)
+    return sum(n_left_out for counts in rows.values() for _, n_left_out, _ in counts)
+
+
 def print_false_findings(records, find=found):
     """Share of healthy records with a finding, by kind of records; returns the number of those that are false."""
     rows = {}
@@ -387,6 +408,8 @@ def main():
     if options.gross:
         print(f"gross errors found in healthy records: {n_false}, target 0")
         return 1 if n_false or named < 0.98 else 0
+    print("Values set aside in healthy records:")
+    n_false += print_set_aside(more_healthy_records(options.seeds))
     print("Findings on healthy records:")
     n_false += print_false_findings(healthy_campaigns(options.seeds))
     campaigns = (make_truss_campaign(random_state=seed) for seed in range(options.seeds))

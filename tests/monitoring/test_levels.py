@@ -52,7 +52,7 @@ def lowered(records, share, n_days=31):
 def test_the_lower_level_changes_no_alarm(truss_monitor, two_levels, whole, records):
     assert two_levels.threshold_ == truss_monitor.threshold_
     assert truss_monitor.watch_threshold_ is None
-    assert two_levels.clear_threshold_ <= two_levels.watch_threshold_ < two_levels.threshold_
+    assert max(two_levels.clear_threshold_, two_levels.watch_threshold_) < two_levels.threshold_
     (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST : DAMAGED + 120]), whole
     assert (with_watch["state"] == "alarm").equals(answers["state"] == "alarm")
     pd.testing.assert_series_equal(with_watch["index"], answers["index"])

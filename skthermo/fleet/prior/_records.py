@@ -197,8 +197,10 @@ def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     values = as_columns(check_array(Y, ensure_2d=False, **options))
     check_same_rows(T, Y, ("temperatures", "quantities"))
     inputs = as_columns(inputs)
-    found = set_aside(frame_like(T, inputs), exclude={"no-rows"}, needs_all=True, is_baseline=False)
-    inputs = np.asarray(found.temperatures)
+    named = Y if np.ndim(Y) == 2 else None
+    options = {"unit": "", "exclude": {"no-rows", "constant"}, "needs_all": True}
+    found = set_aside(frame_like(T, inputs), frame_like(named, values), **options)
+    inputs, values = np.asarray(found.temperatures), np.asarray(found.frequencies)
     if isinstance(Y, pd.Series):
         names = ["f1" if Y.name is None else Y.name]
     else:

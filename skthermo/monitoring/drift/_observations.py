@@ -12,11 +12,10 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
-from skthermo._estimators.warnings import warnings_once, without_warnings
+from skthermo._estimators.warnings import warn_each, warnings_once, without_warnings
 from skthermo._tables.arrays import Array, as_floats, refuse_no_table, spread_evenly
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._validation import check_is_fitted
-from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._daily import DailyMeans
 from skthermo.monitoring.drift._kalman import DayShown
 from skthermo.monitoring.drift._noise import DailyNoise
@@ -184,7 +183,8 @@ def with_mirror_images(slopes: Array, nominal: Array) -> Array:
 
 
 def checked_records(fem: Any, T: Any, F: Any) -> tuple[Any, Any]:
-    """Records without values that cannot be; an error for what is no fitted chain, or no records of it with times."""
+    """Records without values that cannot be and columns that say nothing, the first of each time; an error for what is
+    no fitted chain, or no records of it with times."""
     if isinstance(fem, type) or not hasattr(fem, "simulator_"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
@@ -197,8 +197,13 @@ def checked_records(fem: Any, T: Any, F: Any) -> tuple[Any, Any]:
         raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
-    found = set_aside(T, F, model=fem.model, exclude=OF_TRAINING, needs_all=True, is_baseline=False)
-    return found.temperatures, found.frequencies
+    found = set_aside(T, F, model=fem.model, exclude={"no-rows"})
+    warn_each(found.others.warnings(exclude={"unsorted-stamps"}))
+    T, F = (
+        table[~table.index.duplicated()] * np.where(table.columns.isin(list(found.left_out)), np.nan, 1.0)
+        for table in (found.temperatures, found.frequencies)
+    )
+    return T, F
 
 
 def length_of(freq: str) -> float:

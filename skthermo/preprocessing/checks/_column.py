@@ -15,10 +15,14 @@ from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._signs import equal_runs
 
 LOGGED = (*MARKERS, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
-APART, GAP = 8.0, 5.0  # standard deviations of the narrowest half: from its middle, and between two levels
+APART, GAP = 8.0, 5.0  # standard deviations: from the middle of the usual values, and between two levels
+EMPTY = 1 / 3  # share of all that a column spans, between two levels
 FEW_LEVELS, MANY_VALUES = 3, 5  # different values that repeat, far from so many others
 FEW_VALUES, LEAST_KNOWN = 4, 50  # different values of a column of so many
-HALF = 1.349  # standard deviations of a normal distribution in its narrowest half
+NARROWEST, SPAN = (
+    0.4,
+    1.049,
+)  # share of the values of a column, and standard deviations that it spans if they are normal
 AMONG = np.ones(3)  # rows, of which the middle one is as doubtful as the two others
 
 
@@ -49,11 +53,11 @@ class Column:
         rows = self._rows(levels)
         self.reading.found(what, self.name, rows, f"{self.name!r} {detail} in {self.reading.share(rows)}")
 
-    def put_aside(self, what: str, levels: Array, unit: str = "") -> None:
+    def put_aside(self, what: str, levels: Array) -> None:
         """Add a finding in the rows that have one of these levels; they, and single rows among them, become NaN."""
         if len(levels):
             named = texts_of(levels) if len(levels) <= FEW_LEVELS else f"{levels[0]:.6g} to {levels[-1]:.6g}"
-            self.found(what, levels, f"is {named}{unit}")
+            self.found(what, levels, f"is {named}{self.reading.unit}")
             wrong = np.isin(np.arange(len(self.reading.values)), self._rows(levels))
             self.reading.set_aside(what, np.flatnonzero(wrong | binary_closing(wrong, AMONG)), self.place)
             self._sort()
@@ -72,23 +76,23 @@ class Column:
         return levels[isolated]
 
     def levels_apart(self) -> Array:
-        """Values at another level than the others: beyond a gap of half of all that the column spans.
+        """Values at another level than the others: beyond a gap of a third of all that the column spans.
 
-        The narrowest half of the values says how far they scatter. Where it does not, or few are known, none are.
+        The narrowest part of the values says how far they scatter. Where it does not, or few are known, none are.
         """
-        known, half = self.ordered, len(self.ordered) // 2
+        known, n_usual = self.ordered, int(NARROWEST * len(self.ordered))
         apart: list[Array] = []
         if len(known) < LEAST_KNOWN:
             return known[:0]
-        widths = known[half:] - known[: len(known) - half]
+        widths = known[n_usual:] - known[: len(known) - n_usual]
         first = int(widths.argmin())
-        middle, scatter = known[first : first + half + 1].mean(), widths[first] / HALF
+        middle, scatter = known[first : first + n_usual + 1].mean(), widths[first] / SPAN
         levels = self.levels
         while scatter > 0 and len(levels) > 1:
             gaps = np.diff(levels)
             place = int(gaps.argmax())
             side = levels[: place + 1] if levels[place] < middle else levels[place + 1 :]
-            if gaps[place] < max(GAP * scatter, (levels[-1] - levels[0]) / 2) or (
+            if gaps[place] < max(GAP * scatter, EMPTY * (levels[-1] - levels[0])) or (
                 np.abs(side - middle).min() < APART * scatter
             ):
                 break
@@ -103,9 +107,11 @@ class Column:
         if not n_known and not any(found.column == self.name for found in self.reading.findings):
             self.reading.found("missing-column", self.name, whole, f"{self.name!r} is NaN in all {len(whole)} rows")
         elif n_levels == 1 < n_known:
-            self.found("constant", self.levels, f"is {self.levels[0]:.6g}")
+            self.found("constant", self.levels, f"is {self.levels[0]:.6g}{self.reading.unit}")
         elif n_known and is_coarse:
-            self.found("few-values", self.levels, f"has the {n_levels} values {texts_of(self.levels)}")
+            self.found(
+                "few-values", self.levels, f"has the {n_levels} values {texts_of(self.levels)}{self.reading.unit}"
+            )
         if n_levels < 2 or is_coarse:
             self.reading.useless.add(self.place)
         return n_levels < 2

@@ -174,12 +174,15 @@ class _Records:
 
 
 def _stuck(records: _Records) -> Iterator[Finding]:
-    for what, table, names in (("stuck-sensor", records.T, records.sensors), ("stuck-mode", records.F, records.modes)):
+    for what, table, names, unit in (
+        ("stuck-sensor", records.T, records.sensors, " °C"),
+        ("stuck-mode", records.F, records.modes, records.unit),
+    ):
         for name, column in zip(names, table.T, strict=True):
             for rows in stuck_runs(column):
                 if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
                     continue  # a lag of another column, which begins with copies of its first value
-                detail = f"{name!r} is {column[rows[0]]:.6g} in {len(rows)} rows, {records.period(rows)}"
+                detail = f"{name!r} is {column[rows[0]]:.6g}{unit} in {len(rows)} rows, {records.period(rows)}"
                 yield records.finding(what, name, rows, detail)
                 column[rows] = np.nan
                 records.has_faulty_sensors |= table is records.T

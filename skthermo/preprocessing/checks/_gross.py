@@ -85,7 +85,7 @@ class CleanedRecords:
     @classmethod
     def of(cls, given: Mapping[str, Any], *, unit: str, model: Any) -> CleanedRecords:
         """Read temperatures, frequencies or both."""
-        records = cls([Reading.of(table, what) for what, table in given.items()])
+        records = cls([Reading.of(table, what, unit) for what, table in given.items()])
         tables = [reading for reading in records.readings if reading.is_table]
         for reading in tables:
             reading.sort(records._index_of(reading))
@@ -96,7 +96,7 @@ class CleanedRecords:
             if reading.what == "temperatures":
                 look_at_temperatures(reading)
             else:
-                _look_at_responses(reading, unit, beside_weather=len(tables) == 2)
+                _look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=len(tables) == 2)
                 if model is not None and unit == "Hz":
                     check_model(model)
                     _compare_with_model(reading, model)
@@ -215,24 +215,23 @@ def _relative_change(values: Array) -> tuple[float, bool]:
     return float(np.median((high - low) / np.maximum(np.abs(middle), 1e-300))), bool((low > 0).all())
 
 
-def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
+def _look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> None:
     """Put aside what is no frequency, or no response of another kind.
 
     Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
     """
-    in_hertz, unit = unit == "Hz", f" {unit}" if unit else ""
     for place, name in enumerate(F.columns):
         column = Column(F, place, name)
         rest = column.ordered[~np.isin(column.ordered, LOGGED)]
         if not len(rest):
-            column.put_aside("placeholders", column.levels, unit)
+            column.put_aside("placeholders", column.levels)
         elif len(rest) < len(column.ordered):
             repeats = (column.counts > 1) | (column.levels < 0)
             logged = column.levels[np.isin(column.levels, LOGGED) & repeats]
             low, middle, high = (rest[int(share * (len(rest) - 1))] for share in (0.1, 0.5, 0.9))
-            column.put_aside("placeholders", logged[np.abs(logged - middle) > BEYOND * (high - low)], unit)
+            column.put_aside("placeholders", logged[np.abs(logged - middle) > BEYOND * (high - low)])
         if in_hertz:
-            column.put_aside("not-positive", column.levels[column.levels <= 0], unit)
+            column.put_aside("not-positive", column.levels[column.levels <= 0])
         if column.is_poor():
             continue
         middle, width = column.quantile(0.5), column.quantile(0.9) - column.quantile(0.1)
@@ -241,12 +240,12 @@ def _look_at_responses(F: Reading, unit: str, *, beside_weather: bool) -> None:
             isolated, apart = (
                 one[(one > OTHER_MODE * middle) | (one < middle / OTHER_MODE)] for one in (isolated, apart)
             )
-        column.put_aside("isolated-level", isolated if width > 0 else isolated[:0], unit)
-        column.put_aside("another-level", apart[~np.isin(apart, isolated)], unit)
+        column.put_aside("isolated-level", isolated if width > 0 else isolated[:0])
+        column.put_aside("another-level", apart[~np.isin(apart, isolated)])
         deviation = QUARTILES * (column.quantile(0.75) - column.quantile(0.25))
         far = np.abs(column.levels - column.quantile(0.5)) > IMPLAUSIBLE * deviation
         if deviation > 0 and not beside_weather:
-            column.put_aside("implausible-values", column.levels[far], unit)
+            column.put_aside("implausible-values", column.levels[far])
     find_equal_columns(F)
 
 

@@ -23,13 +23,15 @@ DATES = (19500101, 21001231)  # dates written as one integer
 class Reading:
     """A table of records as numbers in order of time, NaN where they cannot be used, and what was found on the way.
 
-    Rows are row ``order`` of the table that was given. Columns that are ``useless`` have one value, or very few.
+    Rows are row ``order`` of the table that was given. Columns that are ``useless`` have one value, or very few. The
+    ``unit`` is what a sentence says after a value.
     """
 
     what: str
     values: Array
     columns: list[Hashable]
     index: pd.Index
+    unit: str = ""
     findings: list[Finding] = field(default_factory=list)
     given_index: pd.Index = field(default_factory=lambda: pd.RangeIndex(0))
     were_known: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
@@ -39,7 +41,7 @@ class Reading:
     aside: list[tuple[str, NDArray[np.intp], int, Array]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, table: Any, what: str) -> Reading:
+    def of(cls, table: Any, what: str, unit: str = "") -> Reading:
         """Read a frame, a Series or anything that is an array; whatever is none has no column."""
         is_series = isinstance(table, pd.Series)
         if is_series:
@@ -54,6 +56,7 @@ class Reading:
             reading = cls(what, np.empty((0, 0)), [], pd.RangeIndex(0))
             reading._read_array(table)
         reading._check_size()
+        reading.unit = " °C" if what == "temperatures" else f" {unit}" if unit else ""
         reading.given_index, reading.order = reading.index, np.arange(len(reading.values))
         reading.were_known = ~np.isnan(reading.values)
         return reading

@@ -43,7 +43,7 @@ class RecordFindings(SavesFrames):
     >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
-    stuck-sensor: 'T1' is 20 in 31 rows, 2025-12-01 to 2025-12-31
+    stuck-sensor: 'T1' is 20 °C in 31 rows, 2025-12-01 to 2025-12-31
         They count as missing. Put NaN where it is stuck
     """
 

@@ -68,9 +68,14 @@ class SetAside(SavesFrames):
         """
         values = self.table[self.table["what"].isin(SET_ASIDE) & ~self.table["column"].isin(list(self.left_out))]
         if len(values):
+            n_values = values["n_rows"].sum()
+            what = (
+                "1 value cannot be a measurement, and counts"
+                if n_values == 1
+                else (f"{n_values:,} values cannot be measurements, and count")
+            )
             yield RecordsWarning(
-                f"{values['n_rows'].sum():,} values cannot be measurements, and count as missing: "
-                f"{listed_details(values['detail'])}. Repair these sensors, or put NaN there",
+                f"{what} as missing: {listed_details(values['detail'])}. Repair these sensors, or put NaN there",
                 "set-aside",
             )
         if self.left_out:
@@ -186,7 +191,8 @@ def _set_runs_aside(reading: Reading) -> None:
         column = reading.values[:, place]
         for rows in stuck_runs(column):
             if rows[0] > 0:  # a lag of another column begins with copies of its first value
-                reading.found(what, name, rows, f"{name!r} is {column[rows[0]]:.6g} in {reading.share(rows)}")
+                value = f"{column[rows[0]]:.6g}{reading.unit}"
+                reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
                 reading.set_aside(what, rows, place)
 
 

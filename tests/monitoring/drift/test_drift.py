@@ -1,6 +1,7 @@
 """Drift of groups: the filter and smoother are exact, what is there is found, and what is not there is not claimed."""
 
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -342,11 +343,30 @@ def test_a_mode_that_is_hardly_measured_is_left_out(ageing, n_measured):
     campaign, fem = ageing
     F = campaign.frequencies.copy()
     F.iloc[n_measured:, 1] = np.nan
-    found = track_parameters(fem, campaign.temperatures, F, GROUPS, WEEK, random_state=0)
+    with nullcontext() if n_measured else pytest.warns(UserWarning, match="left-out"):
+        found = track_parameters(fem, campaign.temperatures, F, GROUPS, WEEK, random_state=0)
     assert found.explanations["groups"].iloc[0] == ("bottom",)
     assert "Measured on too few days to be used: f2." in found.summary()
     error = found.rates.loc["bottom", "standard_error"]
     assert_allclose(found.rates.loc["bottom", "per_year"], -0.02, atol=3 * error)
+
+
+def test_columns_that_say_nothing_and_repeated_records_change_nothing_of_the_others(ageing):
+    campaign, fem = ageing
+    T, F = campaign.temperatures[::7], campaign.frequencies[::7]
+    with pytest.warns(UserWarning, match="left-out"):
+        missing = track_parameters(fem, T, F.assign(f2=np.nan), GROUPS, WEEK, random_state=0)
+    with pytest.warns(UserWarning, match="left-out"):
+        constant = track_parameters(fem, T, F.assign(f2=F["f2"].iloc[0]), GROUPS, WEEK, random_state=0)
+    pd.testing.assert_frame_equal(constant.rates, missing.rates)
+    again = [*range(len(F)), *range(9)]
+    with pytest.warns(UserWarning, match="repeated-stamps"):
+        repeated = track_parameters(fem, T.iloc[again], F.iloc[again], GROUPS, WEEK, random_state=0)
+    once = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
+    pd.testing.assert_frame_equal(repeated.rates, once.rates)
+    for doubtful in (F["f3"], pd.Series(np.where(np.arange(len(F)) % 2, 27.5, 27.6), F.index)):
+        with pytest.warns(UserWarning, match=r"\[(equal-columns|few-values)\]"):
+            track_parameters(fem, T, F.assign(f2=doubtful), GROUPS, WEEK, random_state=0)
 
 
 @pytest.mark.nightly

@@ -1,0 +1,179 @@
+"""Defects of records and what is made of them: refused, as if the values were missing, told, or silently wrong.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/record_defects.py [--shares 1 5 20 50 90] [--seeds 1]
+
+A year of six-hourly records of the truss, of which one column is wrong in a share of the rows: values of a broken
+sensor (size), of the other sign, -999 (marker), one that repeats (stuck), or at another level. For each callable the
+answer is compared with the one to records where the same values are missing:
+
+- missing: equal to it, and a warning names the column;
+- silently missing: equal to it without such a warning;
+- told: another answer, as single records between wrong ones count as missing, too, or nothing is set aside, and a
+  warning names the column (of a monitor in service: its faults, events or reasons);
+- refused: an error;
+- wrong: another answer, without a warning that names the column.
+
+The exit code is 1 if an answer is wrong or silently missing.
+"""
+
+import argparse
+import collections
+import copy
+import sys
+import warnings
+
+import numpy as np
+import pandas as pd
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.fleet import FleetMapper, FleetPrior
+from skthermo.monitoring import Monitor, track_parameters
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+
+PER_DAY = 4
+SHARES = (1, 5, 20, 50, 90)
+DEFECTS = ("size", "sign", "marker", "stuck", "level")
+OF_ONE_TABLE = {
+    "DataInformedFEM.predict": "temperature",
+    "TemperatureMapper.fit": "temperature",
+    "MahalanobisDetector.fit": "frequency",
+}
+SAME = 1e-6  # relative difference of answers that are the same
+
+
+def campaign(seed):
+    year = make_truss_campaign(samples_per_year=365 * PER_DAY, samples_per_day=PER_DAY, noise=0.002, random_state=seed)
+    return year.temperatures, year.frequencies
+
+
+def spoiled(table, column, defect, share, random):
+    """The table with a defect in a share of the rows of a column, and the same with these values missing."""
+    values = table[column].to_numpy()
+    n_wrong = max(round(share / 100 * len(values)), 3)
+    rows = np.sort(random.choice(len(values), n_wrong, replace=False))
+    if defect in ("stuck", "level"):  # these last
+        first = random.integers(1, len(values) - n_wrong + 1) if n_wrong < 60 * PER_DAY else 1
+        rows = np.arange(first, first + n_wrong)
+    wrong = {
+        "size": values[rows] * (100 if values.min() > 0 else 1) + (0 if values.min() > 0 else 484.0),
+        "sign": -values[rows] if values.min() > 0 else -values[rows] - 100,
+        "marker": np.full(n_wrong, -999.0),
+        "stuck": np.full(n_wrong, values[rows[0]]),
+        "level": values[rows] + 12 * np.ptp(values),
+    }[defect]
+    tables = []
+    for new in (wrong, np.nan):
+        changed = table.copy()
+        changed.iloc[rows, table.columns.get_loc(column)] = new
+        tables.append(changed)
+    return tables
+
+
+def callables(T, F):
+    """By name, a function of temperatures and frequencies that gives numbers."""
+    model, months = make_truss(), slice(0, 60 * PER_DAY)
+    targets = list(F)
+    healthy_T, healthy_F = campaign(99)
+    healthy = healthy_T.join(healthy_F)
+    healthy.index += pd.Timedelta(366, "D")
+    half = slice(0, len(T) // 2)
+
+    def monitor():
+        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets)
+        return Monitor(make_pipeline(compensator, MahalanobisDetector()), targets=targets)
+
+    fitted = monitor().fit(T.join(F))
+    chain = DataInformedFEM(model, random_state=0).fit(T[half], F[half])
+    others, T_short, F_short = [(T, F * (1 + 0.01 * k)) for k in range(2)], healthy_T[months], healthy_F[months]
+    later = pd.Timedelta(366, "D")
+
+    def updated(T, F):
+        one, monitor = T.join(F), copy.deepcopy(fitted)
+        answers = monitor.update(one.set_axis(one.index + later))
+        named = [*monitor.faults_["column"], *answers["modes"], *answers["reason"], *monitor.events_["modes"]]
+        warnings.warn(" ".join(map(repr, " ".join(named).replace(",", " ").split())), stacklevel=1)
+        return answers["index"]
+
+    return {
+        "DataInformedFEM.fit": lambda T, F: DataInformedFEM(model, random_state=0).fit(T, F).predict(healthy_T),
+        "DataInformedFEM.predict": lambda T, F: chain.predict(T),
+        "TemperatureMapper.fit": lambda T, F: TemperatureMapper().fit(T, F).predict(healthy_T),
+        "TemperatureCompensator.fit": lambda T, F: (
+            TemperatureCompensator(TemperatureMapper(), targets=targets).fit(T.join(F)).transform(healthy)
+        ),
+        "MahalanobisDetector.fit": lambda T, F: MahalanobisDetector().fit(F).score_samples(healthy_F),
+        "Monitor.fit": lambda T, F: monitor().fit(T.join(F)).update(healthy[months])["index"],
+        "Monitor.update": updated,
+        "track_parameters": lambda T, F: track_parameters(chain, T, F, random_state=0).rates["per_year"],
+        "FleetPrior.fit": lambda T, F: (
+            FleetMapper(FleetPrior().fit([*others, (T, F)])).fit(T_short, F_short).predict(healthy_T)
+        ),
+    }
+
+
+def answer(function, T, F):
+    """What a callable gives, and the texts of its warnings; an error instead of the first if it refuses."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            given = np.asarray(function(T, F), dtype=float)
+        except ValueError as error:
+            given = error
+    return given, " ".join(str(one.message) for one in caught)
+
+
+def outcome(function, wrong, missing, column):
+    given, said = answer(function, *wrong)
+    if isinstance(given, ValueError):
+        return "refused"
+    expected, _ = answer(function, *missing)
+    is_named = repr(column) in said
+    if isinstance(expected, ValueError) or expected.shape != given.shape:
+        return "told" if is_named else "wrong"
+    scale = np.nanstd(expected) or 1.0
+    if np.allclose(given, expected, rtol=0, atol=SAME * scale, equal_nan=True):
+        return "missing" if is_named else "silently missing"
+    return "told" if is_named else "wrong"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shares", type=float, nargs="+", default=SHARES, help="of the rows, in %%")
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--only", nargs="+", help="callables")
+    options = parser.parse_args()
+    rows = []
+    for seed in range(options.seeds):
+        T, F = campaign(seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            functions = callables(T, F)
+        random = np.random.default_rng(seed)
+        for name, function in functions.items():
+            if options.only and name not in options.only:
+                continue
+            for what, table in (("temperature", T), ("frequency", F)):
+                if OF_ONE_TABLE.get(name, what) != what:
+                    continue
+                column = table.columns[1]
+                for defect in DEFECTS:
+                    for share in options.shares:
+                        pair = spoiled(table, column, defect, share, random)
+                        tables = [(one, F) if what == "temperature" else (T, one) for one in pair]
+                        rows.append((name, what, defect, share, outcome(function, *tables, column)))
+    table = pd.DataFrame(rows, columns=["callable", "column", "defect", "share", "outcome"])
+    shown = table.groupby(["callable", "column", "defect"], sort=False)["outcome"].agg(", ".join).unstack("defect")
+    print(f"outcomes at {', '.join(f'{share:g} %' for share in options.shares)} of the rows")
+    for (name, column), row in shown.iterrows():
+        print(f"{name}, {column}:")
+        for defect in DEFECTS:
+            print(f"  {defect}: {row[defect]}")
+    counts = collections.Counter(table["outcome"])
+    print(f"{len(table)} trials: {dict(counts)}")
+    return 1 if counts["wrong"] + counts["silently missing"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
