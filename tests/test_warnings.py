@@ -4,9 +4,11 @@ import pickle
 import re
 import threading
 import warnings
+from copy import deepcopy
 
 import numpy as np
 import pytest
+from sklearn.inspection import partial_dependence, permutation_importance
 
 from skthermo._estimators.warnings import (
     counted_warnings,
@@ -16,7 +18,9 @@ from skthermo._estimators.warnings import (
     warn_user,
     warnings_once,
 )
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.exceptions import FewRecordsWarning, WeatherWarning
+from skthermo.surrogate import DataInformedFEM
 
 
 def test_filters_tell_kinds_apart_and_point_to_the_line_of_the_user():
@@ -65,6 +69,23 @@ def test_what_is_explained_stays_so_after_the_estimator_around():
     assert not explained_rows(table).any()
     with pytest.warns(FewRecordsWarning):
         warn_user("few", FewRecordsWarning, "few-rows")
+
+
+def test_an_inspection_warns_once_for_each_estimator_and_line():
+    year = make_truss_campaign(random_state=0)
+    T, F = year.temperatures, year.frequencies
+    one = DataInformedFEM(make_truss(), random_state=0).fit(T[:120], F[:120])  # a winter, and summer is outside
+    other = deepcopy(one)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for estimator in (one, other, one):
+            permutation_importance(estimator, T, F, n_repeats=2, random_state=0)
+        partial_dependence(one, T, ["T1"], grid_resolution=3)
+    assert [warning.message.kind for warning in caught] == ["outside-training-weather"] * 3
+    assert len({warning.lineno for warning in caught}) == 2
+    for _ in range(2):
+        with pytest.warns(WeatherWarning):
+            one.predict(T)
 
 
 def test_another_thread_has_a_context_of_its_own():

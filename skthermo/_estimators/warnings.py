@@ -6,12 +6,12 @@ import sys
 import threading
 import warnings
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
-from weakref import ref
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from joblib import Parallel
@@ -39,6 +39,7 @@ class Context:
 
 
 _context: ContextVar[Context] = ContextVar("of warnings and checks", default=Context())  # noqa: B039 (it is frozen)
+_inspected: WeakKeyDictionary[Any, set[tuple[str, str, int]]] = WeakKeyDictionary()  # kinds and lines of warnings given
 _turn = threading.RLock()  # held by the job of this process whose warnings are counted
 
 
@@ -55,8 +56,8 @@ def _within(**changes: Any) -> Iterator[None]:
 
 def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
     """Warn at the nearest line outside skthermo, scikit-learn and joblib, once for all folds of a cross-validation or
-    search; a worker process, which sees only its own folds, warns once in its life. The text ends with the kind; an
-    empty one is no warning."""
+    search, and once for each estimator that one such line inspects, as for a partial dependence; a worker process,
+    which sees only its own folds, warns once in its life. The text ends with the kind; an empty one is no warning."""
     if message:
         warn_each([category(message, kind)])
 
@@ -71,9 +72,11 @@ def _give(warning: Warning, kind: str) -> None:
     context = _context.get()
     if kind in context.reported:
         return
-    frame, level, in_folds, jobs = sys._getframe(1), 2, False, None
+    frame, level, in_folds, jobs, inspected = sys._getframe(1), 2, False, None, None
     while frame.f_back is not None and (module := frame.f_globals.get("__name__", "")).split(".")[0] in PASSED_OVER:
         in_folds = in_folds or module.startswith("sklearn.model_selection")
+        if module.startswith("sklearn.inspection"):
+            inspected = frame.f_locals.get("estimator", inspected)
         if frame.f_code is Parallel.__call__.__code__:
             jobs = frame.f_locals["self"]
         frame, level = frame.f_back, level + 1
@@ -84,6 +87,11 @@ def _give(warning: Warning, kind: str) -> None:
         if kind in given:
             return
         given.add(kind)
+    if inspected is not None and isinstance(inspected, Hashable):
+        place = (kind, frame.f_code.co_filename, frame.f_lineno)
+        if place in _inspected.setdefault(inspected, set()):
+            return
+        _inspected[inspected].add(place)
     warnings.warn(warning, stacklevel=level)
 
 

@@ -18,7 +18,6 @@ from skthermo._tables.arrays import (
     check_theta,
     positive_integer,
 )
-from skthermo._tables.text import counted
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms, nominal_theta
 from skthermo.fem.affine._base import (
@@ -150,8 +149,8 @@ class AffineModel(AffineBase):
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
         if n_modes is None and available < wanted:
             warn_user(
-                f"the model has {counted(available, 'mode')}, and gives them all; without n_modes a larger one gives "
-                f"its lowest {wanted}",
+                f"of the {wanted} modes that models give by default this one has only {available}. It gives these; say "
+                f"so by n_modes={available}",
                 ModelWarning,
                 "fewer-modes",
             )
