@@ -218,6 +218,9 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
     given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
     files = [file for file in given if file.suffix in MONITORS]
     records = [file for file in given if file.suffix not in MONITORS]
+    missing = [file for file in given if not (file.suffix or file.exists())]
+    if missing:
+        raise FileNotFoundError(None, None, str(missing[0]))
     if not files or (records and (work is not _bridge.update or len(files) > 1)):
         raise ValueError(
             f"files are {', '.join(map(str, given))}; expected settings (.toml) or monitors (.skops, .joblib)"

@@ -16,6 +16,7 @@ from skthermo.monitoring._events import WATCH
 LATE = 2 * DAY  # beyond the usual step, after which a record is missed
 AHEAD = DAY  # after now, beyond which the stamp of the newest record is wrong
 MOST_EVENTS = 5  # in a summary, the latest ones
+MOST_FAULTS = 3  # of the baseline, in a summary
 FAULT = ("column", "kind", "since", "detail")
 
 
@@ -241,6 +242,10 @@ def summary_lines(monitor: Any) -> Iterator[str]:
         yield f"watch: {'; '.join(_of_watch(monitor, events[is_watch]))}"
     yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
     yield from _of_events(events[~is_watch])
+    aside = monitor.set_aside_
+    if len(aside):
+        values, details = counted(int(aside["n_rows"].sum()), "value"), "; ".join(aside["detail"].head(MOST_FAULTS))
+        yield f"baseline: {values} set aside, as no measurement can be so: {details}"
     faults = monitor.faults_
     for _, fault in faults[faults["until"].isna()].iterrows():
         yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"

@@ -58,7 +58,7 @@ def spoiled(table, column, defect, share, random):
         rows = np.arange(first, first + n_wrong)
     wrong = {
         "size": values[rows] * (100 if values.min() > 0 else 1) + (0 if values.min() > 0 else 484.0),
-        "sign": -values[rows] if values.min() > 0 else -values[rows] - 100,
+        "sign": -values[rows],
         "marker": np.full(n_wrong, -999.0),
         "stuck": np.full(n_wrong, values[rows[0]]),
         "level": values[rows] + 12 * np.ptp(values),

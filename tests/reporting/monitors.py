@@ -28,6 +28,15 @@ def event_row(start, end, kind="damage", modes="f1", groups="", acknowledged=Fal
     }
 
 
+SET_ASIDE = {
+    "column": ["T <1>"],
+    "n_rows": [31],
+    "from": [pd.Timestamp("2025-03-01")],
+    "to": [pd.Timestamp("2025-03-31")],
+    "detail": ["'T <1>' is 484.667 °C in 31 of 365 rows"],
+}
+
+
 class FakeMonitor:
     """Records of 2025 to its July, or of so many days; the last ones not evaluated (None: all)."""
 
@@ -83,6 +92,7 @@ class FakeMonitor:
             self.days_[f"drift {group}"] = np.linspace(0, drift["change"][group], len(self.days_))
         self.evaluations_ = evaluated[evaluated.index > stamps[-1] - pd.Timedelta("400D")]
         self.faults_, self.drift_, self.last_ = faults, drift, stamps[-1]
+        self.set_aside_ = pd.DataFrame(SET_ASIDE)
         self.targets_, self.threshold_, self.clear_threshold_ = ["f1", "f2"], 3.0, 2.0
         self.units_ = {"T1": "°C", "f1": "Hz", "f2": "Hz"}
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])

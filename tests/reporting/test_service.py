@@ -154,6 +154,7 @@ def test_an_alarm_stays_one_without_records_and_says_so():
 def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
     reason = f"all of {QUOTED} are missing"
     monitor = FakeMonitor(n_not_evaluated=n_not_evaluated, reason=reason)
+    monitor.set_aside_ = monitor.set_aside_[:0]
     page = today_of(monitor)
     assert state_of(page) == "not-evaluated"
     since = monitor.evaluations_.index[-n_not_evaluated if n_not_evaluated else 0]
@@ -179,6 +180,11 @@ def test_stiffening_is_reported_and_is_no_alarm():
     assert state_of(page) == "healthy"
     assert f"Event 1 (stiffening) has been open since 10{SPACE}June{SPACE}2025" in page.text
     assert "No damage event is open." in page.text
+
+
+def test_values_of_the_baseline_that_were_set_aside_are_listed():
+    page = Page(not_evaluated(standing_of(FakeMonitor())))
+    assert "'T <1>' is 484.667 °C in 31 of 365 rows" in page.text
 
 
 def test_a_response_that_was_set_aside_is_named_and_what_to_do():

@@ -403,9 +403,9 @@ def sensors(standing: Standing) -> Section:
 def not_evaluated(standing: Standing) -> Section:
     """How many records were not evaluated, and why."""
     counts, evaluated, days = standing.monitor.counts_, standing.evaluations, standing.monitor.days_
-    title = "What was not evaluated"
+    title, of_baseline = "What was not evaluated", _set_aside(standing.monitor.set_aside_)
     if not standing.has_records:
-        return section("not_evaluated", title, paragraphs("No record has come since the baseline."))
+        return section("not_evaluated", title, paragraphs("No record has come since the baseline."), of_baseline)
     number, unknown = int(counts["n_records"]), int(counts["n_not_evaluated"])
     n_days = (days.index[-1] - days.index[0]).days + 1
     text = f"All of {counted(number, 'record')} were evaluated."
@@ -434,7 +434,22 @@ def not_evaluated(standing: Standing) -> Section:
     }
     rows = [[f"Records {text}", f"{int(counts[name]):,}"] for name, text in names.items() if counts.get(name)]
     parts.append(table("What else was noticed.", ["What", "Number"], rows) if rows else Html())
-    return section("not_evaluated", title, *parts)
+    return section("not_evaluated", title, *parts, of_baseline)
+
+
+def _set_aside(found: pd.DataFrame) -> Html:
+    """A table of the baseline's values that count as missing; nothing without any."""
+    rows = [
+        [
+            str(one["column"]),
+            f"{one['n_rows']:,}",
+            *(moment(one[end], is_short=True) for end in ("from", "to")),
+            one["detail"],
+        ]
+        for _, one in found.iterrows()
+    ]
+    caption = "Of the baseline, values that cannot be measurements and count as missing. Look at these sensors."
+    return table(caption, ["Sensor", "Values", "First", "Last", "What"], rows, is_cards=True) if rows else Html()
 
 
 def _reasons(caption: str, reasons: pd.Series) -> Html:
