@@ -1,4 +1,4 @@
-"""Defects of records and what is made of them: refused, as if the values were missing, told, or silently wrong.
+"""Defects of records and what is made of them: refused, as if the values were missing, named, or wrong without a word.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/record_defects.py [--shares 1 5 20 50 90] [--seeds 1]
 
@@ -8,7 +8,7 @@ answer is compared with the one to records where the same values are missing:
 
 - missing: equal to it, and a warning names the column;
 - silently missing: equal to it without such a warning;
-- told: another answer, as single records between wrong ones count as missing, too, or nothing is set aside, and a
+- named: another answer, as single records between wrong ones count as missing, too, or nothing is set aside, and a
   warning names the column (of a monitor in service: its faults, events or reasons);
 - refused: an error;
 - wrong: another answer, without a warning that names the column.
@@ -131,11 +131,11 @@ def outcome(function, wrong, missing, column):
     expected, _ = answer(function, *missing)
     is_named = repr(column) in said
     if isinstance(expected, ValueError) or expected.shape != given.shape:
-        return "told" if is_named else "wrong"
+        return "named" if is_named else "wrong"
     scale = np.nanstd(expected) or 1.0
     if np.allclose(given, expected, rtol=0, atol=SAME * scale, equal_nan=True):
         return "missing" if is_named else "silently missing"
-    return "told" if is_named else "wrong"
+    return "named" if is_named else "wrong"
 
 
 def main():
