@@ -367,7 +367,7 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        found = set_aside(frame_like(X, T), exclude={"no-rows"}, needs_all=True)
+        found = set_aside(frame_like(X, T), exclude={"no-rows", "stuck-sensor"}, needs_all=True)
         T = np.asarray(found.temperatures)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:

@@ -316,7 +316,7 @@ class FleetMapper(RegressorMixin, Estimator):
         values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
-        found = set_aside(frame_like(X, inputs), exclude={"no-rows", "constant"}, needs_all=True)
+        found = set_aside(frame_like(X, inputs), exclude={"no-rows", "constant", "stuck-sensor"}, needs_all=True)
         inputs = np.asarray(found.temperatures)
         self._check_inputs(X)
         self.y_is_vector_ = values.ndim == 1

@@ -113,7 +113,8 @@ def set_aside(
     model : FEModel, optional
         To whose nominal frequencies those in Hz are compared.
     exclude : collection of str, default=()
-        Kinds of findings that do no harm to what is done with the records.
+        Kinds of findings that do no harm to what is done with the records, such as "stuck-sensor" where the rows need
+        not follow each other in time.
     needs_all : bool, default=False
         Whether columns that would be left out are an error.
     is_baseline : bool, default=True
@@ -162,7 +163,7 @@ def set_aside(
     others.refuse_meaningless()
     left_out: dict[Hashable, str] = {}
     for reading in records.readings:
-        _set_runs_aside(reading)
+        _set_runs_aside(reading, exclude)
         reading.restore(kinds)
         own = dict(_left_out(reading, exclude))
         if own and len(own) == len(reading.columns):
@@ -185,11 +186,11 @@ def set_aside(
     return result
 
 
-def _set_runs_aside(reading: Reading) -> None:
+def _set_runs_aside(reading: Reading, exclude: Collection[str]) -> None:
     what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
     for place, name in enumerate(reading.columns):
         column = reading.values[:, place]
-        for rows in stuck_runs(column):
+        for rows in [] if what in exclude else stuck_runs(column):
             if rows[0] > 0:  # a lag of another column begins with copies of its first value
                 value = f"{column[rows[0]]:.6g}{reading.unit}"
                 reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
