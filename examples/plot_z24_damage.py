@@ -326,8 +326,8 @@ print(ranking[["false_alarms", "within_limit", "pod", "pod_deficit", "pod_at_equ
 #    boosted trees, whitened                    0.025         False  0.760        0.003             0.750
 #    raw, local outlier factor                  0.046         False  0.866       -0.103             0.811
 #
-# The whitened residuals of the chain come first, 2 points of POD ahead of piecewise-linear ones, whitened too, and of 20
-# neighbours on raw frequencies. On the real damage the three find 88.5, 90.8 and 91.5 %.
+# The whitened residuals of the chain come first, 2 points of POD ahead of piecewise-linear ones, whitened too, and of
+# 20 neighbours on raw frequencies. On the real damage the three find 88.5, 90.8 and 91.5 %.
 # At equal false alarms, 20 neighbours come first; both whitened residuals are 1 point behind. So simulation leaves a
 # handful of good detectors of 22. A margin of 1 or 2 points between them, with bounds that include noise alone, is no
 # reason to choose; prefer those that stay well below the limit.
