@@ -31,7 +31,7 @@ GAUGES = {
 }
 """Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
 
-KINDS = ("damage", "watch", "stiffening", "measurement or structure")
+KINDS = ("damage", "watch", "measurement or structure")
 
 
 def as_json(facts: Mapping[str, Any]) -> str:

@@ -28,15 +28,8 @@ from skthermo.detection import (
 )
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._direction import Direction
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, STIFFENING, WATCH, leading
-from skthermo.monitoring._false_alarms import (
-    QUIET,
-    EventRule,
-    FalseAlarmEstimate,
-    estimate_false_alarms,
-    release_level,
-)
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, leading
+from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
@@ -127,8 +120,8 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the responses; records go through ``corrections`` before. Without a direction, all changes are damage. There is an
-    estimate of false alarms for each kind of event that has a damage index. After a new baseline, ``prior`` are records
+    the responses; records go through ``corrections`` before. There is an estimate of false alarms for each
+    kind of event that has a damage index. After a new baseline, ``prior`` are records
     from before the intervention, which was complete ``since`` then.
     """
 
@@ -141,7 +134,6 @@ class ActiveDetector(SavesFrames):
     usual: tuple[Array, Array]
     weather: TrainingRange
     corrections: Corrections
-    direction: Direction | None
     lowered: LoweredIndices
     estimates: dict[str, FalseAlarmEstimate]
     prior: pd.DataFrame | None = None
@@ -162,37 +154,22 @@ class ActiveDetector(SavesFrames):
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
         weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        direction, by_kind = None, {DAMAGE: index}
-        if monitor.direction == "softening":
-            direction = Direction.of(detector, trained[columns], targets)
-            is_high, stiffer = (
-                index > release_level(index, DAY, persistence, QUIET),
-                direction.of_rows(trained[columns]) < 0,
-            )
-            by_kind = {DAMAGE: index.mask(is_high & stiffer), STIFFENING: index.mask(is_high & ~stiffer)}
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         index_of = partial(_index_of, detector, columns)
         changes = LoweredIndices.of(index_of, trained, targets, usual[1], within, _losses_of(detector))
-        options = {"hold": DAY, "persistence": persistence, "every": index}
-        estimates = {
-            kind: estimate_false_alarms(
-                one,
-                monitor.false_alarms_per_year,
-                **options,
-                smallest_at=changes.smallest if kind == DAMAGE else None,
-            )
-            for kind, one in by_kind.items()
-        }
+        options = {"hold": DAY, "persistence": persistence}
+        damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=changes.smallest, **options)
+        estimates = {DAMAGE: damage}
         if monitor.watch_per_year is not None:
             with reported_by_caller(KINDS_OF_ESTIMATE):  # for the higher threshold
                 per_year = monitor.watch_per_year
-                watch = estimate_false_alarms(by_kind[DAMAGE], per_year, **options, name="watch_per_year")
-            lower = min(watch.rule.threshold, estimates[DAMAGE].rule.threshold)
+                watch = estimate_false_alarms(index, per_year, **options, name="watch_per_year")
+            lower = min(watch.rule.threshold, damage.rule.threshold)
             estimates[WATCH] = replace(
                 watch, rule=replace(watch.rule, threshold=lower, release=min(lower, watch.rule.release))
             )
-        parts = (memory, columns, temperatures, targets, usual, weather, corrections, direction, changes, estimates)
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, changes, estimates)
         return cls(detector, trained, *parts)
 
     @property
@@ -231,25 +208,6 @@ class ActiveDetector(SavesFrames):
     def own_ratio(self, times: pd.DatetimeIndex) -> Array:
         """The same of records that it was fitted on, each evaluated by the others."""
         return (self.baseline_index / self.threshold).reindex(times).to_numpy()
-
-    def by_kind(self, records: pd.DataFrame, first: int, index: Array) -> dict[str, Array]:
-        """Index of the records from a position on for each kind of event.
-
-        It is NaN where they go the other way, so that they neither open an event of this kind nor close one.
-        """
-        watch = [WATCH] if WATCH in self.estimates else []
-        if self.direction is None:
-            return dict.fromkeys([DAMAGE, *watch], index)
-        with np.errstate(invalid="ignore"):
-            wanted = np.append(np.zeros(first, dtype=bool), index > self.estimate.rule.release)
-        stiffer = np.zeros(len(index), dtype=bool)
-        if wanted.any():
-            begin = self.memory.start(records.index.asi8, first)
-            signs = self.direction.of_rows(records.iloc[begin:][self.columns], wanted[begin:])
-            stiffer = signs[first - begin :] < 0
-        softer = wanted[first:] & ~stiffer
-        by_kind = dict.fromkeys([DAMAGE, *watch], np.where(stiffer, np.nan, index))
-        return by_kind | {STIFFENING: np.where(softer, np.nan, index)}
 
     def index(self, records: pd.DataFrame, first: int) -> Array:
         """Damage index of the records from a position on, in order of time, rounded; those before are their memory.

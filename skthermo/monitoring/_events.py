@@ -14,8 +14,8 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.frames import as_index
 from skthermo.monitoring._false_alarms import EventRule, EventState
 
-DAMAGE, STIFFENING, MEASUREMENT, WATCH = "damage", "stiffening", "measurement or structure", "watch"
-"""Kinds of events; the third is that of responses set aside as implausible or stuck, the last of a raised index."""
+DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
+"""Kinds of events; the second is that of responses set aside as implausible or stuck, the last of a raised index."""
 
 MATTERS = 2.0  # standard deviations from which a mode, or a damage group, drives an alarm
 MOST_NAMED = 3  # of them

@@ -270,7 +270,6 @@ def estimate_false_alarms(
     *,
     hold: str | pd.Timedelta = "1D",
     persistence: int = 1,
-    every: pd.Series | None = None,
     smallest_at: Callable[[float], SmallestChanges] | None = None,
     name: str = "false_alarms_per_year",
 ) -> FalseAlarmEstimate:
@@ -278,9 +277,9 @@ def estimate_false_alarms(
 
     An excursion lasts from the first level above the usual one until all levels of ``hold`` have stayed within it. As
     that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds it, and
-    the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. Where only departures of
-    one kind count, ``every`` has the indices of all. ``smallest_at`` gives the smallest changes that a threshold sees,
-    for warnings, ``name`` is what errors call ``per_year``.
+    the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. An excursion may be several
+    events, as these end at a higher level: in the mean, as many as the highest excursions are. ``smallest_at`` gives
+    the smallest changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     infinite = known.index[np.isinf(known)]
@@ -302,10 +301,11 @@ def estimate_false_alarms(
         warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-excursions")
     asked = per_year * found.n_years
     tail = Tail.of(found.squares, asked, found.scales)
-    usual, release = (
-        release_level(known if every is None else every, hold, persistence, share) for share in (QUIET, CLOSES)
-    )
-    threshold = max(tail.threshold(asked), usual)
+    usual, release = (release_level(known, hold, persistence, share) for share in (QUIET, CLOSES))
+    half = max(tail.threshold((tail.k + 1) / 2), usual)
+    n_events = len(find_events(known.to_numpy(), known.index, EventRule(half, min(release, half), hold, persistence)))
+    per_excursion = max(n_events / max((found.table["index"] > half).sum(), 1), 1.0)
+    threshold = max(tail.threshold(asked / per_excursion), usual)
     rule = EventRule(threshold, min(release, threshold), hold, persistence)
     lowest, highest = tail.numbers(asked, found.n_years)
     method = (

@@ -21,7 +21,6 @@ from skthermo._validation import (
     Estimator,
     HasMethods,
     Interval,
-    StrOptions,
     _fit_context,
     check_is_fitted,
     held,
@@ -75,8 +74,6 @@ class Monitor(SavesFrames, Estimator):
         Number of records above the threshold by which an event opens, among the last ``2 persistence - 1`` that were
         evaluated: three of five. Single outliers raise no alarm, and a change that lasts is found by its third record.
         1 means that a single record opens an event.
-    direction : {"both", "softening"}, default="both"
-        Which changes are damage. With "softening", stiffening is an event of its own kind, and no alarm.
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
     max_jump : str or timedelta, optional
@@ -120,7 +117,7 @@ class Monitor(SavesFrames, Estimator):
     lookback_ : object
         Which earlier records the evaluation of a record needs.
     events_ : DataFrame
-        A row for each event, counted from 1: ``kind`` ("damage", "watch", "stiffening", or "measurement or structure":
+        A row for each event, counted from 1: ``kind`` ("damage", "watch", or "measurement or structure":
         responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
         is open), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
         largest number of responses set aside), ``peak_time``, ``modes`` (at the peak) and ``groups`` (of all records in
@@ -203,7 +200,6 @@ class Monitor(SavesFrames, Estimator):
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
         "watch_per_year": [Interval(Real, 0, None, closed="neither"), None],
         "persistence": [Interval(Integral, 1, None, closed="left")],
-        "direction": [StrOptions({"both", "softening"})],
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
         "max_jump": [str, timedelta, np.timedelta64, None],
@@ -224,7 +220,6 @@ class Monitor(SavesFrames, Estimator):
         false_alarms_per_year: float = 1.0,
         watch_per_year: float | None = None,
         persistence: int = 3,
-        direction: Literal["both", "softening"] = "both",
         max_delay: str | timedelta = "7D",
         max_jump: str | timedelta | None = None,
         retention: str | timedelta = "400D",
@@ -240,7 +235,6 @@ class Monitor(SavesFrames, Estimator):
         self.false_alarms_per_year = false_alarms_per_year
         self.watch_per_year = watch_per_year
         self.persistence = persistence
-        self.direction = direction
         self.max_delay = max_delay
         self.max_jump = max_jump
         self.retention = retention

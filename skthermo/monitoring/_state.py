@@ -18,7 +18,6 @@ from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionS
 from skthermo.monitoring._events import (
     DAMAGE,
     MEASUREMENT,
-    STIFFENING,
     WATCH,
     Acknowledgement,
     EventLog,
@@ -158,7 +157,8 @@ class MonitorState(SavesFrames):
         outside = active.extrapolated(records.iloc[n_memory:])
         is_blind = active.is_blind(records, n_memory, outside) & ~seen.is_held
         is_doubtful = seen.is_held | is_contested
-        series = active.by_kind(records, n_memory, _not_closing(index, is_doubtful, active))
+        kinds = [kind for kind in (DAMAGE, WATCH) if kind in active.estimates]
+        series = dict.fromkeys(kinds, _not_closing(index, is_doubtful, active))
         times = raw.index.asi8
         after = (rules[kind].follow(begin.log.state(kind), one, times)[0] for kind, one in series.items())
         rows = np.flatnonzero(np.any(list(after), axis=0) & ~np.isnan(index))
@@ -175,7 +175,6 @@ class MonitorState(SavesFrames):
         is_above = (index > active.threshold) & (numbers[DAMAGE] == 0)
         pending = _pending(is_above, is_doubtful | is_blind | np.isnan(index), [*before["state"].iloc[-1:]])
         remarks = {
-            "stiffer than the baseline": numbers.get(STIFFENING, np.zeros(len(raw))) > 0,
             "above the threshold, not yet for long": pending,
             "thermometers contradict each other, and without one of them it would be in alarm": is_contested,
             f"even a fall of all responses by {100 * active.fall_to_detect:.2g} % would stay undetected": is_blind,
@@ -406,7 +405,7 @@ def _answers(
     has_changed = is_held & (numbers.get(MEASUREMENT, np.zeros(len(index))) > 0)
     is_alarm = (has_index & (number > 0)) | has_changed
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
-    for kind in (STIFFENING, MEASUREMENT, WATCH):
+    for kind in (MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))
     groups, is_shown = [", ".join(leading(sizes)) for sizes in drivers[1]], is_alarm | is_watch
     quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")

@@ -18,7 +18,6 @@ from skthermo.plotting._display import (
     GREY,
     LIGHT,
     ORANGE,
-    SKY,
     Display,
     date_axis,
     hold_outliers,
@@ -48,7 +47,6 @@ DODGE = 0.02  # share of the axis of time between error bars beside the last day
 SHADES: dict[str, dict[str, object]] = {
     "damage event": {"facecolor": (ORANGE, 0.2), "edgecolor": (ORANGE, 0.5)},
     "watch event": {"facecolor": (AMBER, 0.15), "edgecolor": (AMBER, 0.6), "hatch": "\\\\"},
-    "stiffening event": {"facecolor": (SKY, 0.3), "edgecolor": (SKY, 0.7), "hatch": "//"},
     "measurement or structure event": {"facecolor": (GREY, 0.25), "edgecolor": (GREY, 0.7), "hatch": "xx"},
     "event marked as harmless": {"facecolor": (GREY, 0.15), "edgecolor": (GREY, 0.5), "hatch": ".."},
 }

@@ -62,7 +62,6 @@ use(
     false_alarms_per_year=(1.0, number(0, -1)),
     watch_per_year=(12.0, number(0, -1, 1.0, but=("None",))),
     persistence=(3, number(0, -1, 1.5)),
-    direction=("both", choice()),
     max_delay=("7D", durations("zero")),
     max_jump=("28D", durations("None")),
     retention=("400D", durations()),

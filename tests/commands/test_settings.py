@@ -84,8 +84,8 @@ def test_the_file_makes_what_python_makes(read):
     )
     others = read('# whiten = "auto"', 'whiten = "none"').monitor()
     assert others.detector[0].whiten is None
-    softening = read('# direction = "both"', 'direction = "softening"\nmax_jump = "30D"').monitor()
-    expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), direction="softening", max_jump="30D")
+    softening = read("# persistence = 3", 'persistence = 5\nmax_jump = "30D"').monitor()
+    expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), persistence=5, max_jump="30D")
     assert repr(softening) == repr(expected)
     assert clone(softening).get_params(deep=False).keys() == softening.get_params(deep=False).keys()
 
@@ -122,7 +122,7 @@ def test_defaults_that_the_file_shows_are_those_that_hold(proposed, read, tmp_pa
         ("[monitor]\n", "[montior]\n", "did you mean 'monitor'"),
         ("# persistence = 3", "persistence = 0", "persistence"),
         ("# persistence = 3", 'persistence = "three"', "persistence"),
-        ('# direction = "both"', 'direction = "down"', "softening"),
+        ("# persistence = 3", "persistence = -1", "persistence"),
         ("false_alarms_per_year = 1.0", "false_alarms_per_year = -1", "false_alarms_per_year"),
         ('class = "DirectionalDetector"', 'class = "MahalanobisDetecter"', "did you mean 'MahalanobisDetector'"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "sklearn.linear_model.Rigde"', "scikit-learn"),

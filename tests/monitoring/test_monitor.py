@@ -425,29 +425,6 @@ def test_what_the_owner_says_of_an_event_stays_with_it():
         monitor.acknowledge(99, harmless=True)
 
 
-@pytest.mark.nightly
-def test_stiffening_is_no_damage_where_softening_is_asked_for():
-    stiffer = ALL[N_BASELINE:].copy()
-    stiffer.iloc[60:, 3:] *= [1.03, 1.02, 1.02]
-    softer = ALL[N_BASELINE:].copy()
-    softer.iloc[60:, 3:] *= [0.97, 0.98, 0.98]
-    monitor = Monitor(DETECTORS["lags"][0], direction="softening", sensors=False).fit(BASELINE)
-    other = copy.deepcopy(monitor)
-    answers = monitor.update(stiffer)
-    last = monitor.events_.iloc[-1]
-    assert last["kind"] == "stiffening"
-    assert pd.isna(last["end"])
-    assert monitor.state() == "healthy"
-    assert answers.iloc[-1][["state", "reason", "event"]].tolist() == [
-        "healthy",
-        "stiffer than the baseline",
-        len(monitor.events_),
-    ]
-    other.update(softer)
-    assert other.events_["kind"].iloc[-1] == "damage"
-    assert other.state() == "alarm"
-
-
 def test_a_monitor_is_cloned_and_has_parameters():
     monitor, _, after = fitted("lags")
     twin = clone(monitor)

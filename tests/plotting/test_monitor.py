@@ -80,12 +80,12 @@ def test_events_are_shaded_until_they_end_and_open_ones_to_the_end_of_the_axis()
     rows = [
         event_row("2025-02-01", "2025-02-08"),
         event_row("2025-03-01", "2025-03-04", acknowledged=True, harmless=True),
-        event_row("2025-06-20", None, kind="stiffening"),
+        event_row("2025-06-20", None, kind="measurement or structure"),
         event_row("2024-06-01", "2024-06-02"),  # before the first day that is drawn
     ]
     display = MonitorDisplay.from_estimator(FakeMonitor(events=rows))
     labels = [span.get_label() for span in display.event_spans_]
-    assert labels == ["damage event", "event marked as harmless", "stiffening event"]
+    assert labels == ["damage event", "event marked as harmless", "measurement or structure event"]
     widths = [span.get_width() for span in display.event_spans_]
     assert widths[:2] == [7, 3]
     last = display.event_spans_[2]

@@ -174,14 +174,6 @@ def test_a_new_baseline_after_a_change_of_the_structure_is_said():
     assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in introduction(monitor)[1]
 
 
-def test_stiffening_is_reported_and_is_no_alarm():
-    monitor = FakeMonitor(events=[event_row("2025-06-10", None, kind="stiffening")])
-    page = today_of(monitor)
-    assert state_of(page) == "healthy"
-    assert f"Event 1 (stiffening) has been open since 10{SPACE}June{SPACE}2025" in page.text
-    assert "No damage event is open." in page.text
-
-
 def test_values_of_the_baseline_that_were_set_aside_are_listed():
     page = Page(not_evaluated(standing_of(FakeMonitor())))
     assert "'T <1>' is 484.667 °C in 31 of 365 rows" in page.text
@@ -351,7 +343,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
 
 
 def test_damage_events_are_counted_beside_the_false_alarms_that_were_to_be_expected():
-    seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="stiffening")]
+    seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="watch")]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
     text = Page(false_alarms(standing_of(monitor))).text
     assert "gives 2 false alarms a year on average" in text

@@ -57,7 +57,6 @@ FAULTS = {
 }
 KINDS = {
     "watch": "in which the damage index was raised, below an alarm",
-    "stiffening": "in which the structure was stiffer, which is reported but no damage",
     "measurement or structure": "in which a response was set aside: its sensor, or the structure, has changed",
 }
 
@@ -492,7 +491,6 @@ def false_alarms(standing: Standing) -> Section:
         ["Time for which it stays there", duration_text(pd.Timedelta(estimate.rule.hold))],
         ["Years of baseline behind it", significant(estimate.n_years, 2)],
         ["How the threshold was found", element("span", estimate.method, class_="text")],
-        ["Which changes are damage", {"both": "softening and stiffening"}.get(monitor.direction, monitor.direction)],
     ]
     if monitor.watch_threshold_ is not None:
         rows.insert(1, ["Level above which a watch begins", significant(monitor.watch_threshold_, 4)])
