@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import compress, product
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import pandas as pd
 
 from skthermo._tables.frames import MARKERS
 from skthermo.commands._record_files import (
+    EXCEL,
     ISO,
     NUMERIC,
     OFFSET,
@@ -26,6 +27,7 @@ from skthermo.commands._record_files import (
     rows_in,
     rows_of,
     text_of,
+    used_width,
     without_margin,
 )
 
@@ -67,7 +69,7 @@ class Look:
 def look_at(file: Path, zone: str | None = None, stamps: str | None = None) -> Look:
     """Find the form of a file and read it, in a time zone and with a format of its stamps if these are known."""
     if not file.is_file():
-        raise FileNotFoundError(f"there is no file {str(file)!r}; expected a CSV file, Excel workbook or parquet file with records")
+        raise FileNotFoundError(f"there is no file {str(file)!r}; expected records as CSV, .xlsx or parquet")
     if file.suffix.lower() in PARQUET:
         form, units, ignored, notes = CsvFormat(time_zone=zone), {}, {}, []
     else:
@@ -94,12 +96,13 @@ def _look_at_table(
     rows, _ = rows_in(file, CsvFormat(separator))
     widths = [len(row) for _, row in rows[:MOST_LOOKED_AT]]
     width = max(set(widths), key=widths.count, default=0)
-    while width and not any(row[width - 1] for _, row in rows if len(row) >= width):
-        width -= 1
+    width = used_width([row for _, row in rows], width)
     rows = [(line, without_margin(row, width)) for line, row in rows]
     rows = [(line, row) for line, row in rows if len(row) == width]
-    places, stamps, is_record, notes = _stamps_of([row for _, row in rows], file, stamps)
-    first = is_record.index(True)
+    cells = [row for _, row in rows]
+    places, stamps, notes = _stamps_of(cells, file, stamps)
+    is_record = _times_in(cells[:MOST_LOOKED_AT], places, stamps).notna()
+    first = int(np.argmax(is_record))
     above = [one for one in rows[:first] if one[1][0] != "TOA5"]
     above = [one for one in above if not one[1][0].startswith("#")] or above
     if not above:
@@ -108,8 +111,7 @@ def _look_at_table(
             f"decimal sign {decimal!r}; expected one, then a line for each record"
         )
     names_line, names = max(above, key=lambda one: sum(map(bool, one[1])))  # a title has fewer cells
-    records = [row for (_, row), is_one in zip(rows, is_record, strict=True) if is_one]
-    columns = dict(zip(names, zip(*records, strict=True), strict=True))
+    columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
     stamp_columns = [names[place] for place in places]
     units = {
         name: UNITS[cell.lower()]
@@ -125,7 +127,7 @@ def _look_at_table(
         and _share_of_numbers(cells, decimal) < MOSTLY
         and any(_is_number(cell, decimal) is False for cell in cells)
     }
-    has_offsets = any(OFFSET.search(" ".join(row[place] for place in places)) for row in records[:1])
+    has_offsets = OFFSET.search(_stamp_text(cells[first], places)) is not None
     form = CsvFormat(
         separator,
         decimal,
@@ -168,86 +170,93 @@ def _is_number(cell: str, decimal: str) -> bool | None:
         return False
 
 
-def _stamps_of(
-    rows: Sequence[Sequence[str]], file: Path, given: str | None
-) -> tuple[tuple[int, ...], str, list[bool], list[str]]:
-    """Places of the columns that hold the stamps, their format, which rows have one, and what is doubtful in it."""
+def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
+    """Places of the columns that hold the stamps, their format, and what is doubtful in it."""
     looked = rows[:MOST_LOOKED_AT]
-    columns = list(zip(*looked, strict=True))
-    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(TIME_OF_DAY.match, cells))) > len(cells)]
     for forms in [(given,)] if given else [WRITTEN, tuple(NUMERIC)]:
-        found = {}
-        for n in range(len(columns)):
-            clock = min((one for one in clocks if one != n), key=lambda one, n=n: (abs(one - n), one < n), default=None)
-            for places in [(n,)] if clock is None else [(n, clock), (n,)]:
-                fitting = _fitting(looked, places, forms)
-                if fitting:
-                    found[places] = fitting
-                    break
-            if found and forms is WRITTEN:
-                break
-        if len(found) > 1:
-            raise ValueError(
-                f"{file}: columns {[places[0] + 1 for places in found]} may all be stamps in the form of "
-                f"{'numbers'}; expected one such column"
-            )
-        for places, fitting in found.items():
-            stamps, notes = _certain(rows, places, fitting, file)
-            return places, stamps, list(_times_in(rows, places, stamps).notna()), notes
+        tried = ((places, _fitting(looked, places, forms)) for places in _places(looked))
+        found = (one for one in tried if one[1])
+        for places, fitting in found:
+            other, _ = next(found, (None, [])) if fitting[0] in NUMERIC else (None, [])
+            if other is not None:
+                got = f"columns {places[0] + 1} and {other[0] + 1} may both hold times as numbers"
+                raise ValueError(f"{file}: {got}; expected one of them")
+            return places, *_certain(rows, places, fitting, file)
     raise ValueError(
         f"{file}: no column holds times, such as 2026-01-31 13:00 or 31.01.2026 13:00; the first values are "
         f"{list(rows[0])!r:.200}"
     )
 
 
+def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
+    """Columns that may hold stamps: each with the nearest time of day, and alone."""
+    columns = list(zip(*rows, strict=True))
+    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(TIME_OF_DAY.match, cells))) > len(cells)]
+    for n in range(len(columns)):
+        near = sorted((abs(clock - n), clock < n, clock) for clock in clocks if clock != n)
+        yield from ((n, clock) for *_, clock in near[:1])
+        yield (n,)
+
+
+def _stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
+    return " ".join(row[place] for place in places)
+
+
 def _times_in(rows: Sequence[Sequence[str]], places: Sequence[int], form: str) -> pd.DatetimeIndex:
     """Stamps in some columns of rows, NaT where there is none that is plausible."""
-    index = parsed([" ".join(row[place] for place in places) for row in rows], form)
+    index = parsed([_stamp_text(row, places) for row in rows], form)
     return index.where((index.year >= YEARS[0]) & (index.year <= YEARS[1]))
 
 
 def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str]) -> list[str]:
-    """Formats in which most rows have a stamp, and most of these differ; those that read the most rows."""
+    """Formats by which the most rows have a stamp, if these are most rows, and their stamps are not all the same."""
     sample = rows[len(rows) // 2 :: max(len(rows) // 8, 1)]
-    found = {form: _times_in(rows, places, form) for form in forms if _times_in(sample, places, form).notna().any()}
-    counts = {form: int(index.notna().sum()) for form, index in found.items()}
-    most = max(counts.values(), default=0)
-    if 2 * most < len(rows):
-        return []
-    return [form for form, index in found.items() if counts[form] == most and 2 * index.nunique() >= most]
+    signs = {sign for row in sample for sign in _stamp_text(row, places)}
+    likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
+    found = {form: _times_in(rows, places, form) for form in likely if _times_in(sample, places, form).notna().any()}
+    least = max([len(rows) / 2, *(index.notna().sum() for index in found.values())])
+    return [
+        form
+        for form, index in found.items()
+        if index.notna().sum() == least
+        and 2 * index.nunique() >= least
+        and (form != EXCEL or _is_in_order(index))  # other numbers are as large
+    ]
 
 
 def _certain(
     rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], file: Path
 ) -> tuple[str, list[str]]:
-    """The format of stamps where several are possible, and a note that says so: the one that reads the most rows, or
-    the only one by which records follow each other regularly."""
-    if len(forms) > 1:
-        found = {form: _times_in(rows, places, form) for form in forms}
-        most = max(index.notna().sum() for index in found.values())
-        found = {form: index for form, index in found.items() if index.notna().sum() == most}
-        readings = [form for n, form in enumerate(found) if not any(found[form].equals(found[one]) for one in [*found][:n])]
-        regular = [form for form in readings if _is_regular(found[form])]
-        if len(readings) > 1 and len(regular) != 1:
-            raise ValueError(
-                f"{file}: stamps such as {' '.join(rows[-1][place] for place in places)!r} may have the formats "
-                f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
-            )
-        if len(readings) > 1:
-            other = next(form for form in readings if form != regular[0])
-            return regular[0], [
-                f"stamps of {file.name} may also have the format {other}: by {regular[0]}, records follow each other "
-                "regularly"
-            ]
-        return readings[0], []
-    return forms[0], []
+    """Of several formats, the one by which the most rows have a stamp, or else they follow each other regularly."""
+    found: dict[str, pd.DatetimeIndex] = {}
+    for form in forms:
+        index = _times_in(rows, places, form)
+        if not any(index.equals(other) for other in found.values()):
+            found[form] = index
+    most = max(index.notna().sum() for index in found.values())
+    readings = [form for form, index in found.items() if index.notna().sum() == most]
+    certain = readings if len(readings) == 1 else [form for form in readings if _is_regular(found[form])]
+    if len(certain) != 1:
+        raise ValueError(
+            f"{file}: stamps such as {_stamp_text(rows[-1], places)!r} may have the formats "
+            f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
+        )
+    others = [form for form in readings if form not in certain]
+    return certain[0], [
+        f"stamps of {file.name} may also have the format {form}: by {certain[0]}, they follow each other regularly"
+        for form in others[:1]
+    ]
+
+
+def _is_in_order(stamps: pd.DatetimeIndex) -> bool:
+    known = stamps.dropna()
+    return known.is_monotonic_increasing or known.is_monotonic_decreasing
 
 
 def _is_regular(stamps: pd.DatetimeIndex) -> bool:
     """Whether stamps are in order, with few gaps: days and months that are exchanged make long ones."""
-    steps = np.diff(stamps.dropna().as_unit("ns").asi8).astype(float)
-    is_in_order = (steps >= 0).all() or (steps <= 0).all()
-    return bool(is_in_order and np.abs(steps).mean() <= 1.5 * np.median(np.abs(steps))) if len(steps) else True
+    steps = np.abs(np.diff(stamps.dropna().asi8))
+    return _is_in_order(stamps) and (not len(steps) or bool(steps.mean() <= 1.5 * np.median(steps)))
 
 
 def _no_measurements(records: pd.DataFrame) -> Iterator[tuple[str, str]]:

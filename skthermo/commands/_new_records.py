@@ -75,7 +75,8 @@ class Taken:
         table = read(file, leave_unfinished=not is_as_before)  # a line that is not finished may be, the next time
         n_rows = known.get("rows", 0)
         n_done = n_rows if len(table) >= n_rows and _checksum(table[:n_rows]) == known.get("checksum") else 0
-        is_finished = is_as_before or file.suffix.lower() in BINARY or file.read_bytes().rstrip(b"\0")[-1:] in (b"\n", b"\r")
+        end = file.read_bytes().rstrip(b"\0")[-1:]
+        is_finished = is_as_before or file.suffix.lower() in BINARY or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
     def _key(self, file: Path) -> str:

@@ -19,7 +19,7 @@ from skthermo._tables.arrays import Array
 from skthermo._validation import import_optional
 from skthermo.exceptions import RecordsWarning
 
-ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix ms", "excel"
+ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"
 NUMERIC = {UNIX: ("s", "unix", 5e8, 4e9), UNIX_MS: ("ms", "unix", 5e11, 4e12), EXCEL: ("D", "1899-12-30", 3e4, 7.5e4)}
 """Stamps that are numbers: their unit, when they begin, and the least and the greatest that are taken for times."""
 STAMP_TEXTS = {
@@ -30,6 +30,7 @@ PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
 BINARY = (*PARQUET, *WORKBOOKS)
 ENDINGS = (".csv", ".txt", ".dat", ".tsv", *BINARY)
 NO_VALUE = re.compile(r"|-+|#.*|n/?a|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE)
+BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
 
@@ -54,7 +55,7 @@ class CsvFormat:
     stamp_columns : list of str, optional
         Columns that hold the stamp: one, or two with the date and the time of day. By default the first column.
     stamps : str, default="ISO8601"
-        Format of stamps, such as "%d.%m.%Y %H:%M". "ISO8601" is 2026-01-31 13:00, "unix" and "unix ms" are seconds and
+        Format of stamps, such as "%d.%m.%Y %H:%M". "ISO8601" is 2026-01-31 13:00, "unix" and "unix_ms" are seconds and
         milliseconds since 1970, "excel" are serial dates of a spreadsheet, such as 46053.5417.
     time_zone : str, optional
         Time zone of the records, such as "Europe/Brussels" or "UTC". Stamps with an offset are converted to it, stamps
@@ -119,7 +120,7 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
     named = next(((line, row) for line, row in rows if line >= form.names_line), None)
     if named is None:
         raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
-    names = named[1][: max((n for n, name in enumerate(named[1], start=1) if name), default=0)]
+    names = named[1][: used_width([row for line, row in rows if line >= named[0]], len(named[1]))]
     if not is_finished:
         rows = rows[:-1] if len(rows[-1][1]) < len(names) else rows
         warn_user(
@@ -170,21 +171,30 @@ def rows_in(file: Path, form: CsvFormat) -> tuple[list[tuple[int, list[str]]], b
 
 def _rows_of_workbook(file: Path) -> list[tuple[int, list[str]]]:
     """Cells of the first sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
-    import_optional("openpyxl", extra="excel")
     try:
+        import_optional("openpyxl", extra="excel")
         with without_warnings():
             sheet = pd.read_excel(file, header=None, dtype=object, na_filter=False, engine="openpyxl")
     except OSError:
         raise
+    except ImportError as error:
+        raise ImportError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
     rows = [[str(cell).strip().removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]
     return [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
 
 
+def used_width(rows: Sequence[Sequence[str]], width: int) -> int:
+    """A width without the last columns in which no row has a cell, as separators at the ends of lines make them."""
+    while width and not any(row[width - 1] for row in rows if len(row) >= width):
+        width -= 1
+    return width
+
+
 def without_margin(row: list[str], width: int) -> list[str]:
     """A row without empty cells beyond a width."""
-    return row if any(row[width:]) else row[:width]
+    return row if len(row) <= width or any(row[width:]) else row[:width]
 
 
 def text_of(file: Path, encoding: str | None = None) -> str:
@@ -234,7 +244,7 @@ def number(text: str, decimal: str) -> float:
     if NO_VALUE.fullmatch(text):
         return np.nan
     point, sign = re.escape(decimal), "," if decimal == "." else r"\."
-    groups = rf"([ '’\u00a0\u202f])\d{{3}}(\2\d{{3}})*({point}\d*)?|({sign}\d{{3}})+{point}\d+|({sign}\d{{3}}){{2,}}"
+    groups = rf"({BLANK})\d{{3}}(\2\d{{3}})*({point}\d*)?|({sign}\d{{3}})+{point}\d+|({sign}\d{{3}}){{2,}}"
     if re.fullmatch(rf"[-+]?\d{{1,3}}({groups})", text):
         return float(re.sub(rf"[^-+\d{point}]", "", text).replace(decimal, "."))
     raise ValueError(text)
@@ -246,8 +256,8 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
     if 0 < sum(has_offset) < len(texts):
         place = has_offset.index(not has_offset[0])
         raise ValueError(
-            f"{file}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have an offset "
-            "from UTC; expected all or none"
+            f"{file}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have an "
+            "offset from UTC; expected all or none"
         )
     index = parsed(texts, form.stamps)
     is_wrong = np.array(index.isna())

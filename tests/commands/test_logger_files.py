@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skthermo.commands._looking import look_at
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
 from skthermo.commands._proposal import SINGLE, Candidate, Proposal
 from skthermo.commands._settings import read_settings
@@ -77,7 +78,12 @@ def toa5(width, records=RECORDS):
     more = [f"V{n}" for n in range(width - 5)]
     first = ["TOA5", "Bridge", "CR1000X", "1234", "CR1000X.Std.05", "CPU:bridge.CR1X", "5678", "Hourly"]
     units = ["TS", "RN", "Deg C", "Hz", "", *("Volts" for _ in more)]
-    head = [first, ["TIMESTAMP", "RECORD", *names[1:], *more], units, ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)]]
+    head = [
+        first,
+        ["TIMESTAMP", "RECORD", *names[1:], *more],
+        units,
+        ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)],
+    ]
     body = [[f'"{stamp}"', str(n), *(one or '"NAN"' for one in values), *("12.5" for _ in more)]
             for n, (stamp, *values) in enumerate(cells)]  # fmt: skip
     return quoted(head), body
@@ -88,7 +94,7 @@ def with_column(cells, name, values, place=None):
     return [[*row[:place], cell, *row[place:]] for row, cell in zip(cells, [name, *values], strict=True)]
 
 
-def workbook(cells, formats="yyyy-mm-dd hh:mm:ss", truth=RECORDS, more=()):
+def workbook(cells, truth=RECORDS, more=()):
     """An Excel workbook in which numbers are numbers and times are times."""
     openpyxl = pytest.importorskip("openpyxl")
     book, file = openpyxl.Workbook(), io.BytesIO()
@@ -215,6 +221,7 @@ UNDERSTOOD = {
     "serial dates, decimal commas": lambda: log(rows(RECORDS, lambda one: comma(float(serial(one))), write=comma), ";"),
     "serial dates after numbers like them": lambda: log(with_column(rows(), "RECORD", map(str, range(40000, 40080)), 0)),
     "a workbook": lambda: workbook(in_cells()),
+    "a workbook, with midnights": lambda: workbook(in_cells(EARLY), truth=EARLY),
     "a workbook with titles and units": lambda: workbook(
         [["Bridge"], ["Logger", 12], [], in_cells()[0], [None, "degC", "Hz", "um/m"], *in_cells()[1:]], more=["Notes"]),
     "a workbook with serial dates": lambda: workbook(in_cells(RECORDS, lambda one: float(serial(one)))),
@@ -247,6 +254,10 @@ UNDERSTOOD = {
     "stamps in no order": lambda: log([rows()[0], *(rows()[1 + n] for n in RANDOM.permutation(N))]),
     "the newest first": lambda: log([rows()[0], *rows()[:0:-1]]),
     "records twice": lambda: log([*rows(), *rows()[5:9]]),
+    "a last column without a name": lambda: log(with_column(rows(), "", ["ok"] * N)),
+    "separators after the names": lambda: log([[*rows()[0], ""], *rows()[1:]]),
+    "a last column without values": lambda: log(with_column(rows(), "spare", [""] * N)),
+    "numbers as names": lambda: log([["Bridge", "12", "", "", ""], ["time", *RECORDS, "7"], *with_column(rows(), "7", ["ok"] * N)[1:]]),
     "a column without a name": lambda: log([["", *rows()[0][1:]], *rows()[1:]]),
     "clocks that change": lambda: log(rows(AUTUMN), truth=AUTUMN, options=("--zone", "Europe/Brussels")),
     "values that are missing at first": lambda: log(rows(BEGUN), truth=BEGUN),
@@ -275,6 +286,7 @@ REFUSED = {
     "a stamp that is none": (lambda: log([*rows()[:30], ["2026-01-32 00:00:00", *rows()[30][1:]], *rows()[31:]]), "line 31"),
     "thousands without quotes": (lambda: log(rows(write=thousands(",", "."))), ""),
     "other names within": (lambda: log([*rows()[:30], ["time", "f1", "T1", "s1"], *rows()[30:]]), "line 31"),
+    "two columns like serial dates": (lambda: log(with_column(rows(RECORDS, serial), "n", map(str, range(40000, 40080)), 0)), ""),
     "no workbook": (lambda: Log({"log.xlsx": b"PK no workbook"}, RECORDS), ""),
 }  # fmt: skip
 """Logs that are refused, and the place that is named."""
@@ -329,6 +341,7 @@ def assert_read(found, truth, order=None):
     )  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:.*unfinished-file")
 @pytest.mark.parametrize("kind", UNDERSTOOD)
 def test_what_loggers_write_is_read_as_it_was_meant(kind, tmp_path):
     one = UNDERSTOOD[kind]()
@@ -378,3 +391,40 @@ def test_later_files_of_another_form_are_read_or_refused(kind, tmp_path):
         check_layout(read_columns(later, settings.csv, settings.records), later, settings.records, [])
     assert place in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_without_openpyxl_a_workbook_is_named_with_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    done, _ = begin(Log({"log.xlsx": b""}, RECORDS), tmp_path)
+    assert done.code == FAILED
+    assert_one_error(done.err, tmp_path, "openpyxl", "[excel]")
+
+
+def test_a_format_of_stamps_that_is_given_is_the_one_that_is_read(tmp_path):
+    (file,) = write(log(rows(LONE, US)), tmp_path)
+    for stamps, month in ((US, 3), ("%d/%m/%Y %H:%M", 4)):
+        assert set(look_at(file, stamps=stamps).records.index.month) == {month}
+    with pytest.raises(ValueError, match=re.escape(str(file))):
+        look_at(file, stamps=GERMAN)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", [kind for kind in UNDERSTOOD if kind != "the month first, as told late"])
+def test_a_monitor_in_service_reads_them_too(kind, tmp_path):
+    one = UNDERSTOOD[kind]()
+    done, file = begin(one, tmp_path)
+    assert done.code == 0, done.err
+    truth = one.truth.sort_index()
+    end = str(truth.index[FIRST - 1])
+    edit(file, "# until = ...", f'until = "{end}"')
+    assert run("fit", file).code == 0
+    done = run("update", file, "--now", str(truth.index[-1]))
+    assert done.code != FAILED, done.err
+    monitor = load_monitor(tmp_path / "bridge" / "monitor.joblib")
+    assert_read(monitor.baseline_, truth[:FIRST])
+    assert_read(monitor.records_, truth[FIRST:])
+    for name, content in one.files.items():
+        (tmp_path / "bridge" / "new" / name).write_bytes(content)
+    done = run("update", file, "--now", str(truth.index[-1]))
+    assert done.code != FAILED, done.err
+    assert len(load_monitor(tmp_path / "bridge" / "monitor.joblib").records_) == N - FIRST
