@@ -94,9 +94,7 @@ def _look_at_table(
     notes."""
     separator, decimal = (",", ".") if file.suffix.lower() in WORKBOOKS else _division(text_of(file), file)
     rows, _ = rows_in(file, CsvFormat(separator))
-    widths = [len(row) for _, row in rows[:MOST_LOOKED_AT]]
-    width = max(set(widths), key=widths.count, default=0)
-    width = used_width([row for _, row in rows], width)
+    width = used_width([row for _, row in rows], _usual_width([row for _, row in rows[:MOST_LOOKED_AT]]))
     rows = [(line, without_margin(row, width)) for line, row in rows]
     rows = [(line, row) for line, row in rows if len(row) == width]
     cells = [row for _, row in rows]
@@ -123,9 +121,7 @@ def _look_at_table(
     texts = {
         name: "it holds text"
         for name, cells in columns.items()
-        if name not in stamp_columns
-        and _share_of_numbers(cells, decimal) < MOSTLY
-        and any(_is_number(cell, decimal) is False for cell in cells)
+        if name not in stamp_columns and _share_of_numbers(cells, decimal) < MOSTLY
     }
     has_offsets = OFFSET.search(_stamp_text(cells[first], places)) is not None
     form = CsvFormat(
@@ -145,21 +141,25 @@ def _division(text: str, file: Path) -> tuple[str, str]:
     head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
     for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
         rows = [row for _, row in rows_of(head, separator)]
-        widths = [len(row) for row in rows]
         if not rows or (separator == decimal and '"' not in head):
             continue
-        width = max(set(widths), key=widths.count)
+        width = _usual_width(rows)
         shares = [_share_of_numbers(row[1:], decimal) for row in rows if len(row) == width]
-        found.append((round(sum(shares) / len(rows), 2), -rank, separator, decimal))
+        found.append((round(np.nansum(shares) / len(rows), 2), -rank, separator, decimal))
     if not found or max(found)[0] == 0:
         raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {SEPARATORS} between")
     return max(found)[2:]
 
 
+def _usual_width(rows: Sequence[Sequence[str]]) -> int:
+    widths = [len(row) for row in rows]
+    return max(set(widths), key=widths.count, default=0)
+
+
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Share of numbers among the cells that have a value."""
+    """Share of numbers among the cells that have a value; NaN if none has."""
     given = [kind for cell in cells if (kind := _is_number(cell, decimal)) is not None]
-    return sum(given) / len(given) if given else 0.0
+    return sum(given) / len(given) if given else np.nan
 
 
 def _is_number(cell: str, decimal: str) -> bool | None:
@@ -177,15 +177,12 @@ def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> 
         tried = ((places, _fitting(looked, places, forms)) for places in _places(looked))
         found = (one for one in tried if one[1])
         for places, fitting in found:
-            other, _ = next(found, (None, [])) if fitting[0] in NUMERIC else (None, [])
-            if other is not None:
-                got = f"columns {places[0] + 1} and {other[0] + 1} may both hold times as numbers"
-                raise ValueError(f"{file}: {got}; expected one of them")
+            for other, _ in found if fitting[0] in NUMERIC else ():
+                columns = f"columns {places[0] + 1} and {other[0] + 1}"
+                raise ValueError(f"{file}: {columns} may both hold times as numbers; expected one that does")
             return places, *_certain(rows, places, fitting, file)
-    raise ValueError(
-        f"{file}: no column holds times, such as 2026-01-31 13:00 or 31.01.2026 13:00; the first values are "
-        f"{list(rows[0])!r:.200}"
-    )
+    expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
+    raise ValueError(f"{file}: no column holds times, {expected}; the first values are {list(*rows[:1])!r:.200}")
 
 
 def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
