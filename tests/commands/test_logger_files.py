@@ -21,7 +21,7 @@ N, FIRST = 80, 60  # records of a file, and of the baseline where later ones are
 RANDOM = np.random.default_rng(0)
 RECORDS = pd.DataFrame(
     {"T1": RANDOM.normal(10, 8, N).round(2), "f1": RANDOM.normal(4, 0.1, N).round(4)},
-    pd.date_range("2026-01-05 12:30", periods=N, freq="3h"),
+    pd.date_range("2026-01-05 12:30", periods=N, freq="9h"),
 )
 RECORDS["s1"] = (1000 + 20 * RECORDS["T1"] + RANDOM.normal(0, 5, N)).round(1)  # a strain, partly above 1000
 RECORDS.iloc[5, 0] = np.nan
@@ -32,6 +32,7 @@ AUTUMN = RECORDS.set_axis(pd.date_range("2026-10-24 20:00", periods=N, freq="20m
 HOURS = RECORDS.set_axis(pd.date_range("2026-01-05 12:00", periods=N, freq="h"))
 BEGUN = RECORDS.where(np.arange(N)[:, None] * [1, 1, 1] > 1)
 ISO, US, GERMAN = "%Y-%m-%d %H:%M:%S", "%m/%d/%Y %H:%M", "%d.%m.%Y %H:%M"
+COUNTS = [str(n) for n in range(40000, 40000 + N)]
 COMMENTS = ["# Logger 12", "# station, bridge, river, north"]
 
 
@@ -110,7 +111,8 @@ def in_cells(records=RECORDS, *stamps):
     """Names and records of a workbook."""
     stamps = stamps or (lambda stamp: stamp.to_pydatetime(),)
     values = zip(records.index, records.to_numpy().tolist(), strict=True)
-    return [["time", "clock"][: len(stamps)] + list(records), *([*(one(stamp) for one in stamps), *row] for stamp, row in values)]  # fmt: skip
+    names = [*["time", "clock"][: len(stamps)], *records]
+    return [names, *([*(one(stamp) for one in stamps), *row] for stamp, row in values)]
 
 
 def serial(stamp):
@@ -167,8 +169,7 @@ def repeated(cells, *places):
     return [line for n, row in enumerate(cells) for line in ([cells[0]] if n in places else []) + [row]]
 
 
-NAMED = dict(zip(RECORDS, ["T1 [°C]", "f1 (Hz)", "s1"], strict=True))
-DEGREES = RECORDS.rename(columns=NAMED)
+DEGREES = RECORDS.rename(columns={"T1": "T1 [°C]", "f1": "f1 (Hz)"})
 STATE = with_column(rows(), "status", ["OK"] * 40 + ["LOW BATTERY"] + ["OK"] * 39)
 
 UNDERSTOOD = {
@@ -220,22 +221,22 @@ UNDERSTOOD = {
     "no zeros before": lambda: log(rows(RECORDS, lambda one: f"{one.year}-{one.month}-{one.day} {one.hour}:{one:%M}")),
     "serial dates": lambda: log(rows(RECORDS, serial)),
     "serial dates, decimal commas": lambda: log(rows(RECORDS, lambda one: comma(float(serial(one))), write=comma), ";"),
-    "serial dates after numbers like them": lambda: log(with_column(rows(), "RECORD", map(str, range(40000, 40080)), 0)),
+    "serial dates after numbers like them": lambda: log(with_column(rows(), "RECORD", COUNTS, 0)),
     "a workbook": lambda: workbook(in_cells()),
     "a workbook, with midnights": lambda: workbook(in_cells(EARLY), truth=EARLY),
     "a workbook with titles and units": lambda: workbook(
         [["Bridge"], ["Logger", 12], [], in_cells()[0], [None, "degC", "Hz", "um/m"], *in_cells()[1:]], more=["Notes"]),
     "a workbook with serial dates": lambda: workbook(in_cells(RECORDS, lambda one: float(serial(one)))),
-    "a workbook with dates and times": lambda: workbook(in_cells(RECORDS, lambda one: one.date(), lambda one: one.time())),
+    "a workbook with dates and times": lambda: workbook(in_cells(RECORDS, pd.Timestamp.date, pd.Timestamp.time)),
     "a workbook with texts as stamps": lambda: workbook(in_cells(RECORDS, lambda one: one.strftime(GERMAN))),
     "names again": lambda: log(repeated(rows(), 20, 50)),
     "names and units again": lambda: log([*rows()[:1], ["", "degC", "Hz", ""], *rows()[1:9], rows()[0],
                                           ["", "degC", "Hz", ""], *rows()[9:]]),
     "names again as the last line": lambda: log([*rows(), rows()[0]]),
-    "a last line that is cut off": lambda: Log({"log.csv": log(rows()).files["log.csv"] + b"2026-01-15 12:3"}, RECORDS),
+    "a last line that is cut off": lambda: Log({"log.csv": log(rows()).files["log.csv"] + b"2026-02-04 0"}, RECORDS),
     "date and time in two columns": lambda: log(rows(RECORDS, "%d.%m.%Y", "%H:%M:%S"), ";"),
     "the time before the date": lambda: log(rows(RECORDS, "%H:%M", "%d.%m.%Y"), "\t"),
-    "date and time apart": lambda: log([[row[0], row[2], row[1], *row[3:]] for row in rows(RECORDS, "%Y-%m-%d", "%H:%M")]),
+    "date and time apart": lambda: log([[day, T, clock, *row] for day, clock, T, *row in rows(RECORDS, "%Y-%m-%d", "%H:%M")]),
     "texts": lambda: log(with_column(STATE, "logger", ["CR1000"] * N, 0)),
     "quotes around all": lambda: log(quoted(rows(DEGREES)), truth=DEGREES),
     "comments before": lambda: log([*COMMENTS, *rows()]),
@@ -258,7 +259,7 @@ UNDERSTOOD = {
     "a last column without a name": lambda: log(with_column(rows(), "", ["ok"] * N)),
     "separators after the names": lambda: log([[*rows()[0], ""], *rows()[1:]]),
     "a last column without values": lambda: log(with_column(rows(), "spare", [""] * N)),
-    "numbers as names": lambda: log([["Bridge", "12", "", "", ""], ["time", *RECORDS, "7"], *with_column(rows(), "7", ["ok"] * N)[1:]]),
+    "a number as a name": lambda: log([["Bridge", "12", "", "", ""], *with_column(rows(), "7", ["ok"] * N)]),
     "a column without a name": lambda: log([["", *rows()[0][1:]], *rows()[1:]]),
     "clocks that change": lambda: log(rows(AUTUMN), truth=AUTUMN, options=("--zone", "Europe/Brussels")),
     "values that are missing at first": lambda: log(rows(BEGUN), truth=BEGUN),
@@ -266,6 +267,7 @@ UNDERSTOOD = {
 """Logs of one kind each, and all of their records."""
 OTHER_LENGTHS = {
     "the month first, as told late", "one day, its format given", "offsets", "offsets of hours", "clocks that change",
+    "the day first, none after the twelfth", "the month first, none after the twelfth", "a workbook, with midnights",
 }  # fmt: skip
 
 HIDDEN = [[row[0][:10], row[0][11:].replace(":", "h"), *row[1:]] for row in rows(HOURS)]
@@ -275,7 +277,7 @@ REFUSED = {
     "an empty file": (lambda: log([]), ""),
     "names alone": (lambda: log(rows()[:1]), ""),
     "names twice": (lambda: log([["time", "T1", "T1", "f1"], *rows()[1:]]), "line 1"),
-    "stamps' names twice": (lambda: log([["time", "T1", "f1", "time"], *([*row[:3], row[0]] for row in rows()[1:])]), "line 1"),
+    "the name of the stamps twice": (lambda: log([[*row[:3], row[0]] for row in rows()]), "line 1"),
     "NUL bytes within": (lambda: log([*rows()[:30], "\0" * 20 + ",".join(rows()[30]), *rows()[31:]]), "line 31"),
     "one day, the day or the month first": (lambda: log(rows(LONE, US)), ""),
     "some with offsets": (lambda: log([*rows()[:30], *([row[0] + "Z", *row[1:]] for row in rows()[30:])]), "line 31"),
@@ -287,10 +289,10 @@ REFUSED = {
     "a line that is cut off within": (lambda: log([*rows()[:30], rows()[30][:2], *rows()[31:]]), "line 31"),
     "a text among numbers": (lambda: log([*rows()[:30], [*rows()[30][:2], "error", "1.0"], *rows()[31:]]),
                              "line 31, column 'f1'"),
-    "a stamp that is none": (lambda: log([*rows()[:30], ["2026-01-32 00:00:00", *rows()[30][1:]], *rows()[31:]]), "line 31"),
+    "a stamp that is none": (lambda: log([*rows()[:30], ["2026-01-32 00:00", *rows()[30][1:]], *rows()[31:]]), "line 31"),
     "thousands without quotes": (lambda: log(rows(write=thousands(",", "."))), ""),
     "other names within": (lambda: log([*rows()[:30], ["time", "f1", "T1", "s1"], *rows()[30:]]), "line 31"),
-    "two columns like serial dates": (lambda: log(with_column(rows(RECORDS, serial), "n", map(str, range(40000, 40080)), 0)), ""),
+    "two columns like serial dates": (lambda: log(with_column(rows(RECORDS, serial), "n", COUNTS, 0)), ""),
     "an empty workbook": (lambda: workbook([]), ""),
     "a workbook of names": (lambda: workbook(in_cells()[:1]), ""),
     "no workbook": (lambda: Log({"log.xlsx": b"PK no workbook"}, RECORDS), ""),
@@ -338,7 +340,7 @@ def begin(one, folder):
     return done, folder / "bridge" / "monitor.toml"
 
 
-def assert_read(found, truth, order=None):
+def assert_read(found, truth):
     """All records are there, each once, to the last bit."""
     pd.testing.assert_frame_equal(
         found[list(truth)].sort_index(), truth.sort_index(), check_exact=True, check_freq=False, check_names=False,
