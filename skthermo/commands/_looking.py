@@ -21,6 +21,7 @@ from skthermo.commands._record_files import (
     UNIX,
     WORKBOOKS,
     CsvFormat,
+    names_of,
     number,
     parsed,
     read_file,
@@ -109,6 +110,7 @@ def _look_at_table(
             f"decimal sign {decimal!r}; expected one, then a line for each record"
         )
     names_line, names = max(above, key=lambda one: sum(map(bool, one[1])))  # a title has fewer cells
+    names = names_of(names)
     columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
     stamp_columns = [names[place] for place in places]
     units = {
@@ -140,7 +142,10 @@ def _division(text: str, file: Path) -> tuple[str, str]:
     """Separator and decimal sign by which most lines have equally many columns and most cells are numbers."""
     head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
     for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
-        rows = [row for _, row in rows_of(head, separator)]
+        try:
+            rows = [row for _, row in rows_of(head, separator)]
+        except ValueError:
+            continue
         if not rows or (separator == decimal and '"' not in head):
             continue
         width = _usual_width(rows)

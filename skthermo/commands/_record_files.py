@@ -7,6 +7,7 @@ import csv
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -120,7 +121,7 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
     named = next(((line, row) for line, row in rows if line >= form.names_line), None)
     if named is None:
         raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
-    names = named[1][: used_width([row for line, row in rows if line >= named[0]], len(named[1]))]
+    names = names_of(named[1][: used_width([row for line, row in rows if line >= named[0]], len(named[1]))])
     if not is_finished:
         rows = rows[:-1] if len(rows[-1][1]) < len(names) else rows
         warn_user(
@@ -136,13 +137,20 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
             f"{file}, line {named[0]}: names {names}; expected stamps and columns, each once, with {form.separator!r} "
             "between"
         )
-    first = max(form.values_line or 0, named[0] + 1)
+    places = [names.index(name) for name in stamp_columns]
+    heads = [(line, row) for line, row in rows if named[0] < line < (form.values_line or 0) and len(row) >= len(names)]
+    is_stamp = parsed([" ".join(row[place] for place in places) for _, row in heads], form.stamps).notna()
+    first = min([max(form.values_line or 0, named[0] + 1), *(line for line, _ in compress(heads, is_stamp))])
     above = [row for line, row in rows if line < first]
     records = [(line, without_margin(row, len(names))) for line, row in rows if line >= first and row not in above]
     records = [(line, row) for line, row in records if len(row) == len(names) or not row[0].startswith("#")]
     for line, row in records:
         if len(row) != len(names):
             raise ValueError(f"{file}, line {line}: values: {len(row)}; expected {len(names)} as named above")
+        if "\n" in "".join(row):
+            raise ValueError(
+                f"{file}, line {line}: quotes hold several lines; expected quotes that close in their line"
+            )
     lines = [line for line, _ in records]
     cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
     texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
@@ -165,7 +173,10 @@ def rows_in(file: Path, form: CsvFormat) -> tuple[list[tuple[int, list[str]]], b
     if file.suffix.lower() in WORKBOOKS:
         return _rows_of_workbook(file), True
     text = text_of(file, form.encoding)
-    rows = rows_of(text, form.separator)
+    try:
+        rows = rows_of(text, form.separator)
+    except ValueError as error:
+        raise ValueError(f"{file}, {error}") from error
     return rows, not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
 
 
@@ -183,6 +194,11 @@ def _rows_of_workbook(file: Path) -> list[tuple[int, list[str]]]:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
     rows = [[str(cell).strip().removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]
     return [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
+
+
+def names_of(row: Sequence[str]) -> list[str]:
+    """Names of columns, each as one line."""
+    return [name.replace("\n", "") for name in row]
 
 
 def used_width(rows: Sequence[Sequence[str]], width: int) -> int:
@@ -216,9 +232,13 @@ def text_of(file: Path, encoding: str | None = None) -> str:
 
 
 def rows_of(text: str, separator: str) -> list[tuple[int, list[str]]]:
-    """Cells of each line that is not empty, with the number of the line."""
-    lines = csv.reader(text.splitlines(), delimiter=separator, skipinitialspace=separator != "\t")
-    return [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(map(str.strip, row))]
+    """Cells of each line that is not empty, with the number of the line; quotes may hold several lines."""
+    ended = (f"{line}\n" for line in text.splitlines())
+    lines = csv.reader(ended, delimiter=separator, skipinitialspace=separator != "\t")
+    try:
+        return [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise ValueError(f"line {lines.line_num}: {error}; expected quotes that close") from error
 
 
 def _numbers(texts: Sequence[str], decimal: str, column: str, file: Path, lines: Sequence[int]) -> Array:

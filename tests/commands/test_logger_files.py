@@ -236,9 +236,13 @@ UNDERSTOOD = {
     "a last line that is cut off": lambda: Log({"log.csv": log(rows()).files["log.csv"] + b"2026-02-04 0"}, RECORDS),
     "date and time in two columns": lambda: log(rows(RECORDS, "%d.%m.%Y", "%H:%M:%S"), ";"),
     "the time before the date": lambda: log(rows(RECORDS, "%H:%M", "%d.%m.%Y"), "\t"),
-    "date and time apart": lambda: log([[day, T, clock, *row] for day, clock, T, *row in rows(RECORDS, "%Y-%m-%d", "%H:%M")]),
+    "date and time apart": lambda: log([[a, c, b, *row] for a, b, c, *row in rows(RECORDS, "%Y-%m-%d", "%H:%M")]),
     "texts": lambda: log(with_column(STATE, "logger", ["CR1000"] * N, 0)),
     "quotes around all": lambda: log(quoted(rows(DEGREES)), truth=DEGREES),
+    "names of two lines": lambda: log(
+        ['"time","T1\n[°C]","f1"', *rows(RECORDS[["T1", "f1"]])[1:]],
+        truth=RECORDS[["T1", "f1"]].set_axis(["T1[°C]", "f1"], axis=1)),
+    "quotes with spaces around": lambda: log(quoted(rows()), " , "),
     "comments before": lambda: log([*COMMENTS, *rows()]),
     "comments within": lambda: log([*COMMENTS, *rows()[:30], "# battery changed", *rows()[30:]]),
     "names in a comment": lambda: log(["# Logger 12", "# " + ",".join(rows()[0]), *rows()[1:]]),
@@ -289,8 +293,13 @@ REFUSED = {
     "a line that is cut off within": (lambda: log([*rows()[:30], rows()[30][:2], *rows()[31:]]), "line 31"),
     "a text among numbers": (lambda: log([*rows()[:30], [*rows()[30][:2], "error", "1.0"], *rows()[31:]]),
                              "line 31, column 'f1'"),
-    "a stamp that is none": (lambda: log([*rows()[:30], ["2026-01-32 00:00", *rows()[30][1:]], *rows()[31:]]), "line 31"),
+    "a stamp that is none": (
+        lambda: log([*rows()[:30], ["2026-01-32 00:00", *rows()[30][1:]], *rows()[31:]]), "line 31"),
     "thousands without quotes": (lambda: log(rows(write=thousands(",", "."))), ""),
+    "a quote that does not close, among texts": (
+        lambda: log([*STATE[:30], [*STATE[30][:-1], '"OK'], *STATE[31:]]), "line 81"),
+    "a quote that does not close, among quotes": (
+        lambda: log([*quoted(STATE[:30]), [*STATE[30][:-1], '"OK'], *quoted(STATE[31:])]), "line 32"),
     "other names within": (lambda: log([*rows()[:30], ["time", "f1", "T1", "s1"], *rows()[30:]]), "line 31"),
     "two columns like serial dates": (lambda: log(with_column(rows(RECORDS, serial), "n", COUNTS, 0)), ""),
     "an empty workbook": (lambda: workbook([]), ""),
@@ -398,6 +407,14 @@ def test_later_files_of_another_form_are_read_or_refused(kind, tmp_path):
         check_layout(read_columns(later, settings.csv, settings.records), later, settings.records, [])
     assert place in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_record_is_not_lost_where_a_later_file_has_no_units(tmp_path):
+    done, file = begin(UNDERSTOOD["units in the second line"](), tmp_path)
+    settings = read_settings(file)
+    assert settings.csv.values_line == 3
+    (later,) = write(log(rows()), tmp_path)
+    assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
 
 
 def test_without_openpyxl_a_workbook_is_named_with_what_to_install(tmp_path, monkeypatch):

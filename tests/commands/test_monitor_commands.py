@@ -143,7 +143,7 @@ ROW = "T1,T2\n2027-01-11,1.5,2.5\n"
         ("time;T1\n2027-01-11;1\n", "line 1: names ['time;T1']; expected stamps and columns"),
         ("time,T1,T1\n", "expected stamps and columns, each once"),
         ("time,T1,T2\n2027-01-11,1.5\n", "line 2: values: 2; expected 3 as named above"),
-        ("time,T1,T2\n\n2027-01-11,1.5,warm\n", "line 3, column 'T2': 'warm'; expected a number with the decimal sign '.'"),
+        ("time,T1,T2\n\n2027-01-11,1.5,warm\n", "line 3, column 'T2': 'warm'; expected a number with the decimal"),
         ("time,T1\n2027-01-11,1_5\n", "line 2, column 'T1': '1_5'; expected a number"),
         ("time,T1\n11.01.2027,1\n12.01.2027,1\n", "line 2: '11.01.2027' is no time; expected one like 2026-01-31"),
         ("time,T1\n2027-13-01,1\n", "'2027-13-01' is no time"),
