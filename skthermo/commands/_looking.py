@@ -15,10 +15,10 @@ from skthermo._tables.frames import MARKERS
 from skthermo.commands._record_files import (
     EXCEL,
     ISO,
-    NUMERIC,
     OFFSET,
     PARQUET,
     UNIX,
+    UNIX_MS,
     WORKBOOKS,
     CsvFormat,
     names_of,
@@ -139,7 +139,7 @@ def _look_at_table(
 
 
 def _division(text: str, file: Path) -> tuple[str, str]:
-    """Separator and decimal sign by which most lines have equally many columns and most cells are numbers."""
+    """Separator and decimal sign by which lines of the usual number of columns have the most numbers."""
     head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
     for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
         try:
@@ -149,8 +149,8 @@ def _division(text: str, file: Path) -> tuple[str, str]:
         if not rows or (separator == decimal and '"' not in head):
             continue
         width = _usual_width(rows)
-        shares = [_share_of_numbers(row[1:], decimal) for row in rows if len(row) == width]
-        found.append((round(np.nansum(shares) / len(rows), 2), -rank, separator, decimal))
+        numbers = [_is_number(cell, decimal) for row in rows if len(row) == width for cell in row[1:]]
+        found.append((numbers.count(True) / len(rows), -rank, separator, decimal))
     if not found or max(found)[0] == 0:
         raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {SEPARATORS} between")
     return max(found)[2:]
@@ -162,9 +162,9 @@ def _usual_width(rows: Sequence[Sequence[str]]) -> int:
 
 
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    """Share of numbers among the cells that have a value; NaN if none has."""
+    """Share of numbers among the cells that have a value."""
     given = [kind for cell in cells if (kind := _is_number(cell, decimal)) is not None]
-    return sum(given) / len(given) if given else np.nan
+    return sum(given) / len(given) if given else 1.0
 
 
 def _is_number(cell: str, decimal: str) -> bool | None:
@@ -178,14 +178,16 @@ def _is_number(cell: str, decimal: str) -> bool | None:
 def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
     """Places of the columns that hold the stamps, their format, and what is doubtful in it."""
     looked = rows[:MOST_LOOKED_AT]
-    for forms in [(given,)] if given else [WRITTEN, tuple(NUMERIC)]:
-        tried = ((places, _fitting(looked, places, forms)) for places in _places(looked))
-        found = (one for one in tried if one[1])
-        for places, fitting in found:
-            for other, _ in found if fitting[0] in NUMERIC else ():
-                columns = f"columns {places[0] + 1} and {other[0] + 1}"
-                raise ValueError(f"{file}: {columns} may both hold times as numbers; expected one that does")
-            return places, *_certain(rows, places, fitting, file)
+    for forms in [(given,)] if given else [WRITTEN, (UNIX, UNIX_MS), (EXCEL,)]:
+        tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]
+        found = [one for one in tried if one[1]]
+        if forms == (EXCEL,) and len(found) > 1:  # whole numbers may be counts of records
+            found = [one for one in found if not _are_days(_times_in(looked, one[0], EXCEL))] or found
+            if len(found) > 1:
+                columns = " and ".join(str(places[0] + 1) for places, _ in found)
+                raise ValueError(f"{file}: columns {columns} may all hold serial dates; expected one that does")
+        if found:
+            return found[0][0], *_certain(rows, *found[0], file)
     expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
     raise ValueError(f"{file}: no column holds times, {expected}; the first values are {list(*rows[:1])!r:.200}")
 
@@ -229,7 +231,8 @@ def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequen
 def _certain(
     rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], file: Path
 ) -> tuple[str, list[str]]:
-    """Of several formats, the one by which the most rows have a stamp, or else they follow each other regularly."""
+    """Of several formats, the one by which the most rows have a stamp, or else the only one by which they follow each
+    other regularly, which must also be that of the shortest time: days and months that are exchanged lengthen it."""
     found: dict[str, pd.DatetimeIndex] = {}
     for form in forms:
         index = _times_in(rows, places, form)
@@ -237,8 +240,9 @@ def _certain(
             found[form] = index
     most = max(index.notna().sum() for index in found.values())
     readings = [form for form, index in found.items() if index.notna().sum() == most]
+    shortest = min(readings, key=lambda form: found[form].max() - found[form].min())
     certain = readings if len(readings) == 1 else [form for form in readings if _is_regular(found[form])]
-    if len(certain) != 1:
+    if certain != [shortest]:
         raise ValueError(
             f"{file}: stamps such as {_stamp_text(rows[-1], places)!r} may have the formats "
             f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
@@ -250,13 +254,17 @@ def _certain(
     ]
 
 
+def _are_days(stamps: pd.DatetimeIndex) -> bool:
+    return bool((stamps.dropna().normalize() == stamps.dropna()).all())
+
+
 def _is_in_order(stamps: pd.DatetimeIndex) -> bool:
     known = stamps.dropna()
     return known.is_monotonic_increasing or known.is_monotonic_decreasing
 
 
 def _is_regular(stamps: pd.DatetimeIndex) -> bool:
-    """Whether stamps are in order, with few gaps: days and months that are exchanged make long ones."""
+    """Whether stamps are in order, with few gaps."""
     steps = np.abs(np.diff(stamps.dropna().asi8))
     return _is_in_order(stamps) and (not len(steps) or bool(steps.mean() <= 1.5 * np.median(steps)))
 

@@ -26,6 +26,7 @@ RECORDS = pd.DataFrame(
 RECORDS["s1"] = (1000 + 20 * RECORDS["T1"] + RANDOM.normal(0, 5, N)).round(1)  # a strain, partly above 1000
 RECORDS.iloc[5, 0] = np.nan
 EARLY = RECORDS.set_axis(pd.date_range("2026-03-01", periods=N, freq="3h"))  # no day after the twelfth
+DAILY = RECORDS.set_axis(pd.date_range("2026-01-05", periods=N))
 LONE = RECORDS.set_axis(pd.date_range("2026-03-04", periods=N, freq="15min"))  # one day, 3 April or 4 March
 UTC = RECORDS.tz_localize("UTC")
 AUTUMN = RECORDS.set_axis(pd.date_range("2026-10-24 20:00", periods=N, freq="20min", tz="Europe/Brussels"))
@@ -214,14 +215,17 @@ UNDERSTOOD = {
     "the month first": lambda: log(rows(RECORDS, US)),
     "the day first, none after the twelfth": lambda: log(rows(EARLY, "%d/%m/%Y %H:%M"), truth=EARLY),
     "the month first, none after the twelfth": lambda: log(rows(EARLY, US), truth=EARLY),
-    "the month first, as told late": late_evidence,
+    "the month first, as later days show": late_evidence,
     "one day, its format given": lambda: log(rows(LONE, US), truth=LONE, options=("--stamps", US)),
     "years of two digits": lambda: log(rows(RECORDS, "%m/%d/%y %H:%M")),
     "names of months": lambda: log(rows(RECORDS, "%d-%b-%Y %H:%M:%S")),
     "no zeros before": lambda: log(rows(RECORDS, lambda one: f"{one.year}-{one.month}-{one.day} {one.hour}:{one:%M}")),
     "serial dates": lambda: log(rows(RECORDS, serial)),
     "serial dates, decimal commas": lambda: log(rows(RECORDS, lambda one: comma(float(serial(one))), write=comma), ";"),
-    "serial dates after numbers like them": lambda: log(with_column(rows(), "RECORD", COUNTS, 0)),
+    "serial dates after counts like them": lambda: log(with_column(rows(RECORDS, serial), "RECORD", COUNTS, 0)),
+    "seconds since 1970 after counts": lambda: log(
+        with_column(rows(UTC, lambda one: f"{one.timestamp():.0f}"), "RECORD", COUNTS, 0), truth=UTC),
+    "written dates after numbers like serial dates": lambda: log(with_column(rows(), "RECORD", COUNTS, 0)),
     "a workbook": lambda: workbook(in_cells()),
     "a workbook, with midnights": lambda: workbook(in_cells(EARLY), truth=EARLY),
     "a workbook with titles and units": lambda: workbook(
@@ -247,6 +251,7 @@ UNDERSTOOD = {
     "comments within": lambda: log([*COMMENTS, *rows()[:30], "# battery changed", *rows()[30:]]),
     "names in a comment": lambda: log(["# Logger 12", "# " + ",".join(rows()[0]), *rows()[1:]]),
     "tabs": lambda: log(rows(), "\t"),
+    "bars, texts and thousands": lambda: log(with_column(STATE, "logger", ["A;1"] * N, 0), "|"),
     "bars": lambda: log(rows(), "|"),
     "T and Z": lambda: log(rows(UTC, "%Y-%m-%dT%H:%M:%SZ"), truth=UTC),
     "offsets": lambda: log(rows(AUTUMN, lambda one: one.isoformat()), truth=AUTUMN.tz_convert("UTC")),
@@ -270,7 +275,7 @@ UNDERSTOOD = {
 }  # fmt: skip
 """Logs of one kind each, and all of their records."""
 OTHER_LENGTHS = {
-    "the month first, as told late", "one day, its format given", "offsets", "offsets of hours", "clocks that change",
+    "the month first, as later days show", "one day, its format given", "offsets", "offsets of hours", "clocks that change",
     "the day first, none after the twelfth", "the month first, none after the twelfth", "a workbook, with midnights",
 }  # fmt: skip
 
@@ -284,6 +289,7 @@ REFUSED = {
     "the name of the stamps twice": (lambda: log([[*row[:3], row[0]] for row in rows()]), "line 1"),
     "NUL bytes within": (lambda: log([*rows()[:30], "\0" * 20 + ",".join(rows()[30]), *rows()[31:]]), "line 31"),
     "one day, the day or the month first": (lambda: log(rows(LONE, US)), ""),
+    "long gaps, none after the twelfth": (lambda: log(rows(EARLY[::13], US)), ""),
     "some with offsets": (lambda: log([*rows()[:30], *([row[0] + "Z", *row[1:]] for row in rows()[30:])]), "line 31"),
     "a clock that is not understood": (lambda: log([["date", "clock", *rows()[0][1:]], *HIDDEN[1:]]), ""),
     "a stamp with two records": (lambda: log(rows(TWICE)), ""),
@@ -301,7 +307,8 @@ REFUSED = {
     "a quote that does not close, among quotes": (
         lambda: log([*quoted(STATE[:30]), [*STATE[30][:-1], '"OK'], *quoted(STATE[31:])]), "line 32"),
     "other names within": (lambda: log([*rows()[:30], ["time", "f1", "T1", "s1"], *rows()[30:]]), "line 31"),
-    "two columns like serial dates": (lambda: log(with_column(rows(RECORDS, serial), "n", COUNTS, 0)), ""),
+    "two columns like serial dates": (
+        lambda: log(with_column(rows(DAILY, serial), "n", COUNTS, 0)), ""),
     "an empty workbook": (lambda: workbook([]), ""),
     "a workbook of names": (lambda: workbook(in_cells()[:1]), ""),
     "no workbook": (lambda: Log({"log.xlsx": b"PK no workbook"}, RECORDS), ""),
@@ -410,7 +417,7 @@ def test_later_files_of_another_form_are_read_or_refused(kind, tmp_path):
 
 
 def test_a_record_is_not_lost_where_a_later_file_has_no_units(tmp_path):
-    done, file = begin(UNDERSTOOD["units in the second line"](), tmp_path)
+    _, file = begin(UNDERSTOOD["units in the second line"](), tmp_path)
     settings = read_settings(file)
     assert settings.csv.values_line == 3
     (later,) = write(log(rows()), tmp_path)
