@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import compress
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -34,6 +34,9 @@ NO_VALUE = re.compile(r"|-+|#.*|n/?a|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|i
 BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
+
+Line: TypeAlias = tuple[int, list[str]]
+"""The number of a line, and its cells."""
 
 
 @dataclass(frozen=True)
@@ -111,17 +114,11 @@ def _parquet(file: Path) -> pd.DataFrame:
 
 
 def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished: bool) -> pd.DataFrame:
-    """Numbers are read to the last bit, and each line has as many values as there are names.
-
-    Comments are left out, and so are lines that repeat those above the first record.
-    """
+    """Numbers are read to the last bit; a stamp comes again with the same values or is an error."""
     rows, is_finished = rows_in(file, form)
     if leave_unfinished and not is_finished:
         rows, is_finished = rows[:-1], True
-    named = next(((line, row) for line, row in rows if line >= form.names_line), None)
-    if named is None:
-        raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
-    names = names_of(named[1][: used_width([row for line, row in rows if line >= named[0]], len(named[1]))])
+    names_line, names = _names(rows, form, file)
     if not is_finished:
         rows = rows[:-1] if len(rows[-1][1]) < len(names) else rows
         warn_user(
@@ -134,13 +131,44 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
     if len(names) < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):
         raise ValueError(
-            f"{file}, line {named[0]}: names {names}; expected stamps and columns, each once, with {form.separator!r} "
-            "between"
+            f"{file}, line {names_line}: names {names}; expected stamps and columns, each once, with "
+            f"{form.separator!r} between"
         )
-    places = [names.index(name) for name in stamp_columns]
-    heads = [(line, row) for line, row in rows if named[0] < line < (form.values_line or 0) and len(row) >= len(names)]
+    records = _records(rows, names_line, names, [names.index(name) for name in stamp_columns], form, file)
+    lines = [line for line, _ in records]
+    cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
+    texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
+    decimal = "." if file.suffix.lower() in WORKBOOKS else form.decimal
+    values = {name: _numbers(cells.get(name, ()), decimal, f"column {name!r}", file, lines) for name in wanted}
+    table = pd.DataFrame(values, _times(texts, form, file, lines), dtype=float)
+    again = table.index.duplicated()
+    if again.any() and (is_other := again & ~table.reset_index().duplicated().to_numpy()).any():
+        place = int(np.argmax(is_other))
+        raise ValueError(
+            f"{file}, line {lines[place]}: {table.index[place]} comes again with other values; expected each once. "
+            "If the clocks go back then, --zone of init, or [csv] time_zone, says where"
+        )
+    return table
+
+
+def _names(rows: Sequence[Line], form: CsvFormat, file: Path) -> tuple[int, list[str]]:
+    """Line and names of the columns."""
+    rows = [(line, row) for line, row in rows if line >= form.names_line]
+    if not rows:
+        raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
+    line, names = rows[0]
+    return line, names_of(names[: used_width([row for _, row in rows], len(names))])
+
+
+def _records(
+    rows: Sequence[Line], names_line: int, names: Sequence[str], places: Sequence[int], form: CsvFormat, file: Path
+) -> list[Line]:
+    """Lines with as many values as there are names, without comments and lines that repeat those above the first
+    record, which may come earlier than in other files."""
+    first = max(form.values_line or 0, names_line + 1)
+    heads = [(line, row) for line, row in rows if names_line < line < first and len(row) >= len(names)]
     is_stamp = parsed([" ".join(row[place] for place in places) for _, row in heads], form.stamps).notna()
-    first = min([max(form.values_line or 0, named[0] + 1), *(line for line, _ in compress(heads, is_stamp))])
+    first = min([first, *(line for line, _ in compress(heads, is_stamp))])
     above = [row for line, row in rows if line < first]
     records = [(line, without_margin(row, len(names))) for line, row in rows if line >= first and row not in above]
     records = [(line, row) for line, row in records if len(row) == len(names) or not row[0].startswith("#")]
@@ -148,27 +176,11 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
         if len(row) != len(names):
             raise ValueError(f"{file}, line {line}: values: {len(row)}; expected {len(names)} as named above")
         if "\n" in "".join(row):
-            raise ValueError(
-                f"{file}, line {line}: quotes hold several lines; expected quotes that close in their line"
-            )
-    lines = [line for line, _ in records]
-    cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
-    texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
-    decimal = "." if file.suffix.lower() in WORKBOOKS else form.decimal
-    values = {name: _numbers(cells.get(name, ()), decimal, f"column {name!r}", file, lines) for name in wanted}
-    table = pd.DataFrame(values, _times(texts, form, file, lines), dtype=float)
-    if table.index.has_duplicates:
-        is_other = table.index.duplicated() & ~table.reset_index().duplicated().to_numpy()
-        if is_other.any():
-            place = int(np.argmax(is_other))
-            raise ValueError(
-                f"{file}, line {lines[place]}: {table.index[place]} comes again with other values; expected each stamp "
-                "once. If the clocks go back then, --zone of init, or [csv] time_zone, says where"
-            )
-    return table
+            raise ValueError(f"{file}, line {line}: quotes hold several lines; expected quotes that close in theirs")
+    return records
 
 
-def rows_in(file: Path, form: CsvFormat) -> tuple[list[tuple[int, list[str]]], bool]:
+def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
     """Cells of each line that is not empty, with the number of the line, and whether the last line is complete."""
     if file.suffix.lower() in WORKBOOKS:
         return _rows_of_workbook(file), True
@@ -180,7 +192,7 @@ def rows_in(file: Path, form: CsvFormat) -> tuple[list[tuple[int, list[str]]], b
     return rows, not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
 
 
-def _rows_of_workbook(file: Path) -> list[tuple[int, list[str]]]:
+def _rows_of_workbook(file: Path) -> list[Line]:
     """Cells of the first sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
     try:
         import_optional("openpyxl", extra="excel")
@@ -192,7 +204,7 @@ def _rows_of_workbook(file: Path) -> list[tuple[int, list[str]]]:
         raise ImportError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
-    rows = [[str(cell).strip().removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]
+    rows = [[str(cell).strip().replace("\n", "").removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]
     return [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
 
 
@@ -231,7 +243,7 @@ def text_of(file: Path, encoding: str | None = None) -> str:
     return text
 
 
-def rows_of(text: str, separator: str) -> list[tuple[int, list[str]]]:
+def rows_of(text: str, separator: str) -> list[Line]:
     """Cells of each line that is not empty, with the number of the line; quotes may hold several lines."""
     ended = (f"{line}\n" for line in text.splitlines())
     lines = csv.reader(ended, delimiter=separator, skipinitialspace=separator != "\t")

@@ -232,6 +232,7 @@ UNDERSTOOD = {
         [["Bridge"], ["Logger", 12], [], in_cells()[0], [None, "degC", "Hz", "um/m"], *in_cells()[1:]], more=["Notes"]),
     "a workbook with serial dates": lambda: workbook(in_cells(RECORDS, lambda one: float(serial(one)))),
     "a workbook with dates and times": lambda: workbook(in_cells(RECORDS, pd.Timestamp.date, pd.Timestamp.time)),
+    "a workbook with texts of two lines": lambda: workbook(with_column(in_cells(), "note", ["a\nb"] * N)),
     "a workbook with texts as stamps": lambda: workbook(in_cells(RECORDS, lambda one: one.strftime(GERMAN))),
     "names again": lambda: log(repeated(rows(), 20, 50)),
     "names and units again": lambda: log([*rows()[:1], ["", "degC", "Hz", ""], *rows()[1:9], rows()[0],
@@ -275,7 +276,8 @@ UNDERSTOOD = {
 }  # fmt: skip
 """Logs of one kind each, and all of their records."""
 OTHER_LENGTHS = {
-    "the month first, as later days show", "one day, its format given", "offsets", "offsets of hours", "clocks that change",
+    "the month first, as later days show", "one day, its format given", "offsets", "offsets of hours",
+    "clocks that change",
     "the day first, none after the twelfth", "the month first, none after the twelfth", "a workbook, with midnights",
 }  # fmt: skip
 
@@ -289,7 +291,7 @@ REFUSED = {
     "the name of the stamps twice": (lambda: log([[*row[:3], row[0]] for row in rows()]), "line 1"),
     "NUL bytes within": (lambda: log([*rows()[:30], "\0" * 20 + ",".join(rows()[30]), *rows()[31:]]), "line 31"),
     "one day, the day or the month first": (lambda: log(rows(LONE, US)), ""),
-    "long gaps, none after the twelfth": (lambda: log(rows(EARLY[::13], US)), ""),
+    "long gaps, none after the twelfth": (lambda: log(rows(EARLY[::13], US), truth=EARLY[::13]), ""),
     "some with offsets": (lambda: log([*rows()[:30], *([row[0] + "Z", *row[1:]] for row in rows()[30:])]), "line 31"),
     "a clock that is not understood": (lambda: log([["date", "clock", *rows()[0][1:]], *HIDDEN[1:]]), ""),
     "a stamp with two records": (lambda: log(rows(TWICE)), ""),
