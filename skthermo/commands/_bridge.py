@@ -278,7 +278,7 @@ def _tried(done: Done, file: Path, read: Callable[..., Any], *arguments: Any) ->
     """What a file gives; an error of one file leaves the others."""
     try:
         return read(*arguments)
-    except (OSError, ValueError, ImportError) as error:
+    except (OSError, ValueError) as error:
         done.failed(error if str(file) in str(error) else ValueError(f"{file}: {error}"))
         return None
 

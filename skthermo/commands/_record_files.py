@@ -200,8 +200,8 @@ def _rows_of_workbook(file: Path) -> list[Line]:
             sheet = pd.read_excel(file, header=None, dtype=object, na_filter=False, engine="openpyxl")
     except OSError:
         raise
-    except ImportError as error:
-        raise ImportError(f"{file}: {error}") from error
+    except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
+        raise ValueError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
     rows = [[str(cell).strip().replace("\n", "").removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]

@@ -2,6 +2,7 @@
 
 import io
 import re
+import shutil
 import sys
 from dataclasses import dataclass
 
@@ -14,7 +15,8 @@ from skthermo.commands._new_records import check_layout, read_baseline, read_col
 from skthermo.commands._proposal import SINGLE, Candidate, Proposal
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
-from tests.commands.folders import edit, run
+from tests.commands.folders import edit, run, write_day
+from tests.monitoring.nightly import FIRST as TWO_YEARS
 
 FAILED = 3
 N, FIRST = 80, 60  # records of a file, and of the baseline where later ones are new
@@ -431,6 +433,20 @@ def test_without_openpyxl_a_workbook_is_named_with_what_to_install(tmp_path, mon
     done, _ = begin(Log({"log.xlsx": b""}, RECORDS), tmp_path)
     assert done.code == FAILED
     assert_one_error(done.err, tmp_path, "openpyxl", "[excel]")
+
+
+def test_without_openpyxl_a_workbook_keeps_no_other_file_out(fitted, records, tmp_path, monkeypatch):
+    bridge = shutil.copytree(fitted, tmp_path / "bridge")
+    now = write_day(records, bridge, TWO_YEARS, TWO_YEARS + 3)
+    (bridge / "new" / "log.xlsx").write_bytes(b"")
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    assert run("update", bridge, "--now", now).code != FAILED  # an empty file is not read yet
+    (bridge / "new" / "log.xlsx").write_bytes(b"PK")
+    now = write_day(records, bridge, TWO_YEARS + 3, TWO_YEARS + 5)
+    done = run("update", bridge, "--now", now)
+    assert done.code == FAILED
+    assert_one_error(done.err, tmp_path, "openpyxl")
+    assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
 
 
 def test_a_format_of_stamps_that_is_given_is_the_one_that_is_read(tmp_path):
