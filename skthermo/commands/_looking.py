@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import compress, product
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +13,33 @@ import pandas as pd
 
 from skthermo._tables.frames import MARKERS
 from skthermo.commands._record_files import (
+    EXCEL,
     ISO,
-    MISSING,
     OFFSET,
     PARQUET,
     UNIX,
+    UNIX_MS,
+    WORKBOOKS,
     CsvFormat,
+    names_of,
     number,
     parsed,
     read_file,
+    rows_in,
     rows_of,
     text_of,
+    used_width,
+    without_margin,
 )
 
-SEPARATORS, DECIMALS = (",", ";", "\t", "|"), (".", ",")
-DAYS = ("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y/%m/%d", "%d.%m.%y", "%Y%m%d")
+SEPARATORS, DECIMALS = (";", "\t", "|", ","), (".", ",")  # a comma last, as it may be a decimal sign
+DAYS = (
+    "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%y",
+    "%d/%m/%y", "%m/%d/%y", "%y/%m/%d", "%d-%m-%y", "%y-%m-%d", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y", "%Y%m%d",
+)  # fmt: skip
 CLOCKS = (" %H:%M:%S", " %H:%M", "", " %H:%M:%S.%f", " %I:%M:%S %p", " %I:%M %p")
-STAMPS = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)), UNIX)
+WRITTEN = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)))
+YEARS = (1970, 2100)  # of stamps
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?$")
 UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 UNITS = {
@@ -57,14 +67,14 @@ class Look:
     notes: tuple[str, ...]
 
 
-def look_at(file: Path, zone: str | None = None) -> Look:
-    """Find the form of a file and read it."""
+def look_at(file: Path, zone: str | None = None, stamps: str | None = None) -> Look:
+    """Find the form of a file and read it, in a time zone and with a format of its stamps if these are known."""
     if not file.is_file():
-        raise FileNotFoundError(f"there is no file {str(file)!r}; expected a CSV or parquet file with records")
+        raise FileNotFoundError(f"there is no file {str(file)!r}; expected records as CSV, .xlsx or parquet")
     if file.suffix.lower() in PARQUET:
         form, units, ignored, notes = CsvFormat(time_zone=zone), {}, {}, []
     else:
-        form, units, ignored, notes = _look_at_csv(file, zone)
+        form, units, ignored, notes = _look_at_table(file, zone, stamps)
     records = read_file(file, form, ignore=ignored)
     ignored |= dict(_no_measurements(records))
     records = records.drop(columns=[name for name in records if name in ignored])
@@ -78,132 +88,185 @@ def look_at(file: Path, zone: str | None = None) -> Look:
     return Look(file, form, records, ignored, units, tuple(notes))
 
 
-def _look_at_csv(file: Path, zone: str | None) -> tuple[CsvFormat, dict[str, str], dict[str, str], list[str]]:
-    """Form of a CSV file, units of its columns as a line below the names has them, columns of text, and notes."""
-    encoding, text = _decoded(file)
-    head = "\n".join(text.splitlines()[:MOST_LOOKED_AT])
-    separator, decimal, rows = _divided(head)
-    width = len(rows[-1][1])
-    is_record = [len(row) == width and _share_of_numbers(row[1:], decimal) > 0 for _, row in rows]
-    if not any(is_record) or is_record[0]:
+def _look_at_table(
+    file: Path, zone: str | None, stamps: str | None
+) -> tuple[CsvFormat, dict[str, str], dict[str, str], list[str]]:
+    """Form of a CSV file or workbook, units of its columns as a line below the names has them, columns of text, and
+    notes."""
+    separator, decimal = (",", ".") if file.suffix.lower() in WORKBOOKS else _division(text_of(file), file)
+    rows, _ = rows_in(file, CsvFormat(separator))
+    width = used_width([row for _, row in rows], _usual_width([row for _, row in rows[:MOST_LOOKED_AT]]))
+    rows = [(line, without_margin(row, width)) for line, row in rows]
+    rows = [(line, row) for line, row in rows if len(row) == width]
+    cells = [row for _, row in rows]
+    places, stamps, notes = _stamps_of(cells, file, stamps)
+    is_record = _times_in(cells[:MOST_LOOKED_AT], places, stamps).notna()
+    first = int(np.argmax(is_record))
+    above = [one for one in rows[:first] if one[1][0] != "TOA5"]
+    above = [one for one in above if not one[1][0].startswith("#")] or above
+    if not above:
         raise ValueError(
             f"{file}: no line of names above the values was found, with {separator!r} between {width} columns and the "
             f"decimal sign {decimal!r}; expected one, then a line for each record"
         )
-    first = is_record.index(True)
-    above = [n for n in range(first) if len(rows[n][1]) == width]
-    if not above:
-        raise ValueError(f"{file}, line {rows[first][0]}: values: {width}; expected a line of as many names above it")
-    names, records = rows[above[0]][1], [row for _, row in rows[first:] if len(row) == width]
-    columns = dict(zip(names, zip(*records, strict=True), strict=True))
-    stamp_columns, stamps, notes = _stamps_of(columns, file)
-    places = [names.index(name) for name in stamp_columns]
-    while first - 1 > above[0] and _are_stamps([" ".join(rows[first - 1][1][n] for n in places)], stamps):
-        first -= 1  # a record without a value
-    units = {}
-    for n in above[1:]:
-        units |= {
-            name: UNITS[cell.lower()] for name, cell in zip(names, rows[n][1], strict=True) if cell.lower() in UNITS
-        }
+    names_line, names = max(above, key=lambda one: sum(map(bool, one[1])))  # a title has fewer cells
+    names = names_of(names)
+    columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
+    stamp_columns = [names[place] for place in places]
+    units = {
+        name: UNITS[cell.lower()]
+        for line, row in above
+        if line > names_line
+        for name, cell in zip(names, row, strict=True)
+        if cell.lower() in UNITS
+    }
     texts = {
         name: "it holds text"
         for name, cells in columns.items()
-        if name not in stamp_columns
-        and _share_of_numbers(cells, decimal) < MOSTLY
-        and set(map(str.lower, cells)) - MISSING
+        if name not in stamp_columns and _share_of_numbers(cells, decimal) < MOSTLY
     }
-    has_offsets = OFFSET.search(" ".join(columns[name][0] for name in stamp_columns)) is not None
+    has_offsets = OFFSET.search(_stamp_text(cells[first], places)) is not None
     form = CsvFormat(
         separator,
         decimal,
-        encoding,
-        names_line=rows[above[0]][0],
-        values_line=rows[first][0] if rows[first][0] != rows[above[0]][0] + 1 else None,
+        names_line=names_line,
+        values_line=rows[first][0] if rows[first][0] != names_line + 1 else None,
         stamp_columns=() if stamp_columns == names[:1] else stamp_columns,
         stamps=stamps,
-        time_zone="UTC" if zone is None and (has_offsets or stamps == UNIX) else zone,
+        time_zone="UTC" if zone is None and (has_offsets or stamps.startswith(UNIX)) else zone,
     )
     return form, units, texts, notes
 
 
-def _decoded(file: Path) -> tuple[str, str]:
-    """Encoding and text of a file."""
-    start = file.read_bytes()[:3]
-    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return "utf-16", text_of(file, "utf-16")
-    try:
-        return "utf-8", text_of(file, "utf-8")
-    except ValueError:
-        return "cp1252", text_of(file, "cp1252")
-
-
-def _divided(text: str) -> tuple[str, str, list[tuple[int, list[str]]]]:
-    """Separator and decimal sign by which most lines have equally many columns and most cells are numbers, and the
-    lines so divided; the last one is a whole record."""
-    found = []
+def _division(text: str, file: Path) -> tuple[str, str]:
+    """Separator and decimal sign by which lines of the usual number of columns have the most numbers."""
+    head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
     for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
-        rows = rows_of(text, separator)
-        widths = np.array([len(row) for _, row in rows])
-        if not len(widths) or (separator == decimal and '"' not in text):
+        try:
+            rows = [row for _, row in rows_of(head, separator)]
+        except ValueError:
             continue
-        width = int(np.bincount(widths).argmax())
-        if width < 2:
+        if not rows or (separator == decimal and '"' not in head):
             continue
-        whole = [row for row in rows if len(row[1]) == width]
-        shares = [_share_of_numbers(row[1:], decimal) for _, row in whole]
-        last = max(n for n, row in enumerate(rows) if len(row[1]) == width)
-        found.append((round(len(whole) / len(rows) * np.mean(shares), 2), -rank, separator, decimal, rows[: last + 1]))
+        width = _usual_width(rows)
+        numbers = [_is_number(cell, decimal) for row in rows if len(row) == width for cell in row[1:]]
+        found.append((numbers.count(True) / len(rows), -rank, separator, decimal))
     if not found or max(found)[0] == 0:
-        raise ValueError(f"no columns of numbers were found; expected values with one of {SEPARATORS} between")
+        raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {SEPARATORS} between")
     return max(found)[2:]
 
 
+def _usual_width(rows: Sequence[Sequence[str]]) -> int:
+    widths = [len(row) for row in rows]
+    return max(set(widths), key=widths.count, default=0)
+
+
 def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
-    given = [cell for cell in cells if cell.lower() not in MISSING]
-    return sum(_is_number(cell, decimal) for cell in given) / len(given) if given else 0.0
+    """Share of numbers among the cells that have a value."""
+    given = [kind for cell in cells if (kind := _is_number(cell, decimal)) is not None]
+    return sum(given) / len(given) if given else 1.0
 
 
-def _is_number(cell: str, decimal: str) -> bool:
+def _is_number(cell: str, decimal: str) -> bool | None:
+    """Whether a cell has a number; None where it has no value."""
     try:
-        return np.isfinite(number(cell, decimal))
+        return None if np.isnan(number(cell, decimal)) else True
     except ValueError:
         return False
 
 
-def _stamps_of(columns: dict[str, Sequence[str]], file: Path) -> tuple[list[str], str, list[str]]:
-    """Columns that hold the stamps, their format, and what is doubtful in it."""
-    names = list(columns)
-    for n, name in enumerate(names):
-        texts, used = columns[name], [name]
-        if n + 1 < len(names) and all(TIME_OF_DAY.match(cell) for cell in columns[names[n + 1]]):
-            used = names[n : n + 2]
-            texts = [" ".join(parts) for parts in zip(texts, columns[names[n + 1]], strict=True)]
-        fitting = [form for form in STAMPS if _are_stamps(texts, form)]
-        if fitting:
-            best = min(fitting, key=lambda form: (_irregularity(parsed(texts, form)), STAMPS.index(form)))
-            others = [form for form in fitting if not parsed(texts, form).equals(parsed(texts, best))]
-            doubts = [
-                f"stamps of {file.name} may also have the format {one}: see that {best} is right" for one in others
-            ]
-            return used, best, doubts[:1]
-    raise ValueError(
-        f"{file}: no column holds times, such as 2026-01-31 13:00 or 31.01.2026 13:00; the first values are "
-        f"{[cells[0] for cells in columns.values()]!r:.200}"
-    )
+def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
+    """Places of the columns that hold the stamps, their format, and what is doubtful in it."""
+    looked = rows[:MOST_LOOKED_AT]
+    for forms in [(given,)] if given else [WRITTEN, (UNIX, UNIX_MS), (EXCEL,)]:
+        tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]
+        found = [one for one in tried if one[1]]
+        if forms == (EXCEL,) and len(found) > 1:  # whole numbers may be counts of records
+            found = [one for one in found if not _are_days(_times_in(looked, one[0], EXCEL))] or found
+            if len(found) > 1:
+                columns = " and ".join(str(places[0] + 1) for places, _ in found)
+                raise ValueError(f"{file}: columns {columns} may all hold serial dates; expected one that does")
+        if found:
+            return found[0][0], *_certain(rows, *found[0], file)
+    expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
+    raise ValueError(f"{file}: no column holds times, {expected}; the first values are {list(*rows[:1])!r:.200}")
 
 
-def _are_stamps(texts: Sequence[str], form: str) -> bool:
-    if form == UNIX:
-        numbers = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce")
-        return bool(numbers.between(5e8, 4e9).all())  # from 1985 on
-    return not parsed(texts[:1], form).hasnans and not parsed(texts, form).hasnans
+def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
+    """Columns that may hold stamps: each with the nearest time of day, and alone."""
+    columns = list(zip(*rows, strict=True))
+    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(TIME_OF_DAY.match, cells))) > len(cells)]
+    for n in range(len(columns)):
+        near = sorted((abs(clock - n), clock < n, clock) for clock in clocks if clock != n)
+        yield from ((n, clock) for *_, clock in near[:1])
+        yield (n,)
 
 
-def _irregularity(stamps: pd.DatetimeIndex) -> float:
-    """Mean time between neighbouring records over the usual one: days and months that are exchanged make it large."""
-    steps = np.abs(np.diff(stamps.as_unit("ns").asi8)).astype(float)
-    usual = np.median(steps) if len(steps) else 0.0
-    return round(float(steps.mean() / usual), 3) if usual else 1.0
+def _stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
+    return " ".join(row[place] for place in places)
+
+
+def _times_in(rows: Sequence[Sequence[str]], places: Sequence[int], form: str) -> pd.DatetimeIndex:
+    """Stamps in some columns of rows, NaT where there is none that is plausible."""
+    index = parsed([_stamp_text(row, places) for row in rows], form)
+    return index.where((index.year >= YEARS[0]) & (index.year <= YEARS[1]))
+
+
+def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str]) -> list[str]:
+    """Formats by which the most rows have a stamp, if these are most rows, and their stamps are not all the same."""
+    sample = rows[len(rows) // 2 :: max(len(rows) // 8, 1)]
+    signs = {sign for row in sample for sign in _stamp_text(row, places)}
+    likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
+    found = {form: _times_in(rows, places, form) for form in likely if _times_in(sample, places, form).notna().any()}
+    least = max([len(rows) / 2, *(index.notna().sum() for index in found.values())])
+    return [
+        form
+        for form, index in found.items()
+        if index.notna().sum() == least
+        and 2 * index.nunique() >= least
+        and (form != EXCEL or _is_in_order(index))  # other numbers are as large
+    ]
+
+
+def _certain(
+    rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], file: Path
+) -> tuple[str, list[str]]:
+    """Of several formats, the one by which the most rows have a stamp, or else the only one by which they follow each
+    other regularly, which must also be that of the shortest time: days and months that are exchanged lengthen it."""
+    found: dict[str, pd.DatetimeIndex] = {}
+    for form in forms:
+        index = _times_in(rows, places, form)
+        if not any(index.equals(other) for other in found.values()):
+            found[form] = index
+    most = max(index.notna().sum() for index in found.values())
+    readings = [form for form, index in found.items() if index.notna().sum() == most]
+    shortest = min(readings, key=lambda form: found[form].max() - found[form].min())
+    certain = readings if len(readings) == 1 else [form for form in readings if _is_regular(found[form])]
+    if certain != [shortest]:
+        raise ValueError(
+            f"{file}: stamps such as {_stamp_text(rows[-1], places)!r} may have the formats "
+            f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
+        )
+    others = [form for form in readings if form not in certain]
+    return certain[0], [
+        f"stamps of {file.name} may also have the format {form}: by {certain[0]}, they follow each other regularly"
+        for form in others[:1]
+    ]
+
+
+def _are_days(stamps: pd.DatetimeIndex) -> bool:
+    return bool((stamps.dropna().normalize() == stamps.dropna()).all())
+
+
+def _is_in_order(stamps: pd.DatetimeIndex) -> bool:
+    known = stamps.dropna()
+    return known.is_monotonic_increasing or known.is_monotonic_decreasing
+
+
+def _is_regular(stamps: pd.DatetimeIndex) -> bool:
+    """Whether stamps are in order, with few gaps."""
+    steps = np.abs(np.diff(stamps.dropna().asi8))
+    return _is_in_order(stamps) and (not len(steps) or bool(steps.mean() <= 1.5 * np.median(steps)))
 
 
 def _no_measurements(records: pd.DataFrame) -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ import pandas as pd
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import write_when_complete
 from skthermo._tables.text import counted
-from skthermo.commands._record_files import ENDINGS, PARQUET, CsvFormat, read_file
+from skthermo.commands._record_files import BINARY, ENDINGS, CsvFormat, read_file
 from skthermo.commands._settings import Records
 from skthermo.exceptions import RecordsWarning
 
@@ -75,7 +75,8 @@ class Taken:
         table = read(file, leave_unfinished=not is_as_before)  # a line that is not finished may be, the next time
         n_rows = known.get("rows", 0)
         n_done = n_rows if len(table) >= n_rows and _checksum(table[:n_rows]) == known.get("checksum") else 0
-        is_finished = is_as_before or file.suffix.lower() in PARQUET or file.read_bytes()[-1:] in (b"\n", b"\r", b"\0")
+        end = file.read_bytes().rstrip(b"\0")[-1:]
+        is_finished = is_as_before or file.suffix.lower() in BINARY or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
     def _key(self, file: Path) -> str:

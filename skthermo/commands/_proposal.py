@@ -23,7 +23,7 @@ from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
 from skthermo.commands._looking import Look, is_in_kelvin, look_at
 from skthermo.commands._new_records import in_celsius, joined
-from skthermo.commands._record_files import PARQUET, CsvFormat
+from skthermo.commands._record_files import BINARY, PARQUET, CsvFormat
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -130,7 +130,7 @@ class Proposal:
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
-        looks = [look_at(file, options.zone) for file in options.files]
+        looks = [look_at(file, options.zone, options.stamps) for file in options.files]
         form = _form_of_all(looks)
         again = [
             name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])
@@ -176,7 +176,7 @@ class Proposal:
     def account(self) -> Iterator[str]:
         for look in self.looks:
             form, index = look.form, look.records.index
-            is_csv = look.file.suffix.lower() not in PARQUET
+            is_csv = look.file.suffix.lower() not in BINARY
             shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
             zone = f" in {index.tz}" if index.tz else ", without a time zone"
             yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"

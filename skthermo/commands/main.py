@@ -174,6 +174,7 @@ def _on_records(one: argparse.ArgumentParser) -> None:
     one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
     one.add_argument("--reference", nargs="+", default=[], metavar="COLUMN", help="temperatures from elsewhere")
     one.add_argument("--zone", help='time zone of the logger\'s clock, such as "Europe/Brussels"')
+    one.add_argument("--stamps", metavar="FORMAT", help='such as "%%m/%%d/%%Y %%H:%%M" (default: as stamps tell)')
     one.add_argument("--until", metavar="TIME", help="last moment of the baseline (default: all records)")
 
 
