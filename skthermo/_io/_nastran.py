@@ -147,7 +147,7 @@ def _of_text(lines: Lines, head: Head, n: int, width: int) -> scipy.sparse.csc_a
         if not is_real or not words:
             continue
         if stated != size_of * length and not (len(words) == 3 and stated == length):  # some count a block's values
-            raise ValueError(f"line {number} states {stated} words; {length} values of {size_of} follow")
+            raise ValueError(f"line {number} states {stated} words; {length} values follow")
         if length:
             strings.add(column, row, length)
     raise ValueError(f"no end after {head.n_columns} columns: the file seems to be cut off")
@@ -157,7 +157,11 @@ def _values(line: bytes, number: int, n: int, width: int) -> list[float]:
     count = line.count(b".")
     if count > n:
         raise ValueError(f"line {number} holds {count} values; expected at most {n}")
-    return [_real(line[i : i + width], number) for i in range(0, count * width, width)]
+    words = [line[i : i + width] for i in range(0, count * width, width)]
+    try:
+        return [float(word) for word in words] if b"_" not in line else [_real(word, number) for word in words]
+    except ValueError:
+        return [_real(word, number) for word in words]
 
 
 def _of_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
@@ -195,7 +199,7 @@ def _records(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 def _of_columns(
     records: Iterator[tuple[int, bytes]], head: Head, integer: str, real: str
 ) -> scipy.sparse.csc_array | None:
-    strings, values, before = Strings(head), bytearray(), 0
+    strings, values, before, is_dense = Strings(head), bytearray(), 0, head.n_rows >= 0
     word, size = np.dtype(integer).itemsize, np.dtype(real).itemsize
     start_of_string = (2 if head.is_big else 1) * word
     for at, record in records:
@@ -208,7 +212,9 @@ def _of_columns(
             raise ValueError(
                 f"column {column} of {n_words} words comes after {before} in a record of {len(record)} bytes"
             )
-        before, start = column, 3 * word
+        if row and not is_dense:
+            raise ValueError(f"column {column} begins in row {row}; expected strings, as in the columns before")
+        before, start, is_dense = column, 3 * word, row > 0
         while head.kind in REAL and start < len(record):
             stop = len(record)
             if not row or start > 3 * word:
@@ -226,11 +232,9 @@ def _of_columns(
 
 def _real(word: bytes, line: int) -> float:
     try:
-        if b"_" in word:
-            raise ValueError
-        return float(word)
+        return float(word.replace(b"D", b"E").replace(b"_", b"?"))  # Python reads 1_000
     except ValueError:
-        changed = BARE_EXPONENT.sub(rb"E\1", word.translate(TO_FLOATS)) if b"_" not in word else b""
+        changed = BARE_EXPONENT.sub(rb"E\1", word.translate(TO_FLOATS).replace(b"_", b"?"))
         try:
             return float(changed)
         except ValueError:
@@ -247,8 +251,8 @@ def _whole(word: bytes, line: int) -> int:
 class Entries:
     """The entries of a matrix of DMIG, by grid point and component of row and column."""
 
-    def __init__(self) -> None:
-        self.head: list[int] = []
+    def __init__(self, line: int) -> None:
+        self.line, self.head = line, list[int]()
         self.rows, self.columns, self.values = array("q"), array("q"), array("d")
 
     def matrix(self) -> Labelled | None:
@@ -274,40 +278,38 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
             name = ""
         if not (line[:4] == b"DMIG" and line[4:5] in b" *," if is_card else name and line[:1] in b" +*,"):
             continue
-        quadruples = _quadruples(line, is_free=is_free)
+        fields = _fields(line, is_free=is_free)
         if is_card:
-            word, *fields = next(quadruples)
-            name = word.decode("latin-1")
+            name, column = fields[0].decode("latin-1"), [_whole(field or b"0", number) for field in fields[1:4]]
             if not 0 < len(name) <= 8:
                 raise ValueError(f"line {number}: {name!r} is no name of one to eight characters")
-            entries = found.setdefault(name, Entries())
-            column = [_whole(field or b"0", number) for field in fields]
+            entries = found.setdefault(name, Entries(number))
             if column[0] == 0:
                 entries.head = column[1:]
                 if column[1] not in (1, 2, 6, 9) or column[2] not in (1, 2, 3, 4):
                     stated = f"form {column[1]} and type {column[2]}"
                     raise ValueError(f"line {number}: matrix {name!r} has {stated}; expected 6 and 2, or such")
-        for node, component, value, _ in quadruples if column[0] else ():
-            if node or component or value:
-                if not value:
-                    raise ValueError(f"line {number}: matrix {name!r} has an entry without a value")
+        for i in range(4 * is_card, len(fields) - 2, 4) if column[0] else ():
+            node, component, value = fields[i : i + 3]
+            if value:
                 entries.rows.extend((_whole(node, number), _whole(component or b"0", number)))
                 entries.columns.extend(column[:2])
                 entries.values.append(_real(value, number))
+            elif node or component:
+                raise ValueError(f"line {number}: matrix {name!r} has an entry without a value")
     if not found:
         raise ValueError("no DMIG entry")
     for name, entries in found.items():
         if not entries.head:
-            raise ValueError(f"matrix {name!r} has no entry that states its form")
+            raise ValueError(f"line {entries.line}: matrix {name!r} has no entry that states its form")
     return {name: entries.matrix() for name, entries in found.items()}
 
 
-def _quadruples(line: bytes, *, is_free: bool) -> Iterator[list[bytes]]:
-    """The fields of a line, four at a time, without its first field."""
+def _fields(line: bytes, *, is_free: bool) -> list[bytes]:
+    """Four or eight fields of a line, without its first."""
     if is_free and b"," in line:
         fields = [field.strip() for field in line.partition(b"$")[0].split(b",")[1:9]]
-    else:
-        width = 16 if b"*" in line[:8] else 8
-        fields = [line[i : i + width].strip() for i in range(8, 72, width)]
-    fields += [b""] * (-len(fields) % 4)
-    return (fields[i : i + 4] for i in range(0, len(fields), 4))
+        return fields + [b""] * (-len(fields) % 4)
+    if b"*" in line[:8]:
+        return [line[8:24].strip(), line[24:40].strip(), line[40:56].strip(), line[56:72].strip()]
+    return [line[i : i + 8].strip() for i in range(8, 72, 8)]

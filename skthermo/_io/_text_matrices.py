@@ -95,11 +95,8 @@ def numbers_of(text: bytes, n_before: int = 0) -> Numbers:
         raise
 
 
-def _fields(grid: Grid, lines: Integers, if_blank: bytes = b"") -> Numbers:
-    """One number for each row of characters; ``if_blank`` is what those of spaces alone mean."""
-    if if_blank:
-        empty = (grid == SPACE).all(axis=1)
-        grid[empty, grid.shape[1] - len(if_blank) :] = list(if_blank)
+def _fields(grid: Grid, lines: Integers) -> Numbers:
+    """One number for each row of characters."""
     spaced = np.full((len(grid), grid.shape[1] + 2), SPACE, dtype=np.uint8)
     spaced[:, 1:-1] = grid
     blank = spaced <= SPACE
