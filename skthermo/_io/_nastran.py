@@ -22,7 +22,7 @@ from skthermo._io._text_matrices import (
 
 HEADING = re.compile(
     rb"([ \d]{8}|[ \d]{16})([ \d-]{8}|[ \d-]{16})([ \d]{8})([ \d]{8})([A-Z]\w{0,7})"
-    rb"[ \0]*(?:(?:1P,)?(\d+)[EDed](\d+)\.\d+)?(?:\|I16)?[ \t]*"
+    rb"[ \0]*(?:(?:1P,)?(\d{1,3})[EDed](\d{1,3})\.\d+)?(?:\|I16)?[ \t]*"
 )
 USUAL_FORMAT = 5, 16  # values in a line and characters of each, if a heading does not say so
 STRING = 65536  # a string's length and row in one number, where there are fewer rows
@@ -199,7 +199,7 @@ def _records(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 def _of_columns(
     records: Iterator[tuple[int, bytes]], head: Head, integer: str, real: str
 ) -> scipy.sparse.csc_array | None:
-    strings, values, before, is_dense = Strings(head), bytearray(), 0, head.n_rows >= 0
+    strings, values, before, is_dense = Strings(head), bytearray(), 0, None
     word, size = np.dtype(integer).itemsize, np.dtype(real).itemsize
     start_of_string = (2 if head.is_big else 1) * word
     for at, record in records:
@@ -212,8 +212,10 @@ def _of_columns(
             raise ValueError(
                 f"column {column} of {n_words} words comes after {before} in a record of {len(record)} bytes"
             )
-        if row and not is_dense:
-            raise ValueError(f"column {column} begins in row {row}; expected strings, as in the columns before")
+        if is_dense not in (None, row > 0):
+            raise ValueError(
+                f"column {column} begins in row {row}; expected dense columns, or strings (row 0), throughout"
+            )
         before, start, is_dense = column, 3 * word, row > 0
         while head.kind in REAL and start < len(record):
             stop = len(record)
