@@ -130,7 +130,8 @@ def _of_text(lines: Lines, head: Head, n: int, width: int) -> scipy.sparse.csc_a
         if len(words) == 3:
             column, row, stated = words
             if column == head.n_columns + 1:
-                lines.take()
+                if lines:
+                    _values(lines.take(), lines.number, n, width)  # a number without meaning
                 return strings.matrix(np.array(values)) if is_real else None
             stated = stated if row else 0
         elif column and len(words) == 2 and head.is_big:

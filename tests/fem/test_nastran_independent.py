@@ -58,7 +58,6 @@ def test_dmig_is_read_as_pyyeti_reads_it(name):
 
 
 def test_dmig_that_pyyeti_writes(tmp_path):
-
     labels = pd.MultiIndex.from_tuples(DOFS, names=["id", "dof"])
     with open(tmp_path / "bridge.pch", "w") as file:
         nastran.wtdmig(file, {"kaax": pd.DataFrame(TOTAL, index=labels, columns=labels)})
