@@ -9,13 +9,12 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._io._text_matrices import (
-    BARE_EXPONENT,
     MOST,
-    TO_FLOATS,
     Labelled,
     Numbers,
     Text,
     labelled,
+    reals,
     square,
     symmetric,
 )
@@ -111,11 +110,9 @@ def _of_lines(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | No
             raise ValueError(f"line {number} is {line[:40].decode('latin-1')!r}; expected the heading of a matrix")
         n_columns, n_rows, form, kind = (int(word) for word in heading.groups()[:4])
         head = Head(n_columns, n_rows, form, kind, heading[5].decode("ascii"))
+        n, width = map(int, heading.group(6, 7)) if heading[6] else USUAL_FORMAT
         try:
-            yield (
-                head.name,
-                _of_text(lines, head, *(USUAL_FORMAT if heading[6] is None else map(int, heading.group(6, 7)))),
-            )
+            yield head.name, _of_text(lines, head, n, width)
         except ValueError as error:
             raise ValueError(f"matrix {head.name!r} of line {number}: {error}") from error
 
@@ -158,11 +155,7 @@ def _values(line: bytes, number: int, n: int, width: int) -> list[float]:
     count = line.count(b".")
     if count > n:
         raise ValueError(f"line {number} holds {count} values; expected at most {n}")
-    words = [line[i : i + width] for i in range(0, count * width, width)]
-    try:
-        return [float(word) for word in words] if b"_" not in line else [_real(word, number) for word in words]
-    except ValueError:
-        return [_real(word, number) for word in words]
+    return reals([line[i : i + width] for i in range(0, count * width, width)], number)
 
 
 def _of_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
@@ -209,14 +202,9 @@ def _of_columns(
         column, row, n_words = np.frombuffer(record[: 3 * word], integer).tolist()
         if column == head.n_columns + 1:
             return strings.matrix(np.frombuffer(values, real).astype(float)) if head.kind in REAL else None
-        if not before < column or len(record) != (3 + n_words) * word:
-            raise ValueError(
-                f"column {column} of {n_words} words comes after {before} in a record of {len(record)} bytes"
-            )
-        if is_dense not in (None, row > 0):
-            raise ValueError(
-                f"column {column} begins in row {row}; expected dense columns, or strings (row 0), throughout"
-            )
+        if column <= before or len(record) != (3 + n_words) * word or is_dense not in (None, row > 0):
+            what = f"column {column} from row {row}, of {n_words} words, in {len(record)} bytes"
+            raise ValueError(f"after column {before}, {what}")
         before, start, is_dense = column, 3 * word, row > 0
         while head.kind in REAL and start < len(record):
             stop = len(record)
@@ -231,17 +219,6 @@ def _of_columns(
             values += record[start:stop]
             start = stop
     raise ValueError(f"no end after {head.n_columns} columns: the file seems to be cut off")
-
-
-def _real(word: bytes, line: int) -> float:
-    try:
-        return float(word.replace(b"D", b"E").replace(b"_", b"?"))  # Python reads 1_000
-    except ValueError:
-        changed = BARE_EXPONENT.sub(rb"E\1", word.translate(TO_FLOATS).replace(b"_", b"?"))
-        try:
-            return float(changed)
-        except ValueError:
-            raise ValueError(f"line {line}: {word.decode('latin-1').strip()!r} is not a number") from None
 
 
 def _whole(word: bytes, line: int) -> int:
@@ -297,7 +274,7 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
             if value:
                 entries.rows.extend((_whole(node, number), _whole(component or b"0", number)))
                 entries.columns.extend(column[:2])
-                entries.values.append(_real(value, number))
+                entries.values.extend(reals([value], number))
             elif node or component:
                 raise ValueError(f"line {number}: matrix {name!r} has an entry without a value")
     if not found:

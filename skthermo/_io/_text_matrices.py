@@ -4,7 +4,7 @@ Texts are read as arrays of bytes, in parts of many lines at once. Errors name t
 """
 
 import re
-from collections.abc import Iterator
+from array import array
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Grid = NDArray[np.uint8]
 
 BYTES_FOR_EACH_ROW = 100  # that checks of a sparse matrix take, its entries apart
 LINES_AT_ONCE = 20_000
@@ -60,26 +59,6 @@ class Text:
         begins = np.flatnonzero(blank[:-1] & ~blank[1:])
         return np.diff(np.append(0, np.searchsorted(begins, self.ends)))
 
-    def grid(self, lines: Integers, width: int) -> Grid:
-        """The first characters of some lines, (n_lines, width), with spaces after the end of a line."""
-        starts, ends = self.starts[lines], self.ends[lines]
-        n_lines, steps = len(starts), np.diff(starts)
-        grid = np.full((n_lines, width), SPACE, dtype=np.uint8)
-        if n_lines > 1 and (steps == steps[0]).all() and ends[-1] - starts[-1] == steps[0] - 1 <= width:
-            even = self.bytes[starts[0] : ends[-1]]  # a table of characters, but for the last line end
-            grid[:-1, : steps[0] - 1] = even[: -steps[0] + 1].reshape(n_lines - 1, steps[0])[:, :-1]
-            grid[-1, : steps[0] - 1] = even[-steps[0] + 1 :]
-        elif len(self.bytes):
-            places = starts[:, np.newaxis] + np.arange(width)
-            inside = places < ends[:, np.newaxis]
-            grid[inside] = self.bytes[places[inside]]
-        return grid
-
-    def parts(self, lines: Integers) -> Iterator[Integers]:
-        """Lines in parts that take little memory."""
-        for start in range(0, len(lines), LINES_AT_ONCE):
-            yield lines[start : start + LINES_AT_ONCE]
-
 
 def numbers_of(text: bytes, n_before: int = 0) -> Numbers:
     """All numbers of a text in a row; an error names the first word that is none, and its line after others."""
@@ -93,31 +72,6 @@ def numbers_of(text: bytes, n_before: int = 0) -> Numbers:
                 except ValueError:
                     raise ValueError(f"line {number}: {word[:30].decode('latin-1')!r} is not a number") from None
         raise
-
-
-def _fields(grid: Grid, lines: Integers) -> Numbers:
-    """One number for each row of characters."""
-    spaced = np.full((len(grid), grid.shape[1] + 2), SPACE, dtype=np.uint8)
-    spaced[:, 1:-1] = grid
-    blank = spaced <= SPACE
-    is_one = (blank[:, :-1] & ~blank[:, 1:]).sum(axis=1) == 1
-    text = spaced.tobytes().translate(TO_FLOATS)
-    for change in (lambda text: text, lambda text: BARE_EXPONENT.sub(rb"E\1", text)):
-        try:
-            numbers = np.fromstring(change(text), sep=" ") if is_one.all() else np.empty(0)
-        except (DeprecationWarning, ValueError):
-            continue
-        if len(numbers) == len(grid):
-            return numbers
-    for row, line, is_word in zip(grid, lines, is_one, strict=True):
-        word = row.tobytes()
-        try:
-            if not is_word:
-                raise ValueError
-            float(BARE_EXPONENT.sub(rb"E\1", word.translate(TO_FLOATS)))
-        except ValueError:
-            raise ValueError(f"line {line + 1}: {word.decode('latin-1').strip()!r} is not a number") from None
-    raise ValueError(f"lines {lines[0] + 1} to {lines[-1] + 1}: what is not a number")
 
 
 def _whole(numbers: Numbers, what: str, least: int = -MOST) -> Integers:
@@ -240,8 +194,8 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
     Duff, Grimes and Lewis, User's Guide for the Harwell-Boeing Sparse Matrix Collection (1992). ANSYS writes it with
     ``HBMAT``, one number in each line, the right-hand side at the end.
     """
-    text = Text(content)
-    heads = [text.content[text.starts[i] : text.ends[i]] for i in range(min(4, len(text)))]
+    lines = Text(content).content.removesuffix(b"\n").split(b"\n")
+    heads = lines[:4]
     try:
         counts = [int(word) for word in heads[1].split()]
         kind, sizes = heads[2][:3].decode("ascii").upper(), [int(word) for word in heads[2][3:].split()]
@@ -260,7 +214,7 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
         or len(forms) < 3
     ):
         raise ValueError(f"a matrix {kind} of {n_rows} x {n_columns}; expected a square one, RSA or RUA")
-    start, found, words = 5 if n_sides else 4, [], text.words()
+    start, found = 5 if n_sides else 4, []
     for n_lines, n_numbers, (n, width), what in zip(
         (pointers_in, rows_in, values_in),
         (n_columns + 1, n_entries, n_entries),
@@ -268,13 +222,12 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
         ("pointers", "rows", "values"),
         strict=True,
     ):
-        if n_numbers < 0 or n_lines != -(-n_numbers // n) or start + n_lines > len(text):
+        if n_numbers < 0 or n_lines != -(-n_numbers // n) or start + n_lines > len(lines):
             raise ValueError(
-                f"{n_numbers} {what} in {n_lines} lines of {n} from line {start + 1}, of {len(text)} lines; expected "
+                f"{n_numbers} {what} in {n_lines} lines of {n} from line {start + 1}, of {len(lines)} lines; expected "
                 "as many as the heading says"
             )
-        lines = np.arange(start, start + n_lines)
-        found.append(_block(text, lines, words[lines], n_numbers, n, width))
+        found.append(_block(lines[start : start + n_lines], start + 1, n_numbers, n, width))
         start += n_lines
     pointers, rows = _whole(found[0], "a pointer", 1) - 1, _whole(found[1], "a row", 1) - 1
     if pointers[0] or pointers[-1] != n_entries or (np.diff(pointers) < 0).any() or (rows >= n_rows).any():
@@ -285,26 +238,29 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
     return square(rows, columns, found[2], n_rows)
 
 
-def _block(text: Text, lines: Integers, words: Integers, n_numbers: int, n: int, width: int) -> Numbers:
+def _block(lines: list[bytes], first: int, n_numbers: int, n: int, width: int) -> Numbers:
     """Numbers of some lines: between spaces or, where they touch one another, in fields of a width, n in a line."""
-    if words.sum() == n_numbers:
-        return _spaced_numbers(text, lines)
-    numbers = [np.empty(0)]
-    for line in lines[(text.ends - text.starts)[lines] > n * width]:
-        if text.content[text.starts[line] + n * width : text.ends[line]].strip():
-            raise ValueError(f"line {line + 1} is longer than {n} fields of {width} characters")
-    for part in text.parts(lines):
-        fields = text.grid(part, n * width).reshape(-1, width)
-        inside = np.repeat(part, n)[: n_numbers - n * int(part[0] - lines[0])]
-        numbers.append(_fields(fields[: len(inside)], inside))
-    return np.concatenate(numbers)
+    numbers, is_spaced = array("d"), sum(len(line.split()) for line in lines) == n_numbers
+    for number, line in enumerate(lines, start=first):
+        if not is_spaced and line[n * width :].strip():
+            raise ValueError(f"line {number} is longer than {n} fields of {width} characters")
+        words = line.split() if is_spaced else [line[i : i + width] for i in range(0, n * width, width)]
+        numbers.extend(reals(words[: n_numbers - len(numbers)], number))
+    return np.array(numbers)
 
 
-def _spaced_numbers(text: Text, lines: Integers) -> Numbers:
-    """The numbers of some lines, with spaces between them."""
-    numbers, width = [np.empty(0)], int((text.ends - text.starts)[lines].max(initial=0)) + 1
-    for part in text.parts(lines):
-        grid = text.grid(part, width)
-        grid[:, -1] = NEWLINE
-        numbers.append(numbers_of(grid.tobytes().translate(TO_FLOATS), int(part[0])))
-    return np.concatenate(numbers)
+def reals(words: list[bytes], line: int) -> list[float]:
+    """Numbers as Fortran writes them; an error names the first word that is none."""
+    try:
+        if b"_" not in b"".join(words):  # Python reads 1_000
+            return [float(word.replace(b"D", b"E")) for word in words]
+    except ValueError:
+        pass
+    found = []
+    for word in words:
+        try:
+            changed = BARE_EXPONENT.sub(rb"E\1", word.upper().replace(b"D", b"E").replace(b"_", b"?"))
+            found.append(float(changed))
+        except ValueError:
+            raise ValueError(f"line {line}: {word.decode('latin-1').strip()!r} is not a number") from None
+    return found
