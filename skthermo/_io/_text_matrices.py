@@ -1,7 +1,4 @@
-"""Matrices in texts that FE programs write: lines of entries and Harwell-Boeing.
-
-Texts are read as arrays of bytes, in parts of many lines at once. Errors name the line.
-"""
+"""Matrices in texts that FE programs write: lines of entries and Harwell-Boeing. Errors name the line."""
 
 import re
 from array import array
@@ -244,8 +241,11 @@ def _block(lines: list[bytes], first: int, n_numbers: int, n: int, width: int) -
     for number, line in enumerate(lines, start=first):
         if not is_spaced and line[n * width :].strip():
             raise ValueError(f"line {number} is longer than {n} fields of {width} characters")
-        words = line.split() if is_spaced else [line[i : i + width] for i in range(0, n * width, width)]
+        starts = range(0, min(n * width, len(line)), width)
+        words = line.split() if is_spaced else [line[i : i + width] for i in starts]
         numbers.extend(reals(words[: n_numbers - len(numbers)], number))
+    if len(numbers) != n_numbers:
+        raise ValueError(f"{len(numbers)} numbers in {len(lines)} lines from line {first}; expected {n_numbers}")
     return np.array(numbers)
 
 
