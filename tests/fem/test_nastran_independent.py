@@ -1,4 +1,4 @@
-"""Nastran's files as pyyeti, an independent program, writes and reads them, and those of Nastran that it comes with."""
+"""Nastran's files as pyyeti, an independent program, writes and reads them, and the files that it comes with."""
 
 import warnings
 from pathlib import Path
