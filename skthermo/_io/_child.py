@@ -21,15 +21,13 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
-from skthermo._io._binary_matrices import read_binary_op4
+from skthermo._io._nastran import read_dmig, read_op4
 from skthermo._io._text_matrices import (
     BYTES_FOR_EACH_ROW,
     numbers_of,
-    read_dmig,
     read_dofs,
     read_entries,
     read_harwell_boeing,
-    read_op4,
 )
 
 Bytes = bytes | memoryview
@@ -207,7 +205,6 @@ READERS = {
     "Harwell-Boeing": read_harwell_boeing,
     "Nastran's DMIG": read_dmig,
     "Nastran's OUTPUT4": read_op4,
-    "Nastran's binary OUTPUT4": read_binary_op4,
     "lines of entries": read_entries,
     "labels of rows": read_dofs,
 }

@@ -97,7 +97,7 @@ def read_entries(content):
 def fields(lines, count, n, width):
     spaced = [word for line in lines for word in line.split()]
     if len(spaced) == count:
-        return [number(word) for word in spaced]
+        return [number(word, bare=True) for word in spaced]
     if any(line[n * width :].strip() for line in lines):
         raise ValueError("longer")
     words = [line.ljust(n * width)[i * width : (i + 1) * width] for line in lines for i in range(n)]

@@ -167,36 +167,56 @@ def test_binary_files_of_programs_are_named(tmp_path, content, program):
     assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED)  # beside texts, they are ignored
 
 
-def binary_op4(folder, job, K, M, order="<", kind=2):
-    """OUTPUT4 with dense columns; those of zeros are left out."""
+def binary_op4(folder, job, K, M, order="<", kind=2, layout="dense", word=4):
+    """OUTPUT4 in binary form, its integers of four or eight bytes; columns of zeros are left out."""
+    number, size = f"{order}f{max(word, 4 * kind)}", max(word, 4 * kind) // word
 
-    def record(integers, rest=b""):
-        content = np.array(integers, dtype=order + "i4").tobytes() + rest
+    def integers(*values):
+        return np.array(values, dtype=f"{order}i{word}").tobytes()
+
+    def record(*contents):
+        content = b"".join(contents)
         length = np.array([len(content)], dtype=order + "i4").tobytes()
         return length + content + length
 
+    def string(first, values):
+        words = size * len(values) + 1
+        return integers(words, first) if layout == "big" else integers(65536 * words + first)
+
     parts = []
     for name, matrix in {"KLL": K, "MLL": M}.items():
-        parts.append(record([*matrix.shape, 6, kind], name.ljust(8).encode()))
+        n_rows = -len(matrix) if layout == "big" else len(matrix)
+        parts.append(record(integers(len(matrix), n_rows, 6, kind), name.ljust(2 * word).encode()))
         for j, column in enumerate(matrix.T, start=1):
             (used,) = np.nonzero(column)
-            if len(used):
-                values = column[used[0] : used[-1] + 1].astype(f"{order}f{4 * kind}")
-                parts.append(record([j, used[0] + 1, len(values) * kind], values.tobytes()))
-        parts.append(record([len(matrix) + 1, 1, kind], np.ones(1, dtype=f"{order}f{4 * kind}").tobytes()))
+            if not len(used):
+                continue
+            if layout == "dense":
+                values = column[used[0] : used[-1] + 1].astype(number)
+                parts.append(record(integers(j, used[0] + 1, len(values) * size), values.tobytes()))
+                continue
+            rows = np.split(used, np.flatnonzero(np.diff(used) > 1) + 1)
+            strings = b"".join(string(some[0] + 1, some) + column[some].astype(number).tobytes() for some in rows)
+            parts.append(record(integers(j, 0, len(strings) // word), strings))
+        parts.append(record(integers(len(matrix) + 1, 1, size), np.ones(1, dtype=number).tobytes()))
     (folder / f"{job}.op4").write_bytes(b"".join(parts))
 
 
+LAYOUTS = ["dense", "strings", "big"]
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize(("kind", "tolerance"), [(1, 1e-6), (2, 1e-12)])
-def test_binary_output4(tmp_path, order, kind, tolerance):
-    write(lambda *job: binary_op4(*job, order=order, kind=kind), tmp_path)
+@pytest.mark.parametrize(("kind", "word", "tolerance"), [(1, 4, 1e-6), (2, 4, 1e-12), (1, 8, 1e-12), (2, 8, 1e-12)])
+def test_binary_output4(tmp_path, layout, order, kind, word, tolerance):
+    write(lambda *job: binary_op4(*job, order=order, kind=kind, layout=layout, word=word), tmp_path)
     assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, tolerance)
 
 
-def test_damaged_binary_output4_is_read_or_refused(tmp_path):
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_damaged_binary_output4_is_read_or_refused(tmp_path, layout):
     """What is cut off gives an error that names the file, and no change of a byte anything but an error."""
-    binary_op4(tmp_path, "nominal", whole(), M)
+    binary_op4(tmp_path, "nominal", whole(), M, layout=layout)
     file, random = tmp_path / "nominal.op4", np.random.default_rng(0)
     sound = file.read_bytes()
     for length in random.integers(1, len(sound), 40):
@@ -207,6 +227,7 @@ def test_damaged_binary_output4_is_read_or_refused(tmp_path):
         file.write_bytes(sound[:place] + bytes([random.integers(256)]) + sound[place + 1 :])
         with contextlib.suppress(ValueError):
             read_named_matrices(file, lambda name: True)
-    file.write_bytes(sound[:40] + bytes(4) + sound[44:])  # row 0
-    with pytest.raises(ValueError, match="sparse"):
+    other_row = 0 if layout == "dense" else 1
+    file.write_bytes(sound[:40] + np.array([other_row], "<i4").tobytes() + sound[44:])
+    with pytest.raises(ValueError, match=r"nominal\.op4"):
         read_named_matrices(file, lambda name: True)
