@@ -277,9 +277,9 @@ def estimate_false_alarms(
 
     An excursion lasts from the first level above the usual one until all levels of ``hold`` have stayed within it. As
     that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds it, and
-    the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. An excursion may be several
-    events, as these end at a higher level: in the mean, as many as the highest excursions are. ``smallest_at`` gives
-    the smallest changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
+    the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. An excursion may be
+    several events, as these end at a higher level: in the mean, as many as the highest excursions are. ``smallest_at``
+    gives the smallest changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
     infinite = known.index[np.isinf(known)]
