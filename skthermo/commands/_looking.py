@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress, product
 from pathlib import Path
@@ -67,8 +67,9 @@ class Look:
     notes: tuple[str, ...]
 
 
-def look_at(file: Path, zone: str | None = None, stamps: str | None = None) -> Look:
-    """Find the form of a file and read it, in a time zone and with a format of its stamps if these are known."""
+def look_at(file: Path, zone: str | None = None, stamps: str | None = None, wanted: Collection[str] = ()) -> Look:
+    """Find the form of a file and read it, in a time zone and with a format of its stamps if these are known. Columns
+    that are wanted are used, whatever they hold."""
     if not file.is_file():
         raise FileNotFoundError(f"there is no file {str(file)!r}; expected records as CSV, .xlsx or parquet")
     if file.suffix.lower() in PARQUET:
@@ -76,7 +77,7 @@ def look_at(file: Path, zone: str | None = None, stamps: str | None = None) -> L
     else:
         form, units, ignored, notes = _look_at_table(file, zone, stamps)
     records = read_file(file, form, ignore=ignored)
-    ignored |= dict(_no_measurements(records))
+    ignored |= {name: why for name, why in _no_measurements(records) if name not in wanted}
     records = records.drop(columns=[name for name in records if name in ignored])
     marked = [marker for marker in MARKERS if records.isin([marker]).to_numpy().any()]
     if marked:

@@ -130,7 +130,8 @@ class Proposal:
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
-        looks = [look_at(file, options.zone, options.stamps) for file in options.files]
+        wanted = [*(options.temperatures or ()), *(options.responses or ()), *options.reference]
+        looks = [look_at(file, options.zone, options.stamps, wanted) for file in options.files]
         form = _form_of_all(looks)
         again = [
             name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])

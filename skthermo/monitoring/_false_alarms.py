@@ -26,7 +26,7 @@ N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
 NEAR = 15  # days of the year, up to which a record stands for the season around it
 SEASON = 30  # days of the year, before and after each, whose records give its scale
-LEAST_INDEX = 0.1  # share of the median index, as which smaller ones count for the scale of a season
+LEAST_INDEX = 0.1  # share of the median index above 0, as which smaller ones count for the scale of a season
 FEWEST_PEAKS = 3
 QUIET, CLOSES = 0.5, 0.98  # shares of the days of a baseline that stay within a level: what lies above is an excursion,
 # and an event that is open ends
@@ -252,7 +252,10 @@ def seasonal_scale(index: pd.Series) -> pd.Series:
     It is drawn to 1, the scale of the whole baseline, by as much of its variance as independent seasons would have by
     chance, which the correlation time of what it leaves tells.
     """
-    logs = 2 * np.log(index.clip(lower=LEAST_INDEX * index.median()))
+    positive = index[index > 0]
+    if positive.empty:
+        return pd.Series(1.0, index.index)
+    logs = 2 * np.log(index.clip(lower=LEAST_INDEX * positive.median()))
     logs -= logs.mean()
     day = np.minimum(index.index.day_of_year, 365) - 1
     around = (np.arange(365)[:, np.newaxis] + np.arange(-SEASON, SEASON + 1)) % 365

@@ -337,7 +337,8 @@ class Monitor(SavesFrames, Estimator):
         seed_parts(detector, seeded(self.random_state))
         self.targets_, self.units_ = columns.targets, columns.units
         self.columns_, self.left_out_ = usable.given, usable.found.left_out
-        self.set_aside_ = usable.found.table
+        found = usable.found.table
+        self.set_aside_ = found[~found["column"].isin(list(self.left_out_))].reset_index(drop=True)
         corrections = self._corrections(baseline, columns.reference, self.fem)
         trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
         active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)

@@ -67,6 +67,16 @@ def test_columns_that_measure_nothing_are_left_out_with_a_reason(tmp_path):
     assert list(found.records) == list(RECORDS)
 
 
+def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
+    stuck, file, settings = RECORDS.assign(f2=5.0), tmp_path / "records.csv", tmp_path / "bridge"
+    stuck.to_csv(file, index_label="time")
+    done = run("init", file, "--into", settings, "--temperatures", "T air [°C]", "--responses", "f1 (Hz)", "f2")
+    assert done.code == 0, done.err
+    assert run("fit", settings).code == 0
+    said = run("status", settings, "--json").json["bridges"][0]["status"]["faults"]
+    assert [(fault["column"], fault["kind"]) for fault in said] == [("f2", "left out")]
+
+
 def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):
     table = RECORDS.set_axis(pd.date_range("2026-01-01", periods=80, freq="3h"))  # no day after the twelfth
     table.to_csv(tmp_path / "a.csv", date_format="%d/%m/%Y %H:%M")

@@ -12,7 +12,7 @@ from skthermo._io import read_named_matrices
 from tests.fem.exported_files import DOFS, TOTAL, M
 
 with np.printoptions():  # which pyyeti changes
-    nastran = pytest.importorskip("pyyeti.nastran", reason="pyyeti is not installed: the extra 'oracle' brings it")
+    nastran = pytest.importorskip("pyyeti.nastran", reason="pyyeti is not installed: the extra 'drop-ins' brings it")
 pytestmark = [pytest.mark.usefixtures("in_process"), pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
 SHIPPED = Path(nastran.__file__).parents[1] / "tests"

@@ -157,6 +157,14 @@ def test_fewer_alarms_need_a_higher_threshold():
     assert thresholds[0] > release_level(index, share=QUIET)
 
 
+def test_an_index_that_is_mostly_zero_has_a_threshold():
+    random = np.random.default_rng(5)
+    index = pd.Series(np.maximum(random.normal(-1, 1, 365), 0.0), stamps(365))  # of one mode that can only fall
+    assert index.max() / 2 < estimate_false_alarms(index, persistence=1).rule.threshold < 2 * index.max()
+    with pytest.raises(ValueError, match="excursion"):
+        estimate_false_alarms(0 * index)
+
+
 def test_as_many_alarms_as_excursions_come_from_their_order_alone():
     index = pd.Series(chi(np.random.default_rng(3), 365), stamps(365))
     estimate = estimate_false_alarms(index, 30.0)
