@@ -1,1 +1,4 @@
-"""Warnings that point to the user's line, and threads of BLAS."""
+"""What all estimators share: warnings that point to the user's line, answers kept for equal questions, threads of BLAS.
+
+It stands on scikit-learn and joblib alone. Start with ``warnings.py``.
+"""

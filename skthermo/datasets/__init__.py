@@ -1,4 +1,7 @@
-"""Structures and monitoring campaigns to learn and test with."""
+"""Structures and monitoring campaigns to learn and test with.
+
+It stands on ``fem``. Start with ``_truss.py``, the structure of most examples.
+"""
 
 from skthermo.datasets._fleet import BridgeFleet, FleetBridge, make_fleet
 from skthermo.datasets._kw51_campaign import make_kw51_campaign

@@ -1,4 +1,8 @@
-"""Damage detection from frequencies."""
+"""Damage detection from frequencies: temperature removed, a damage index, a threshold for stated false alarms.
+
+It stands on ``residuals`` and ``preprocessing``; detectors take an FE model or a chain, and need none. Start with
+``_base.py``, what all detectors share, then ``_directional.py``.
+"""
 
 from skthermo.detection._base import DamageDetector
 from skthermo.detection._compensator import TemperatureCompensator

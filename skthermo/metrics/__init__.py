@@ -1,4 +1,7 @@
-"""How well damage is detected, and how well frequencies are predicted."""
+"""How well damage is detected, and how well frequencies are predicted.
+
+It stands on NumPy and SciPy alone. Start with ``_detectability.py``.
+"""
 
 from skthermo.metrics._detectability import (
     minimum_detectable_damage,

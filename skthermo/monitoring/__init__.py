@@ -1,4 +1,8 @@
-"""Detectors in service: records that come in batches, sensors that fail, structures that age."""
+"""Detectors in service: records that come in batches, sensors that fail, structures that age.
+
+It stands on ``detection``, and takes a chain where there is an FE model. Start with ``_monitor.py``; ``_state.py`` is
+what happens to a batch.
+"""
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor

@@ -1,4 +1,7 @@
-"""Display objects, as scikit-learn has them; matplotlib is imported when something is drawn."""
+"""Display objects, as scikit-learn has them; matplotlib is imported when something is drawn.
+
+It stands on what it draws, and nothing but pages and commands on it. Start with ``_display.py``, what all share.
+"""
 
 from skthermo.plotting._damage_index import DamageIndexDisplay
 from skthermo.plotting._detectors import DetectorsDisplay

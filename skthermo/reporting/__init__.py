@@ -1,4 +1,7 @@
-"""Pages for the owners of structures."""
+"""Pages for the owners of structures.
+
+It stands on studies, monitors and fleets, whose facts it puts into words. Start with ``_owner_report.py``.
+"""
 
 from skthermo.reporting._owner_report import owner_report
 

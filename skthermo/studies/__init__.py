@@ -1,4 +1,8 @@
-"""Studies of what a monitoring system would detect."""
+"""Studies of what a monitoring system would detect, and which damage explains what it has detected.
+
+It stands on ``surrogate`` and ``detection``. Start with ``detectability/_study.py``, then
+``identification/_identify.py``.
+"""
 
 from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
 from skthermo.studies.extension import compare_extensions

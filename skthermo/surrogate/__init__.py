@@ -1,4 +1,8 @@
-"""From monitoring data to a thermal FE model: inverses, temperature mapper, the chain."""
+"""From monitoring data to a thermal FE model: inverses, temperature mapper, the chain.
+
+It stands on ``fem`` and ``preprocessing``. Start with ``chain/_data_informed.py``, whose ``fit`` is the method, step by
+step.
+"""
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain

@@ -1,4 +1,7 @@
-"""Calibration of FE models to measured modes: sensitivities, identifiability, model updating."""
+"""Calibration of FE models to measured modes: sensitivities, identifiability, model updating.
+
+It stands on ``fem``. Start with ``_updater.py``.
+"""
 
 from skthermo.updating._identifiability import cramer_rao, identifiability, select_parameters, sensitivity
 from skthermo.updating._updater import ModelUpdater
