@@ -1,4 +1,4 @@
 """What all estimators share: warnings that point to the user's line, answers kept for equal questions, threads of BLAS.
 
-It stands on scikit-learn and joblib alone. Start with ``warnings.py``.
+It uses scikit-learn and joblib alone. Start with ``warnings.py``.
 """

@@ -1,6 +1,6 @@
 """Files that may be damaged or shared: matrices of MATLAB, NumPy and FE programs; locks; a progress bar.
 
-It stands on NumPy and SciPy alone. Start with ``_matrix_files.py``, which recognises a file by its content.
+It uses NumPy and SciPy alone. Start with ``_matrix_files.py``, which recognises a file by its content.
 """
 
 from skthermo._io._matrix_files import MASS, read_half, read_matlab, read_named_matrices

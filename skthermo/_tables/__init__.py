@@ -1,4 +1,4 @@
 """Arguments and records as arrays and frames: read, matched by name, given back, saved and put into text.
 
-It stands on NumPy and pandas alone. Start with ``arrays.py`` for arguments, ``frames.py`` for records and their times.
+It uses NumPy and pandas alone. Start with ``arrays.py`` for arguments, ``frames.py`` for records and their times.
 """

@@ -1,6 +1,6 @@
 """Structures and monitoring campaigns to learn and test with.
 
-It stands on ``fem``. Start with ``_truss.py``, the structure of most examples.
+It uses ``fem``. Start with ``_truss.py``, the structure of most examples.
 """
 
 from skthermo.datasets._fleet import BridgeFleet, FleetBridge, make_fleet

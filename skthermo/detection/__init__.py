@@ -1,6 +1,6 @@
 """Damage detection from frequencies: temperature removed, a damage index, a threshold for stated false alarms.
 
-It stands on ``residuals`` and ``preprocessing``; detectors take an FE model or a chain, and need none. Start with
+It uses ``residuals`` and ``preprocessing``; detectors take an FE model or a chain, and need none. Start with
 ``_base.py``, what all detectors share, then ``_directional.py``.
 """
 

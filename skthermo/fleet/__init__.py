@@ -1,6 +1,6 @@
 """Many bridges: fitted side by side, learning together.
 
-It stands on ``surrogate`` and ``monitoring``. Start with ``prior/_prior.py``, what bridges teach each other, and
+It uses ``surrogate`` and ``monitoring``. Start with ``prior/_prior.py``, what bridges teach each other, and
 ``_fleet.py``, their monitors together.
 """
 

@@ -1,6 +1,6 @@
 """How well damage is detected, and how well frequencies are predicted.
 
-It stands on NumPy and SciPy alone. Start with ``_detectability.py``.
+It uses NumPy and SciPy alone. Start with ``_detectability.py``.
 """
 
 from skthermo.metrics._detectability import (

@@ -1,6 +1,6 @@
 """Detectors in service: records that come in batches, sensors that fail, structures that age.
 
-It stands on ``detection``, and takes a chain where there is an FE model. Start with ``_monitor.py``; ``_state.py`` is
+It uses ``detection``, and takes a chain where there is an FE model. Start with ``_monitor.py``; ``_state.py`` is
 what happens to a batch.
 """
 

@@ -1,6 +1,6 @@
 """Display objects, as scikit-learn has them; matplotlib is imported when something is drawn.
 
-It stands on what it draws, and nothing but pages and commands on it. Start with ``_display.py``, what all share.
+It uses what it draws; only pages and commands use it. Start with ``_display.py``, what all share.
 """
 
 from skthermo.plotting._damage_index import DamageIndexDisplay

@@ -1,6 +1,6 @@
 """Preparing temperatures and frequencies: faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds.
 
-It stands on ``_tables``. Start with ``checks/_set_aside.py``, through which all fits go.
+It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits go.
 """
 
 from skthermo.preprocessing._folds import BlockedKFold

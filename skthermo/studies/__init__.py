@@ -1,6 +1,6 @@
 """Studies of what a monitoring system would detect, and which damage explains what it has detected.
 
-It stands on ``surrogate`` and ``detection``. Start with ``detectability/_study.py``, then
+It uses ``surrogate`` and ``detection``. Start with ``detectability/_study.py``, then
 ``identification/_identify.py``.
 """
 

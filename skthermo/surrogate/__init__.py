@@ -1,6 +1,6 @@
 """From monitoring data to a thermal FE model: inverses, temperature mapper, the chain.
 
-It stands on ``fem`` and ``preprocessing``. Start with ``chain/_data_informed.py``, whose ``fit`` is the method, step by
+It uses ``fem`` and ``preprocessing``. Start with ``chain/_data_informed.py``, whose ``fit`` is the method, step by
 step.
 """
 

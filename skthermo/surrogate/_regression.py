@@ -50,6 +50,7 @@ NETWORKS: dict[str, dict[str, Any]] = {
     "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
 }
 PENALTIES = np.logspace(-3, 5, 33)
+ALLOWED = ("no-rows", "stuck-sensor", "implausible-values")  # findings in rows of any order, of any inputs
 TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 
 
@@ -367,7 +368,7 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        found = set_aside(frame_like(X, T), exclude={"no-rows", "stuck-sensor"}, needs_all=True)
+        found = set_aside(frame_like(X, T), exclude=ALLOWED, needs_all=True)
         T = np.asarray(found.temperatures)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:

@@ -1,6 +1,6 @@
 """Calibration of FE models to measured modes: sensitivities, identifiability, model updating.
 
-It stands on ``fem``. Start with ``_updater.py``.
+It uses ``fem``. Start with ``_updater.py``.
 """
 
 from skthermo.updating._identifiability import cramer_rao, identifiability, select_parameters, sensitivity

@@ -31,6 +31,7 @@ from skthermo.preprocessing import set_aside
 from skthermo.residuals.weather import TrainingRange, parts, warn_of_implausible
 
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
+ALLOWED = ("no-rows", "stuck-sensor", "implausible-values", "constant")  # findings in rows of any order, of any inputs
 
 
 @dataclass(frozen=True)
@@ -316,7 +317,7 @@ class FleetMapper(RegressorMixin, Estimator):
         values = check_array(y, dtype=np.float64, ensure_2d=False)
         plain_rows = isinstance(y, pd.DataFrame | pd.Series) and y.index.equals(pd.RangeIndex(len(y)))
         check_same_rows(X, values if plain_rows else y, ("inputs", "quantities"))
-        found = set_aside(frame_like(X, inputs), exclude={"no-rows", "constant", "stuck-sensor"}, needs_all=True)
+        found = set_aside(frame_like(X, inputs), exclude=ALLOWED, needs_all=True)
         inputs = np.asarray(found.temperatures)
         self._check_inputs(X)
         self.y_is_vector_ = values.ndim == 1

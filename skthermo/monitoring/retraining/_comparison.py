@@ -12,6 +12,7 @@ import pandas as pd
 from skthermo._estimators.answers import answers_kept
 from skthermo._tables.arrays import Array
 from skthermo.monitoring._active import ActiveDetector
+from skthermo.monitoring._false_alarms import levels
 from skthermo.monitoring._smallest import blocks_of, crossing, lowered, whole_weeks
 from skthermo.monitoring.retraining._shift import block_mean
 from skthermo.residuals.weather import BEYOND, TrainingRange
@@ -20,7 +21,7 @@ MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
 STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
 CLEAR = 3.0  # standard errors from which a difference is one
 WORSE = np.log(1.1)  # of the smallest detected change, from which it counts
-FALSE, SMALLEST = "records above the threshold", "smallest detected change"  # rows that decide
+FALSE, SMALLEST = "records in alarm", "smallest detected change"  # rows that decide
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,9 @@ class DetectorComparison:
         """
         blocks = blocks_of(overlap.index)
         rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
+        persistence = old.estimate.rule.persistence
         rows = {
-            FALSE: _compared(*(_above(one) for one in rates), blocks),
+            FALSE: _compared(*(_above(levels(one, persistence)[0]) for one in rates), blocks),
             "median index over threshold": _medians(*rates),
             **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
             "records in unknown weather": _unknown(old, new, overlap, targets),
@@ -61,7 +63,7 @@ class DetectorComparison:
 
     @property
     def fewer_false(self) -> bool:
-        """Whether the new detector has clearly fewer records above its threshold."""
+        """Whether the new detector has clearly fewer records in alarm."""
         row = self.table.loc[FALSE]
         return bool(row["difference"] < -CLEAR * row["standard_error"])
 

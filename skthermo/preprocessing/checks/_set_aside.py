@@ -114,7 +114,7 @@ def set_aside(
         To whose nominal frequencies those in Hz are compared.
     exclude : collection of str, default=()
         Kinds of findings that do no harm to what is done with the records, such as "stuck-sensor" where the rows need
-        not follow each other in time.
+        not follow each other in time. Their values are not set aside.
     needs_all : bool, default=False
         Whether columns that would be left out are an error.
     is_baseline : bool, default=True
@@ -157,7 +157,7 @@ def set_aside(
     given = {what: table for what, table in tables.items() if table is not None}
     records = CleanedRecords.of(given, unit=unit, model=model)
     findings = findings_table(records.findings)
-    kinds = SET_ASIDE if is_baseline else IMPOSSIBLE
+    kinds = (SET_ASIDE if is_baseline else IMPOSSIBLE).difference(exclude)
     harmless = SET_ASIDE | (set() if needs_all else LEFT_OUT) | set(exclude)
     others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
     others.refuse_meaningless()

@@ -245,7 +245,7 @@ def test_a_vector_with_a_name_belongs_to_its_family(prior):
             "has 2 inputs and bridge 'b' 1",
         ),
         ({"a": (np.arange(9.0), -np.ones(9))}, "bridge 'a': quantity 'f1' falls to -1"),
-        ({"a": (np.arange(9.0), np.full(9, np.nan))}, "bridge 'a': 'f1' is NaN in all 9 rows"),
+        ({"a": (np.arange(9.0), np.full(9, np.nan))}, "bridge 'a': a column has no value: 'f1' is NaN in all 9 rows"),
     ],
 )
 def test_what_is_no_fleet_is_refused(bridges, message):
