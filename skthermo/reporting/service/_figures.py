@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 
 from skthermo._tables.frames import midnight, midnights_between
@@ -19,8 +20,10 @@ from skthermo.reporting.service._standing import MONTH, YEAR, Standing
 LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
 
 
-def draw_month(standing: Standing) -> Html:
-    """Damage index of each record in the month before the newest one."""
+def draw_month(standing: Standing) -> list[Html]:
+    """Damage index of each record in the month before the newest one; nothing without any."""
+    if not len(standing.evaluations):
+        return []
     start = standing.last - MONTH
     evaluated = standing.evaluations[standing.evaluations.index >= start]
     alarms, unknown = ((evaluated["state"] == state).sum() for state in ("alarm", "not evaluated"))
@@ -29,7 +32,8 @@ def draw_month(standing: Standing) -> Html:
         f"evaluated. {_highest(evaluated['index'])}"
     )
     values = Values("damage index of the last month", evaluated[["index", "threshold"]].rename_axis("date"))
-    return _drawn(standing, alt, "The last month, by record", values=values, start=start, by="record", parts=["index"])
+    title = "The last month, by record"
+    return [_drawn(standing, alt, title, values=values, start=start, by="record", parts=["index"])]
 
 
 def draw_days(standing: Standing) -> list[Html]:
@@ -52,9 +56,12 @@ def draw_days(standing: Standing) -> list[Html]:
     return drawn
 
 
-def draw_detectable(structure: Structure, losses: Mapping[str, float]) -> Html:
-    """The smallest loss of stiffness of each member's group that raises an alarm."""
-    seen = {name: 100 * loss for name, loss in losses.items() if name in structure.groups}
+def draw_detectable(structure: Structure | None, losses: Mapping[str, float]) -> list[Html]:
+    """The smallest loss of stiffness of each member's group that raises an alarm; nothing where none does."""
+    groups = [] if structure is None else structure.groups
+    seen = {name: 100 * loss for name, loss in losses.items() if name in groups and np.isfinite(loss)}
+    if structure is None or not seen:
+        return []
     alt = "Drawing of the structure. Smallest losses that raise an alarm: " + "; ".join(
         f"{name} {percent(loss / 100, '.2g')}" for name, loss in seen.items()
     )
@@ -64,7 +71,7 @@ def draw_detectable(structure: Structure, losses: Mapping[str, float]) -> Html:
         fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
         return display
 
-    return draw(make, f"{alt}.", height=None, width=6.2)
+    return [draw(make, f"{alt}.", height=None, width=6.2)]
 
 
 def chart_year(standing: Standing) -> Html:
@@ -85,18 +92,18 @@ def chart_year(standing: Standing) -> Html:
     return chart(days["index_max"], days["n_alarms"] > 0, standing.monitor.threshold_, alt, spans)
 
 
-def draw_drift(standing: Standing) -> Html | None:
+def draw_drift(standing: Standing) -> list[Html]:
     """Change of each group's stiffness by day; nothing where none is known yet."""
     days = standing.monitor.days_
     columns = [name for name in days.columns if str(name).startswith("drift ")]
     if not columns or not days[columns].notna().any(axis=None):
-        return None
+        return []
     names = ", ".join(str(name).removeprefix("drift ") for name in columns)
     alt = f"Change of stiffness over time of the groups {names}."
     changes = 100 * days[columns].astype(float)
     changes = changes.set_axis([f"change of {str(name).removeprefix('drift ')} (%)" for name in columns], axis=1)
     values = Values("change of stiffness", changes.rename_axis("date"))
-    return _drawn(standing, alt, parts=["drift"], height=3.0, values=values)
+    return [_drawn(standing, alt, parts=["drift"], height=3.0, values=values)]
 
 
 def _daily(days: pd.DataFrame, threshold: float) -> pd.DataFrame:
