@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import traceback
 from base64 import b64encode
 from collections.abc import Mapping
@@ -102,6 +103,12 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
     ]
 
 
+def sections_of(page: str) -> list[tuple[str, Html]]:
+    """Anchors and headings of the sections of a page."""
+    found = re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
+    return [(anchor, Html(title)) for anchor, title in found]
+
+
 def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
     """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
     if pd.isna(time):
@@ -139,6 +146,7 @@ FILTERS = [
     day,
     grouped,
     rows_of,
+    sections_of,
 ]
 """What templates write numbers and times with."""
 
