@@ -130,23 +130,9 @@ def grouped(number: int) -> str:
 
 
 FILTERS = [
-    text.bounds_text,
-    text.capital,
-    text.chance_text,
-    text.counted,
-    text.counted_number,
-    text.duration_text,
-    text.listed,
-    text.percent,
-    text.period_text,
-    text.probability_text,
-    text.share_text,
-    text.significant,
-    moment,
-    day,
-    grouped,
-    rows_of,
-    sections_of,
+    *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
+    *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
+    *(moment, day, grouped, rows_of, sections_of),
 ]
 """What templates write numbers and times with."""
 

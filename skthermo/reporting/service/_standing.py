@@ -18,7 +18,6 @@ from skthermo.reporting._templates import Row, rows_of
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
 
-MOST_REASONS = 12  # largest number of reasons that are named
 N_ERRORS = 2  # standard errors on either side of an estimate
 FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
 
@@ -50,20 +49,6 @@ class Reached(NamedTuple):
     about: pd.Timestamp | None = None
     soonest: pd.Timestamp | None = None
     latest: pd.Timestamp | None = None
-
-
-class Counted(NamedTuple):
-    """The most frequent texts with their numbers, how many others there are, and their number."""
-
-    most: list[tuple[str, int]]
-    n_others: int
-    n_rest: int
-
-    @classmethod
-    def of(cls, texts: pd.Series) -> Counted:
-        found = texts.value_counts()
-        rest = found.iloc[MOST_REASONS:]
-        return cls(list(found.head(MOST_REASONS).items()), len(rest), int(rest.sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,10 +196,6 @@ class Standing:
         """Numbers of events by kind."""
         return {str(kind): int(number) for kind, number in self.events["kind"].value_counts().items()}
 
-    @property
-    def n_harmless(self) -> int:
-        return int(self.events.loc[self.events["kind"] == "damage", "harmless"].astype(bool).sum())
-
     def _failing(self, event: Row) -> list[str]:
         """Sensors that failed in the time of an event, before the monitor had noticed."""
         faults, end = self.monitor.faults_, event["end"] or self.last
@@ -266,6 +247,6 @@ class Standing:
                 name for name, number in counts.items() if number and name not in ("n_records", "n_not_evaluated")
             ],
             "since": self.evaluations.index[0] if len(self.evaluations) else None,
-            "reasons": Counted.of(self.evaluations.loc[is_unknown, "reason"]),
-            "remarks": Counted.of(remarks[remarks != ""]),
+            "reasons": list(self.evaluations.loc[is_unknown, "reason"].value_counts().items()),
+            "remarks": list(remarks[remarks != ""].value_counts().items()),
         }
