@@ -24,11 +24,13 @@ VOID = {"img", "input", "meta"}  # elements without content
 
 def element(tag: str, *content: object, **attributes: object) -> Html:
     """An element with its content; an underscore at the end of an attribute's name is left out, others are hyphens."""
-    named = "".join(
-        f' {name.rstrip("_").replace("_", "-")}="{escape(printable(value))}"' for name, value in attributes.items()
-    )
-    inner = "".join(part if isinstance(part, Html) else escape(printable(part)) for part in content)
+    named = "".join(f' {name.rstrip("_").replace("_", "-")}="{_escaped(one)}"' for name, one in attributes.items())
+    inner = "".join(_escaped(part) for part in content)
     return Html(f"<{tag}{named}>" if tag in VOID else f"<{tag}{named}>{inner}</{tag}>")
+
+
+def _escaped(value: object) -> str:
+    return str(value) if hasattr(value, "__html__") else escape(printable(value))
 
 
 def joined(parts: Iterable[Html]) -> Html:

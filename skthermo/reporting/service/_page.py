@@ -7,11 +7,11 @@ from typing import Any
 from skthermo.fem import Structure
 from skthermo.monitoring import Monitor
 from skthermo.reporting._settings import settings_of, versions
-from skthermo.reporting.service._figures import chart_year, draw_days, draw_detectable, draw_drift, draw_month
+from skthermo.reporting.service._figures import chart_year, draw_detectable, draw_drift, draw_span, losses_on, spans_of
 from skthermo.reporting.service._standing import Standing
 
-DRAWINGS = (chart_year, draw_days, draw_detectable, draw_drift, draw_month)
-"""Drawings, made where a template calls them."""
+DRAWINGS = (chart_year, draw_detectable, draw_drift, draw_span, losses_on, spans_of)
+"""What templates draw with, and what they say of drawings."""
 
 
 def monitor_facts(standing: Standing, structure: Structure | None = None) -> dict[str, Any]:
