@@ -16,6 +16,6 @@ def identified_facts(identified: IdentifiedDamage) -> dict[str, Any]:
     groups = Values("identified damage", identified.table.rename_axis("group"))
     return {
         "found": identified,
-        "drawing": draw_identified_damage(identified),
+        "draw": draw_identified_damage,
         "saved": csv_link(groups, "Table of all groups (CSV)"),
     }

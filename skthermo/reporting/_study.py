@@ -12,9 +12,8 @@ from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import Structure
 from skthermo.reporting._choice import Choice
-from skthermo.reporting._figures import draw_curve, draw_damage_indices, draw_groups, draw_modes
+from skthermo.reporting._figures import draw_curve, draw_damage_indices, draw_groups, draw_mode
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding, findings_of, with_severities
-from skthermo.reporting._html import Html
 from skthermo.reporting._identified import identified_facts
 from skthermo.reporting._model import over_temperature, records_of, training_tables
 from skthermo.reporting._settings import settings_of, versions
@@ -62,15 +61,13 @@ def study_facts(
         "is_distance": isinstance(last_step(system), MahalanobisDetector),
         "records": records_of(T, F),
         "weather": study.indices_[next(key for key in study.indices_ if key[2] == SIMULATED)].index,
-        "sensor": temperature.name,
         "agreement": agreement(results),
-        "drawings": {
-            "over_time": draw_modes(F),
-            "structure": [] if structure is None else [draw_groups(structure, list(families))],
-            "over_temperature": draw_modes(measured, predicted, temperature),
-            "curves": [draw_curve(found, found.curve) for found in findings if found.curve is not None],
-            "indices": _damage_indices(study, findings),
-        },
+        "draw": {one.__name__: one for one in (draw_curve, draw_damage_indices, draw_groups, draw_mode)},
+        "structure": structure,
+        "groups": [] if structure is None else [name for name in families if name in structure.groups],
+        "measured": F,
+        "over_temperature": {"measured": measured, "predicted": predicted, "temperature": temperature},
+        "indices": indices_of(study, findings),
         "settings": settings_of(parts, but=("study: fem", "study: detectors", "study: scenarios")),
         "versions": versions(),
         "warned": warned,
@@ -158,10 +155,11 @@ def agreement(results: pd.DataFrame) -> Row | None:
     }
 
 
-def _damage_indices(study: DetectabilityStudy, findings: Sequence[Finding]) -> list[Html]:
-    """One drawing for each family, and for each scenario that belongs to none."""
+def indices_of(study: DetectabilityStudy, findings: Sequence[Finding]) -> list[Row]:
+    """Damage indices to draw, with those of the healthy structure: for each family, and each scenario without one."""
     detector = study.detector_name()
-    if study.thresholds_[detector] is None:
+    threshold = study.thresholds_[detector]
+    if threshold is None:
         return []
     onsets = {scenario.name: scenario.onset for scenario in study.scenarios_}
     rows = study.results_[study.results_["source"] == SIMULATED]
@@ -174,5 +172,8 @@ def _damage_indices(study: DetectabilityStudy, findings: Sequence[Finding]) -> l
     drawn = []
     for name in shown[:MOST_DRAWN]:
         indices = {scenario: study.indices_[detector, scenario, SIMULATED] for scenario in (*healthy, name)}
-        drawn.append(draw_damage_indices(study, indices, onsets.get(name)))
+        above = {scenario: float((index.dropna() > threshold).mean()) for scenario, index in indices.items()}
+        unknown = {scenario: int(index.isna().sum()) for scenario, index in indices.items()}
+        one = {"indices": indices, "threshold": threshold, "onset": onsets.get(name)}
+        drawn.append({**one, "above": above, "unknown": unknown})
     return drawn
