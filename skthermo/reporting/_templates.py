@@ -62,7 +62,8 @@ def rendered(name: str, facts: Mapping[str, Any], folder: str = "") -> str:
 
 
 def check_templates(folder: str | os.PathLike[str] | None) -> str:
-    """The folder as text, "" for none; an error for one that holds no template of a page."""
+    """The folder as text, "" for none; an error for one that holds no template of a page, or without jinja2."""
+    import_optional("jinja2", extra="pages")
     if folder is None:
         return ""
     path = check_path(folder, "templates")

@@ -142,6 +142,7 @@ def test_folders_without_a_template_are_refused(tmp_path):
 
 def test_without_jinja_the_error_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    with pytest.raises(ImportError, match=r"'jinja2' is not installed; .*\[pages\]"):
-        owner_report(FakeMonitor(), tmp_path / "a.html")
+    for subject in (FakeMonitor(), FakeFleet({"one": FakeMonitor()})):
+        with pytest.raises(ImportError, match=r"'jinja2' is not installed; .*\[pages\]"):
+            owner_report(subject, tmp_path / "a.html")
     assert not list(tmp_path.iterdir())
