@@ -200,7 +200,7 @@ def test_private_scikit_learn_is_imported_in_one_place():
 
 
 def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit_learn():
-    unwanted = ("matplotlib", "dask", "distributed", "hypothesis", "scipy.signal", "sklearn.ensemble")
+    unwanted = ("matplotlib", "jinja2", "dask", "distributed", "hypothesis", "scipy.signal", "sklearn.ensemble")
     code = "import sys, skthermo.fem; print([m for m in ('pandas', 'sklearn') if m in sys.modules])\n"
     code += f"import {', '.join(f'skthermo.{room}' for room in ROOMS)}; "
     code += f"print([m for m in {unwanted} if m in sys.modules])"

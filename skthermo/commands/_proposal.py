@@ -70,6 +70,7 @@ OTHERS = """
 # [page]
 # title = "Bridge over the river"
 # structure = "model.py:make_structure"
+# templates = "templates"
 # drift_limit = 0.1"""
 
 

@@ -217,6 +217,8 @@ class Settings:
     def page(self) -> dict[str, Any]:
         """Arguments of the owner's page."""
         options = {"title": self.name} | self.options["page"]
+        if "templates" in options:
+            options["templates"] = self.path(options["templates"])
         if "structure" in options:
             setting = f"{self.file}: [page] structure"
             options["structure"] = _made_by(self.path(options["structure"]), setting, "a Structure")

@@ -14,7 +14,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.text import chance_text, counted, percent, printable, share_text, significant
+from skthermo._tables.text import printable
 from skthermo._validation import import_optional
 from skthermo.fem import Structure
 from skthermo.plotting import (
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from skthermo.reporting._findings import Finding
-    from skthermo.studies import DetectabilityStudy, IdentifiedDamage, PODCurve
+    from skthermo.studies import IdentifiedDamage
 
 
 class HasFigure(Protocol):
@@ -119,43 +119,25 @@ def _places(ax: Axes, values: Values) -> tuple[Array, Array | None]:
     return x, np.clip(1 - y, 0, 1) if values.is_scatter else None
 
 
-def draw_modes(
-    measured: pd.DataFrame, predicted: pd.DataFrame | None = None, temperature: pd.Series | None = None
-) -> list[Html]:
-    """Frequencies over time, or measured and predicted ones over a temperature, one drawing for each mode."""
-    drawn = []
-    for number, name in enumerate(measured):
-        table = measured.iloc[:, [number]]
-        low, high = (significant(value, 4) for value in (table.iloc[:, 0].min(), table.iloc[:, 0].max()))
-        over = "time" if temperature is None else f"the temperature {temperature.name}, beside the model's prediction"
-        alt = f"Measured frequency {name} over {over}: between {low} and {high} Hz."
-        other = None if predicted is None else predicted.iloc[:, [number]]
-        make = partial(PredictionDisplay.from_predictions, table, other, temperature=temperature)
-        if other is None or temperature is None:
-            values = Values(
-                f"frequency {name} over time",
-                table.set_axis([f"{name} (Hz)"], axis=1).rename_axis(table.index.name or "date"),
-            )
-        else:
-            both = pd.DataFrame({f"{name} measured (Hz)": table.iloc[:, 0], f"{name} predicted (Hz)": other.iloc[:, 0]})
-            both = both.set_axis(pd.Index(temperature, name=f"{temperature.name} (°C)"))
-            values = Values(f"frequency {name} over temperature", both, is_scatter=True)
-        drawn.append(draw(make, alt, height=2.2 if temperature is None else HEIGHT, values=values))
-    return drawn
+def draw_mode(
+    measured: pd.Series, alt: str, predicted: pd.Series | None = None, temperature: pd.Series | None = None
+) -> Html:
+    """A measured frequency over time, or a measured and a predicted one over a temperature."""
+    name, tables = str(measured.name), [None if one is None else one.to_frame() for one in (measured, predicted)]
+    make = partial(PredictionDisplay.from_predictions, *tables, temperature=temperature)
+    if predicted is None or temperature is None:
+        table = measured.to_frame(f"{name} (Hz)").rename_axis(measured.index.name or "date")
+        return draw(make, alt, height=2.2, values=Values(f"frequency {name} over time", table))
+    both = pd.DataFrame({f"{name} measured (Hz)": measured, f"{name} predicted (Hz)": predicted})
+    both = both.set_axis(pd.Index(temperature, name=f"{temperature.name} (°C)"))
+    return draw(make, alt, values=Values(f"frequency {name} over temperature", both, is_scatter=True))
 
 
-def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
+def draw_curve(finding: Finding, title: str, alt: str) -> Html:
     """Probability of detection of one family of scenarios."""
+    fitted = finding.curve
     is_curve = bool(np.isfinite(fitted.slope))
-    rates = ", ".join(
-        f"{share_text(rate)} at {percent(abs(severity))}"
-        for severity, rate in zip(finding.severities, finding.rates, strict=True)
-    )
-    alt = f"Share of records in alarm over the severity of {finding.family}: {rates}."
-    title = finding.family if is_curve else f"{finding.family}: no curve can be fitted"
-
-    largest = np.abs(finding.severities).max()
-    marks = is_curve and max(abs(fitted.a90), abs(fitted.a90_95)) <= largest  # no extrapolation
+    marks = is_curve and max(abs(fitted.a90), abs(fitted.a90_95)) <= finding.largest  # no extrapolation
 
     def make() -> PODCurveDisplay:
         display = PODCurveDisplay.from_predictions(fitted, label="fitted curve", marks=marks)
@@ -171,14 +153,8 @@ def draw_curve(finding: Finding, fitted: PODCurve) -> Html:
     return draw(make, alt, title, height=3.2, values=Values(f"detection of {finding.family}", table))
 
 
-def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series], onset: object = None) -> Html:
+def draw_damage_indices(shown: Mapping[str, pd.Series], threshold: float, onset: object, alt: str) -> Html:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
-    threshold = study.thresholds_[study.detector_name()]
-    above = "; ".join(
-        f"{name}: {share_text(float((index.dropna() > threshold).mean()))} of the records above the threshold"
-        + (f", {counted(int(index.isna().sum()), 'record')} not evaluated" if index.isna().any() else "")
-        for name, index in shown.items()
-    )
 
     def make() -> DamageIndexDisplay:
         display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
@@ -187,23 +163,21 @@ def draw_damage_indices(study: DetectabilityStudy, shown: Mapping[str, pd.Series
 
     table = pd.DataFrame(dict(shown)).assign(threshold=threshold)
     values = Values(f"damage index {list(shown)[-1]}", table.rename_axis("date"))
-    return draw(make, f"Damage index over time. {above}.", height=3.2, values=values)
+    return draw(make, alt, height=3.2, values=values)
 
 
-def draw_groups(structure: Structure, families: Sequence[str]) -> Html:
+def draw_groups(structure: Structure, groups: Sequence[str], alt: str) -> Html:
     """Where the damage groups are."""
-    known = [family for family in families if family in structure.groups]
-    alt = f"Drawing of the structure with {', '.join(known) or 'its members'} in colour."
 
     def make() -> StructureDisplay:
-        display = StructureDisplay.from_structure(structure, groups=known)
+        display = StructureDisplay.from_structure(structure, groups=groups)
         fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
         return display
 
     return draw(make, alt, height=None, width=5.2)
 
 
-def draw_identified_damage(identified: IdentifiedDamage) -> Html:
+def draw_identified_damage(identified: IdentifiedDamage, alt: str) -> Html:
     """Explanations, severities and shifts, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
     heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
@@ -212,10 +186,6 @@ def draw_identified_damage(identified: IdentifiedDamage) -> Html:
         axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
         return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
 
-    explanations = ", ".join(
-        f"{label}: {chance_text(row['probability'])}" for label, row in identified.summary_table.head(3).iterrows()
-    )
-    alt = f"Explanations with their probabilities ({explanations}), severities, and measured and explained shifts."
     return draw(make, alt, height=sum(heights))
 
 

@@ -12,8 +12,8 @@ from sklearn.exceptions import NotFittedError
 from skthermo._io import write_when_complete
 from skthermo._tables.arrays import check_path, check_size
 from skthermo.fem import Structure
-from skthermo.reporting._html import page, paragraphs
-from skthermo.reporting.service import Standing, monitor_page
+from skthermo.reporting._templates import check_templates, rendered
+from skthermo.reporting.service import Standing, monitor_facts
 
 if TYPE_CHECKING:  # jobs write the page on a monitor every night: studies and fleets are imported for their own pages
     from skthermo.fleet import Fleet
@@ -27,11 +27,6 @@ KINDS = {
 }
 """Attributes by which a subject is recognised."""
 
-HEADINGS = {
-    "Fleet": "The bridges today",
-    "Monitor": "The structure today",
-    "DetectabilityStudy": "Which damage the monitoring would detect",
-}
 ONLY_FOR = {
     "identified": ("DetectabilityStudy", "Monitor"),
     "structure": ("DetectabilityStudy", "Monitor"),
@@ -53,6 +48,7 @@ def owner_report(
     drift_limit: float = 0.1,
     fdr: float = 0.1,
     now: str | pd.Timestamp | None = None,
+    templates: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
@@ -85,6 +81,9 @@ def owner_report(
         False discovery rate: share of healthy ones among the significant bridges of the page on a fleet, on average.
     now : time, optional
         When the page on a monitor or a fleet is written, in the time zone of the records; by default the clock's time.
+    templates : str or path, optional
+        Folder of templates in Jinja that go before the package's, such as ``monitor.html.j2`` in another language.
+        They are programs: take them from those you trust only.
 
     Returns
     -------
@@ -97,9 +96,10 @@ def owner_report(
         If the study has no results, or the monitor is not fitted.
     ValueError
         If the folder does not exist, the path is a folder, an argument is something else or does not belong to this
-        subject, the detector has no results, or several cannot be ranked, as no scenario is healthy or none is damaged.
+        subject, the detector has no results, several cannot be ranked, as no scenario is healthy or none is damaged, or
+        a template is wrong: the error names its file and line.
     ImportError
-        If matplotlib is not installed; the pages on a fleet do without.
+        If jinja2 or matplotlib is not installed; the pages on a fleet do without matplotlib.
 
     Notes
     -----
@@ -130,25 +130,24 @@ def owner_report(
     file = _checked_file(path)
     if kind != "DetectabilityStudy":
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
-    heading = HEADINGS[kind] if title is None else title
+    folder = check_templates(templates)
     if kind == "Fleet":
-        from skthermo.reporting.fleet import fleet_page
+        from skthermo.reporting.fleet import write_fleet
 
         check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
-        introduction, sections = fleet_page(subject, file, heading, now, limit, fdr)
+        write_fleet(subject, file, title, now, limit, fdr, folder)
     elif kind == "Monitor":
-        introduction, sections = monitor_page(Standing.of(subject, now, limit), structure)
+        facts = monitor_facts(Standing.of(subject, now, limit), structure)
         if identified is not None:
-            from skthermo.reporting._identified import identified_damage
+            from skthermo.reporting._identified import identified_facts
 
-            sections.insert(-1, identified_damage(identified))
+            facts["identified"] = identified_facts(identified)
+        write_when_complete(file, rendered("monitor", facts | {"title": title}, folder))
     else:
-        from skthermo.reporting._study import study_page
+        from skthermo.reporting._study import study_facts
 
-        introduction, sections = study_page(subject, identified, structure, detector, max_false_alarms)
-    written = pd.Timestamp.now() if now is None else pd.Timestamp(now)
-    ending = paragraphs(f"Written by skthermo on {written:%Y-%m-%d}.")
-    write_when_complete(file, page(heading, introduction, sections, ending))
+        facts = study_facts(subject, identified, structure, detector, max_false_alarms)
+        write_when_complete(file, rendered("study", facts | {"title": title}, folder))
     return file
 
 

@@ -352,6 +352,22 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
     assert (failed.code, "make_modl" in failed.err) == (FAILED, True)
 
 
+def test_the_page_is_written_from_the_templates_that_the_settings_name(bridge, monkeypatch):
+    pytest.importorskip("jinja2")
+    monkeypatch.undo()  # of the short page
+    monkeypatch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
+    text = settings(bridge).read_text().replace("# [page]", "[page]").replace("# templates = ", "templates = ")
+    settings(bridge).write_text(text)
+    failed = run("report", settings(bridge))
+    assert (failed.code, "status.html was not written" in failed.err) == (FAILED, True)
+    assert str(bridge / "templates") in failed.err
+    (bridge / "templates").mkdir()
+    template = bridge / "templates" / "monitor.html.j2"
+    template.write_text('{% extends "skthermo/monitor.html.j2" %}{% block today %}<p>Ask Anna.</p>{% endblock %}')
+    assert run("report", settings(bridge)).code != FAILED
+    assert "<p>Ask Anna.</p>" in (bridge / "status.html").read_text()
+
+
 def test_a_reader_that_has_gone_changes_neither_output_nor_exit_code(fitted):
     reads, writes = os.pipe()
     os.close(reads)

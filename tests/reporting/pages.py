@@ -1,6 +1,7 @@
 """A small structure whose names try to break a page, and a reader that checks pages."""
 
 import base64
+import re
 from html.parser import HTMLParser
 from io import StringIO
 from urllib.parse import unquote
@@ -8,10 +9,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import AffineModel
-from skthermo.reporting._html import POLICY, SCRIPT
+from skthermo.reporting._templates import POLICY, SCRIPT, rendered
 from skthermo.studies import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
@@ -49,14 +51,30 @@ def run_study(fem, T, scenarios, **options):
     return study
 
 
+def written(name, facts, **options):
+    """A page as text, for laws of the text around its drawings, which are blank."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
+        return rendered(name, {"title": None} | facts(), **options)
+
+
+def section_text(text, anchor):
+    """One section of a page."""
+    return re.search(rf'<section id="{anchor}".*?</section>', text, re.DOTALL)[0]
+
+
+def section_of(text, anchor):
+    return Page(section_text(text, anchor))
+
+
 class Page(HTMLParser):
-    """A page or a section that was read: an error if tags are not balanced."""
+    """A page or a section that was read, white space as one space: an error if tags are not balanced."""
 
     def __init__(self, text):
         super().__init__()
         self.open, self.tags, self.text, self.cells, self.heads, self.paragraphs = [], [], "", [], [], []
         self.link_texts = []
-        self.feed(getattr(text, "html", text))
+        self.feed(text)
         self.close()
         assert self.open == []
 
@@ -73,10 +91,11 @@ class Page(HTMLParser):
         if self.open and self.open[-1] == "script":
             assert data == SCRIPT, "a script that is not the page's own"
         elif self.open and self.open[-1] not in ("style", "title"):
+            data = re.sub("[ \n]+", " ", data)
             self.text += data
             texts = {"td": self.cells, "th": self.heads, "p": self.paragraphs, "a": self.link_texts}.get(self.open[-1])
-            if texts is not None:
-                texts.append(data)
+            if texts is not None and data.strip(" "):
+                texts.append(data.strip(" "))
 
     def all(self, tag):
         return [attributes for name, attributes in self.tags if name == tag]

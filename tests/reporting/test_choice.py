@@ -7,8 +7,9 @@ from skthermo._tables.text import share_text
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.reporting import owner_report
 from skthermo.reporting._choice import Choice
+from skthermo.reporting._study import study_facts
 from skthermo.studies import DetectabilityStudy, sweep
-from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
+from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain, section_of, written
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
@@ -33,13 +34,13 @@ def study():
     return study
 
 
-def written(study, path, **options):
+def page_of(study, path, **options):
     return Page(owner_report(study, path / "bridge.html", **options).read_text(encoding="utf-8"))
 
 
 @pytest.mark.nightly
 def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
-    page = written(study, tmp_path, max_false_alarms=0.1)
+    page = page_of(study, tmp_path, max_false_alarms=0.1)
     ranking = study.ranking(0.1)
     best = ranking.index[0]
     assert best in (HOSTILE, QUOTED)
@@ -49,7 +50,7 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
     assert "4\N{NO-BREAK SPACE}alarm systems were tested" in page.text
     assert [tag["id"] for tag in page.all("section")][:2] == ["answer", "choice"]
     assert all(name in page.heads for name in ranking.index)
-    other = written(study, tmp_path, max_false_alarms=0.1, detector=LOUD)
+    other = page_of(study, tmp_path, max_false_alarms=0.1, detector=LOUD)
     assert f"This report is on \N{LEFT DOUBLE QUOTATION MARK}{LOUD}" in other.text
     false_alarms = study.results_.set_index(["detector", "scenario"]).loc[(LOUD, "healthy"), "rate"]
     assert f"Of the records of the healthy structure, {share_text(false_alarms)} raise an alarm" in other.text
@@ -70,10 +71,12 @@ def test_the_rest_is_that_of_a_study_with_this_detector_alone(study):
 
 
 def test_none_is_recommended_if_none_keeps_the_limit(study):
-    ranking = study.ranking(0.1)
-    ranking["within_limit"] = False
-    text = Choice(study, ranking, 0.1, ranking.index[0]).sentence()
-    assert text.startswith("None is recommended")
+    def facts():
+        made = study_facts(study, None, None, None, 0.1)
+        made["choice"].ranking["within_limit"] = False
+        return made
+
+    assert "None is recommended" in section_of(written("study", facts), "choice").text
 
 
 def test_detectors_that_are_not_there_are_named(study, tmp_path):

@@ -14,13 +14,24 @@ from skthermo._tables.text import bounds_text, chance_text, share_text
 from skthermo.datasets import kw51_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report
-from skthermo.reporting._answer import answer, found_and_missed
-from skthermo.reporting._findings import findings_of
-from skthermo.reporting._html import STYLE
-from skthermo.reporting._identified import identified_damage
-from skthermo.reporting._model import monitored
+from skthermo.reporting._identified import identified_facts
+from skthermo.reporting._study import study_facts
+from skthermo.reporting._templates import STYLE, rendered
+from skthermo.reporting.service import Standing, monitor_facts
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, sweep
-from tests.reporting.pages import HOSTILE, MODES, QUOTED, SENSOR, Page, fitted_chain, run_study
+from tests.reporting.monitors import FakeMonitor
+from tests.reporting.pages import (
+    HOSTILE,
+    MODES,
+    QUOTED,
+    SENSOR,
+    Page,
+    fitted_chain,
+    run_study,
+    section_of,
+    section_text,
+    written,
+)
 from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")
@@ -72,6 +83,21 @@ def file(study, found, tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(file):
     return Page(file.read_text(encoding="utf-8"))
+
+
+def page_of(study):
+    """The page on a study, as text."""
+    return written("study", lambda: study_facts(study, None, None, None, 0.02))
+
+
+def facts_with(found):
+    """Of the page on a monitor, with identified damage."""
+    facts = monitor_facts(Standing.of(FakeMonitor()))
+    return facts | {"identified": identified_facts(found), "title": None}
+
+
+def identified_in(*args, **options):
+    return section_of(written("monitor", lambda: facts_with(identified(*args, **options))), "identified")
 
 
 @pytest.fixture
@@ -155,10 +181,10 @@ def test_identified_damage_is_said_first_and_in_full(page, found):
 
 
 def test_groups_that_are_not_seen_have_no_amount():
-    page = Page(identified_damage(identified(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])))
+    page = identified_in(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])
     assert "piers" in page.heads
     assert page.cells.count("unobservable") == 1
-    page = Page(identified_damage(identified(EXPLANATIONS, rest=0.0)))
+    page = identified_in(EXPLANATIONS, rest=0.0)
     assert "The measured modes show and distinguish all groups." in page.text
 
 
@@ -179,7 +205,7 @@ def test_lags_are_no_sensors():
     lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), (0.9 * T).rename(columns={SENSOR: "deck"})], axis=1)
     lagged["deck_lag2"], lagged["north_lag3"] = T[SENSOR].shift(2).bfill(), T[SENSOR].shift(3).bfill()
     study = run_study(clone(fem).fit(lagged, F), lagged, [Scenario("healthy")])
-    page = Page(monitored(study, None, []))
+    page = section_of(page_of(study), "monitored")
     assert "with 3\xa0temperatures, with lags, and 3\xa0natural frequencies each" in page.text
     sensors = page.heads[page.heads.index("Sensor") :]
     assert [sensor for sensor in sensors if "deck" in sensor or "north" in sensor or SENSOR in sensor] == [
@@ -205,12 +231,12 @@ def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
 
 
 def test_studies_without_a_family_that_has_a_smallest_damage(chain):
-    text = Page(answer(run_study(*chain[:2], [Scenario("healthy")]), [], [])).text
+    text = section_of(page_of(run_study(*chain[:2], [Scenario("healthy")])), "answer").text
     assert "No damage was tested." in text
     assert "there is no smallest damage to report" in text
     study = run_study(*chain[:2], [Scenario(f"part {severity}", {HOSTILE: severity}) for severity in (-0.1, 0.2)])
-    assert "were tested together" in Page(answer(study, findings_of(study), [])).text
-    assert "damage and strengthening together" in Page(found_and_missed(study, findings_of(study))).text
+    assert "were tested together" in section_of(page_of(study), "answer").text
+    assert "damage and strengthening together" in section_of(page_of(study), "found").text
 
 
 @pytest.mark.filterwarnings("ignore:.*many-false-alarms")
@@ -230,16 +256,16 @@ def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
 def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(page, found):
     opened = plt.figure()
     with plt.style.context("dark_background"):
-        (again,) = Page(identified_damage(found)).values("src")
+        again = section_of(rendered("monitor", facts_with(found)), "identified").values("src")
     assert plt.get_fignums() == [opened.number]
     plt.close(opened)
-    assert again == page.values("src")[-1]
+    assert again == page.values("src")[-1:]
 
 
 def test_control_characters_in_names_are_seen_and_harm_nothing():
     names = ["a\x00b", "line\nbreak \x1b[31m\u202e", "\x07bell", "\ud800"]
     explanations = {name: (0.25, {name: (0.2, 0.01)}) for name in names}
-    text = identified_damage(identified(explanations, unobservable=names[2:])).html
+    text = section_text(rendered("monitor", facts_with(identified(explanations, unobservable=names[2:]))), "identified")
     page = Page(text)
     for seen in (r"a\x00b", r"line break \x1b[31m\u202e", r"\x07bell", r"\ud800"):
         assert seen in page.text
@@ -249,15 +275,15 @@ def test_control_characters_in_names_are_seen_and_harm_nothing():
 
 
 def test_records_that_cannot_be_evaluated_are_counted_and_not_called_healthy(chain, study, tmp_path):
-    assert "The alarm system evaluated every simulated record." in Page(answer(study, [], [])).text
+    assert "The alarm system evaluated every simulated record." in section_of(page_of(study), "answer").text
     partly = copy.copy(study)
     indices = {key: index.where(np.arange(len(index)) >= 30) for key, index in study.indices_.items()}
     partly.findings_ = replace(study.findings_, indices=indices)
-    text = Page(answer(partly, [], [])).text
+    text = section_of(page_of(partly), "answer").text
     n_states = len(study.results_)
     assert f"could not evaluate {30 * n_states:,} of {120 * n_states:,}\xa0records of the first simulation" in text
     assert "They count neither as healthy nor as alarms" in text
-    assert Page(found_and_missed(partly, [])).text.count("(25\xa0% not evaluated)") == n_states
+    assert section_of(page_of(partly), "found").text.count("(25\xa0% not evaluated)") == n_states
 
 
 @pytest.mark.parametrize("number", [0, 1], ids=["light", "dark"])

@@ -15,20 +15,9 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.reporting import owner_report
-from skthermo.reporting.service._sections import (
-    detectable,
-    drift,
-    drift_sentences,
-    events,
-    false_alarms,
-    introduction,
-    not_evaluated,
-    sensors,
-    today,
-)
-from skthermo.reporting.service._standing import Standing
+from skthermo.reporting.service import Standing, monitor_facts
 from tests.reporting.monitors import FakeMonitor, event_row
-from tests.reporting.pages import HOSTILE, QUOTED, Page
+from tests.reporting.pages import HOSTILE, QUOTED, Page, section_of, written
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
@@ -42,8 +31,17 @@ def standing_of(monitor, now=None, limit=0.1):
     return Standing.of(monitor, monitor.last_ + pd.Timedelta("5h") if now is None else now, limit)
 
 
+def page_of(standing, structure=None):
+    """The page on a monitor, as text."""
+    return written("monitor", lambda: monitor_facts(standing, structure))
+
+
+def part_of(monitor, anchor, now=None):
+    return section_of(page_of(standing_of(monitor, now)), anchor)
+
+
 def today_of(monitor, now=None):
-    return Page(today(standing_of(monitor, now)))
+    return part_of(monitor, "today", now)
 
 
 def headline(page):
@@ -161,7 +159,7 @@ def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
     assert headline(page) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
     assert f"Because: {reason}." in page.text
     number = int(monitor.counts_["n_not_evaluated"])
-    page = Page(not_evaluated(standing_of(monitor)))
+    page = part_of(monitor, "not_evaluated")
     assert f"{number:,} ({share_text(number / 180)}) were not evaluated" in page.text
     assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
     assert page.cells == [str(number), "2"]
@@ -169,13 +167,14 @@ def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
 
 def test_a_new_baseline_after_a_change_of_the_structure_is_said():
     monitor = FakeMonitor()
-    assert len(introduction(monitor)) == 1
+    assert "The structure was changed" not in page_of(standing_of(monitor))
     monitor.since_ = pd.Timestamp("2024-12-20")
-    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in introduction(monitor)[1]
+    text = Page(page_of(standing_of(monitor))).text
+    assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in text
 
 
 def test_values_of_the_baseline_that_were_set_aside_are_listed():
-    page = Page(not_evaluated(standing_of(FakeMonitor())))
+    page = part_of(FakeMonitor(), "not_evaluated")
     assert "'T <1>' is 484.667 °C in 31 of 365 rows" in page.text
 
 
@@ -184,7 +183,7 @@ def test_a_response_that_was_set_aside_is_named_and_what_to_do():
     monitor = FakeMonitor(events=[event], n_not_evaluated=9, reason="f2 is left out (implausible since 2025-06-20)")
     page = today_of(monitor)
     assert state_of(page) == "alarm"
-    assert "a response was set aside: its sensor, or the structure, has changed" in str(events(standing_of(monitor)))
+    assert "a response was set aside: its sensor, or the structure, has changed" in part_of(monitor, "events").text
 
 
 def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
@@ -199,7 +198,7 @@ def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
     assert "No damage event is open." in page.text
     assert "nobody has said" not in page.text
     assert "acknowledge" not in page.text
-    page = Page(false_alarms(standing_of(monitor)))
+    page = part_of(monitor, "false_alarms")
     assert [page.heads[3], page.cells[1]] == ["Level above which a watch begins", "2.500"]
     assert state_of(today_of(monitor, monitor.last_ + pd.Timedelta("9D"))) == "not-evaluated"
     both = FakeMonitor(events=[opened, event_row("2025-06-26", None)], watch_per_year=12)
@@ -210,11 +209,11 @@ def test_the_smallest_change_that_would_be_seen_is_said():
     monitor = FakeMonitor()
     text = "A fall of all responses by 1 %, or of one response alone by 2 % (f1) to 3 % (f2) raises an alarm"
     assert text in today_of(monitor).text
-    page = Page(detectable(standing_of(monitor), None))
+    page = part_of(monitor, "detectable")
     falls = dict(zip(page.heads[-3:], page.cells[-3:], strict=True))
     assert falls == {"all responses by one share": f"1{SPACE}%", "f1 alone": f"2{SPACE}%", "f2 alone": f"3{SPACE}%"}
     monitor.smallest_changes_ = SmallestChanges(np.nan, {"f1": 0.5, "f2": np.nan}, False, pd.Timedelta("3D"))
-    page = Page(detectable(standing_of(monitor), None))
+    page = part_of(monitor, "detectable")
     assert page.cells[-2:] == [f"0.50{SPACE}Hz", "none is seen"]
 
 
@@ -225,7 +224,7 @@ def test_losses_that_raise_an_alarm_are_listed_and_drawn_on_the_structure():
     )
     assert "a loss of stiffness by 4 % (top)" in today_of(monitor).text
     for structure in (None, truss_structure()):
-        page = Page(detectable(standing_of(monitor), structure))
+        page = section_of(page_of(standing_of(monitor), structure), "detectable")
         losses = dict(zip(page.heads[-2:], page.cells[-2:], strict=True))
         assert losses == {"loss of stiffness of top": f"4{SPACE}%", "loss of stiffness of bottom": "none is seen"}
         assert len(page.all("img")) == (structure is not None)
@@ -236,7 +235,7 @@ def test_parts_that_explain_an_event_are_where_an_engineer_looks_first():
     today = today_of(FakeMonitor(events=[event]))
     assert "A loss of stiffness of top, bottom or diagonal explains most of it." in today.text
     assert "beginning with top, bottom or diagonal," in today.text
-    assert "top, bottom or diagonal" in Page(events(standing_of(FakeMonitor(events=[event])))).cells
+    assert "top, bottom or diagonal" in part_of(FakeMonitor(events=[event]), "events").cells
 
 
 def test_events_that_nobody_has_explained_are_named():
@@ -245,14 +244,14 @@ def test_events_that_nobody_has_explained_are_named():
     monitor = FakeMonitor(events=[*ended, known])
     said = f"2{SPACE}events: 1 and 2 have ended, and nobody has said yet what they were."
     assert said in today_of(monitor).text
-    page = Page(events(standing_of(monitor)))
+    page = part_of(monitor, "events")
     assert [cell for cell in page.cells if cell in ("yes, harmless", "not yet")] == [
         "yes, harmless",
         "not yet",
         "not yet",
     ]
     assert HOSTILE in page.text
-    page = Page(events(standing_of(FakeMonitor(events=[ended[0]] * 40))))
+    page = part_of(FakeMonitor(events=[ended[0]] * 40), "events")
     assert "the newest 30; 10 older ones" in page.text
     assert [head for head in page.heads if head.isdigit()] == [str(number) for number in range(40, 10, -1)]
 
@@ -271,27 +270,24 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
     )
     monitor = FakeMonitor(drift=found)
     standing = standing_of(monitor)
-    whether, said = drift_sentences(standing)
-    assert (
-        whether
-        == "The stiffness changes slowly; a change as large would be seen with a probability of 0.001 by chance."
-    )
+    page = section_of(page_of(standing), "drift")
+    whether = "The stiffness changes slowly; a change as large would be seen with a probability of 0.001 by chance."
+    assert whether in page.text
     loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
-    assert said.startswith(loss)
+    assert loss in page.text
     years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
-    assert said.endswith(f"{reached} {years[0.008]}).")
-    assert f"A loss of 1.5{SPACE}% has been reached." in drift_sentences(standing_of(monitor, limit=0.015))[1]
-    page = Page(drift(standing))
-    assert said in page.text
+    assert f"{reached} {years[0.008]})." in page.text
+    assert Page(page_of(standing)).text.count(loss) == 2  # of today, and of slow change
+    assert f"A loss of 1.5{SPACE}% has been reached." in page_of(standing_of(monitor, limit=0.015))
     assert len(page.drawings()) == 1
     assert page.cells[2::3] == ["yes", "no"]
 
     def sentence(**changed):
-        return drift_sentences(standing_of(FakeMonitor(drift=found.assign(**changed))))[-1]
+        return part_of(FakeMonitor(drift=found.assign(**changed)), "drift").text
 
-    assert sentence(per_year_error=0.01).endswith("at the earliest).")
-    assert sentence(significant=False).startswith("No slow change of stiffness is certain")
+    assert "at the earliest)." in sentence(per_year_error=0.01)
+    assert "No slow change of stiffness is certain" in sentence(significant=False)
     assert "reached" not in sentence(per_year=np.nan, per_year_error=np.nan)
     assert "reached" not in sentence(per_year=0.01)
     assert "more than 100 years" in sentence(per_year=-1e-4)
@@ -316,7 +312,7 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
         headline(today_of(monitor)) == f"Not evaluated since {since.day}{SPACE}{since.month_name()}{SPACE}{since.year}"
     )
     n_kept = len(monitor.evaluations_)
-    text = Page(not_evaluated(standing_of(monitor))).text
+    text = part_of(monitor, "not_evaluated").text
     assert f"Why {500 - n_kept} older ones of them were not evaluated is no longer kept." in text
 
 
@@ -331,12 +327,12 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
             "detail": ["repeats 7", ""],
         }
     )
-    page = Page(sensors(standing_of(FakeMonitor(faults=faults))))
+    page = part_of(FakeMonitor(faults=faults), "sensors")
     assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
     assert "Mode f2" not in page.text
     assert "is swapped with another" in page.cells
     seen = [event_row("2025-03-03", "2025-03-09", note="cold"), event_row("2025-03-20", "2025-03-21")]
-    notes = Page(events(standing_of(FakeMonitor(faults=faults, events=seen)))).text
+    notes = part_of(FakeMonitor(faults=faults, events=seen), "events").text
     assert notes.count("failed at that time") == notes.count("cold; T1 failed at that time") == 1
     assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text
     assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
@@ -345,7 +341,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
 def test_damage_events_are_counted_beside_the_false_alarms_that_were_to_be_expected():
     seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="watch")]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
-    text = Page(false_alarms(standing_of(monitor))).text
+    text = part_of(monitor, "false_alarms").text
     assert "gives 2 false alarms a year on average" in text
     assert f"there was 1{SPACE}damage event, 0 of them said to be harmless." in text
     years = (monitor.last_ - monitor.days_.index[0]) / pd.Timedelta(days=365.25)
@@ -357,7 +353,7 @@ def test_time_zones_and_the_clock():
     assert state_of(today_of(monitor)) == "alarm"
     utc = (monitor.last_ + pd.Timedelta("5h")).tz_convert("UTC")
     assert state_of(today_of(monitor, utc)) == "alarm"
-    assert state_of(Page(today(Standing.of(monitor)))) == "alarm"  # by the clock, long after
+    assert state_of(section_of(page_of(Standing.of(monitor)), "today")) == "alarm"  # by the clock, long after
     with pytest.raises(ValueError, match="expected a time without a time zone"):
         today_of(FakeMonitor(), utc)
     early = FakeMonitor()

@@ -7,8 +7,8 @@ import pytest
 
 from skthermo._tables.text import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
-from skthermo.reporting._html import Html
-from skthermo.reporting._identified import identified_damage
+from skthermo.reporting._identified import identified_facts
+from skthermo.reporting._templates import environment_of
 from skthermo.studies.identification._identified import explanation_text
 from skthermo.studies.identification._observe import ComparedRecords
 from tests.studies.identified import identified
@@ -207,8 +207,8 @@ def test_explanations_that_are_not_listed_are_counted():
 @pytest.mark.parametrize("name", CASES)
 def test_report_summary_and_drawing_say_the_same(name):
     found = CASES[name]
-    page = identified_damage(found).html
-    assert isinstance(page, Html)
+    section = environment_of().get_template("identified.html.j2").module.identified_damage
+    page = str(section(identified_facts(found)))
     for sentence in (*found.answer(), *found.limits(), *found.records.sentences()):
         assert sentence.replace(SPACE, " ") in found.summary()
         assert sentence in page

@@ -1,5 +1,5 @@
 """Pages for owners of many bridges."""
 
-from skthermo.reporting.fleet._page import fleet_page
+from skthermo.reporting.fleet._page import write_fleet
 
-__all__ = ["fleet_page"]
+__all__ = ["write_fleet"]

@@ -1,6 +1,6 @@
 """Pages on detectors in service."""
 
-from skthermo.reporting.service._sections import banner, first_section, monitor_page, symbol
-from skthermo.reporting.service._standing import Standing, Time, moment
+from skthermo.reporting.service._page import monitor_facts
+from skthermo.reporting.service._standing import Doubt, Standing, Time
 
-__all__ = ["Standing", "Time", "banner", "first_section", "moment", "monitor_page", "symbol"]
+__all__ = ["Doubt", "Standing", "Time", "monitor_facts"]

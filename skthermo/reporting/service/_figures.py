@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from skthermo._tables.frames import midnight, midnights_between
-from skthermo._tables.text import counted, percent, significant
 from skthermo.fem import Structure
 from skthermo.plotting import MonitorDisplay, StructureDisplay
 from skthermo.reporting._chart import chart
@@ -19,55 +20,70 @@ from skthermo.reporting.service._standing import MONTH, YEAR, Standing
 LONGEST = pd.Timedelta(days=400)  # longer services are drawn as a whole, too
 
 
-def draw_month(standing: Standing) -> Html:
-    """Damage index of each record in the month before the newest one."""
-    start = standing.last - MONTH
-    evaluated = standing.evaluations[standing.evaluations.index >= start]
-    alarms, unknown = ((evaluated["state"] == state).sum() for state in ("alarm", "not evaluated"))
-    alt = (
-        f"Damage index of {counted(len(evaluated), 'record')} of the last month: {alarms:,} in alarm, {unknown:,} not "
-        f"evaluated. {_highest(evaluated['index'])}"
-    )
-    values = Values("damage index of the last month", evaluated[["index", "threshold"]].rename_axis("date"))
-    return _drawn(standing, alt, "The last month, by record", values=values, start=start, by="record", parts=["index"])
+class Span(NamedTuple):
+    """What a drawing of the damage index shows: the records of the last "month", the days of the last "year", or those
+    of all of the "service"."""
+
+    name: str
+    start: pd.Timestamp
+    table: pd.DataFrame
+    number: int
+    n_alarms: int
+    n_unknown: int
+    highest: float
 
 
-def draw_days(standing: Standing) -> list[Html]:
-    """Highest and median damage index of each day in the last year and, where service is longer, in all of it."""
-    drawn = []
+def spans_of(standing: Standing) -> list[Span]:
+    """The last month, if records of it are kept, the last year and, where service is longer, all of it."""
+    found = []
+    if len(standing.evaluations):
+        start = standing.last - MONTH
+        shown = standing.evaluations[standing.evaluations.index >= start]
+        n_alarms, n_unknown = (int((shown["state"] == state).sum()) for state in ("alarm", "not evaluated"))
+        highest = shown["index"].max()
+        found.append(Span("month", start, shown[["index", "threshold"]], len(shown), n_alarms, n_unknown, highest))
     whole = standing.monitor.days_.index[0]
-    spans = {"The last year, by day": midnight(max(standing.last - YEAR, whole))}
+    starts = {"year": midnight(max(standing.last - YEAR, whole))}
     if standing.last - whole > LONGEST:
-        spans["All of the service, by day"] = whole
-    for title, start in spans.items():
+        starts["service"] = whole
+    for name, start in starts.items():
         days = standing.monitor.days_[standing.monitor.days_.index >= start]
-        n_days = len(midnights_between(days.index[0], standing.last))
-        n_without = n_days - int((days["n_evaluated"] > 0).sum())
-        alt = (
-            f"{title}: {counted(n_days, 'day')}, {int((days['n_alarms'] > 0).sum()):,} with an alarm, "
-            f"{n_without:,} without an evaluated record. {_highest(days['index_max'])}"
-        )
-        values = Values(f"damage index {title.split(',')[0]}", _daily(days, standing.monitor.threshold_))
-        drawn.append(_drawn(standing, alt, title, values=values, start=start, parts=["index"]))
-    return drawn
+        number = len(midnights_between(days.index[0], standing.last))
+        n_unknown = number - int((days["n_evaluated"] > 0).sum())
+        values = {"highest of the day": days["index_max"], "median": days["index_median"]}
+        table = pd.DataFrame(values).assign(threshold=standing.monitor.threshold_)
+        n_alarms = int((days["n_alarms"] > 0).sum())
+        found.append(Span(name, start, table, number, n_alarms, n_unknown, days["index_max"].max()))
+    return found
 
 
-def draw_detectable(structure: Structure, losses: Mapping[str, float]) -> Html:
+def draw_span(standing: Standing, span: Span, title: str, alt: str) -> Html:
+    """Damage index of each record, or the highest and the median of each day."""
+    what = "all of the service" if span.name == "service" else f"the last {span.name}"
+    values = Values(f"damage index of {what}", span.table.rename_axis("date"))
+    options = {"by": "record"} if span.name == "month" else {}
+    return _drawn(standing, alt, title, values=values, start=span.start, parts=["index"], **options)
+
+
+def losses_on(structure: Structure | None, losses: Mapping[str, float]) -> dict[str, float]:
+    """Losses that raise an alarm, of groups that can be drawn."""
+    groups = [] if structure is None else structure.groups
+    return {name: loss for name, loss in losses.items() if name in groups and np.isfinite(loss)}
+
+
+def draw_detectable(structure: Structure, losses: Mapping[str, float], alt: str) -> Html:
     """The smallest loss of stiffness of each member's group that raises an alarm."""
-    seen = {name: 100 * loss for name, loss in losses.items() if name in structure.groups}
-    alt = "Drawing of the structure. Smallest losses that raise an alarm: " + "; ".join(
-        f"{name} {percent(loss / 100, '.2g')}" for name, loss in seen.items()
-    )
 
     def make() -> StructureDisplay:
-        display = StructureDisplay.from_structure(structure, seen, label="smallest loss (%)")
+        percents = {name: 100 * loss for name, loss in losses.items()}
+        display = StructureDisplay.from_structure(structure, percents, label="smallest loss (%)")
         fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
         return display
 
-    return draw(make, f"{alt}.", height=None, width=6.2)
+    return draw(make, alt, height=None, width=6.2)
 
 
-def chart_year(standing: Standing) -> Html:
+def chart_year(standing: Standing, alt: str) -> Html:
     """Highest damage index of each day in the last year, without matplotlib, for a page among many."""
     days = standing.days_until(standing.last)
     damage = standing.events[standing.events["kind"] == "damage"]
@@ -77,32 +93,19 @@ def chart_year(standing: Standing) -> Html:
         for start, end in zip(damage["start"], ends, strict=True)
         if end.tz_localize(None) >= days.index[0]
     ]
-    alarms = int((days["n_alarms"] > 0).sum())
-    alt = (
-        f"Damage index of {counted(len(days), 'day')}: {alarms:,} with an alarm, "
-        f"{int(days['index_max'].isna().sum()):,} without an evaluated record. {_highest(days['index_max'])}"
-    )
     return chart(days["index_max"], days["n_alarms"] > 0, standing.monitor.threshold_, alt, spans)
 
 
-def draw_drift(standing: Standing) -> Html | None:
+def draw_drift(standing: Standing, alt: str) -> list[Html]:
     """Change of each group's stiffness by day; nothing where none is known yet."""
     days = standing.monitor.days_
     columns = [name for name in days.columns if str(name).startswith("drift ")]
     if not columns or not days[columns].notna().any(axis=None):
-        return None
-    names = ", ".join(str(name).removeprefix("drift ") for name in columns)
-    alt = f"Change of stiffness over time of the groups {names}."
+        return []
     changes = 100 * days[columns].astype(float)
     changes = changes.set_axis([f"change of {str(name).removeprefix('drift ')} (%)" for name in columns], axis=1)
     values = Values("change of stiffness", changes.rename_axis("date"))
-    return _drawn(standing, alt, parts=["drift"], height=3.0, values=values)
-
-
-def _daily(days: pd.DataFrame, threshold: float) -> pd.DataFrame:
-    """Damage index of each day, for those who read it."""
-    columns = {"highest of the day": days["index_max"], "median": days["index_median"], "threshold": threshold}
-    return pd.DataFrame(columns).rename_axis("date")
+    return [_drawn(standing, alt, parts=["drift"], height=3.0, values=values)]
 
 
 def _drawn(
@@ -116,8 +119,3 @@ def _drawn(
         return display
 
     return draw(make, alt, title, height=height, values=values)
-
-
-def _highest(index: pd.Series) -> str:
-    highest = index.max()
-    return f"The highest index is {significant(highest, 3)}." if highest == highest else "None was evaluated."

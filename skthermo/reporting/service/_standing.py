@@ -2,47 +2,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import as_moment, midnight
-from skthermo._tables.text import SPACE, counted, counted_number, duration_text, listed, percent
+from skthermo._tables.frames import as_moment
 from skthermo.monitoring import Monitor, MonitorStatus
+from skthermo.reporting._templates import Row, rows_of
 
 ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
+
+N_ERRORS = 2  # standard errors on either side of an estimate
+FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
 
 SET_ASIDE = "measurement or structure"  # the kind of events of responses that moved too far
 
 
 class Doubt(NamedTuple):
-    """Why it is not known whether a structure is healthy: since when, in a line and in a sentence."""
+    """Why it is not known whether a structure is healthy, and since when.
 
+    Kinds are "error", "no records", "ahead" of a newest record in the future, "late" of one that is too old, and
+    "reason" of records that are not evaluated: ``reason`` is the newest one's.
+    """
+
+    kind: str
     since: pd.Timestamp
-    headline: str
-    explanation: str
+    last: pd.Timestamp
+    now: pd.Timestamp
+    step: pd.Timedelta
+    errors: tuple[str, ...]
+    reason: str
+
+
+class Reached(NamedTuple):
+    """When a loss is reached: now, later than anything is predicted, or about a time between two others, if these are
+    known."""
+
+    is_past: bool = False
+    is_far: bool = False
+    about: pd.Timestamp | None = None
+    soonest: pd.Timestamp | None = None
+    latest: pd.Timestamp | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
     """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss.
 
-    ``error`` says in words that the newest records could not be evaluated, if they could not.
+    ``errors`` are the stages that failed, such as "update" where the newest records could not be evaluated.
     """
 
     monitor: Monitor
     now: pd.Timestamp
     limit: float
-    error: str = ""
+    errors: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, monitor: Monitor, now: Time = None, limit: float = 0.1, error: str = "") -> Standing:
+    def of(cls, monitor: Monitor, now: Time = None, limit: float = 0.1, errors: Iterable[str] = ()) -> Standing:
         """Now is by the clock where no time is given."""
-        return cls(monitor, as_moment(now, monitor.last_.tz), limit, error)
+        return cls(monitor, as_moment(now, monitor.last_.tz), limit, tuple(dict.fromkeys(errors)))
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -69,7 +93,7 @@ class Standing:
     def state(self) -> str:
         """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
         said = self.status.state
-        if said in ("healthy", "watch") and self.error:
+        if said in ("healthy", "watch") and self.errors:
             return "not evaluated"
         return "attention" if said == "healthy" and self.worn else said
 
@@ -81,68 +105,36 @@ class Standing:
             return []
         return [str(name) for name in drift.index[drift["significant"].astype(bool) & (drift["change"] <= -self.limit)]]
 
-    def headline(self) -> str:
-        if self.state == "alarm":
-            starts = [self.opened(kind)["start"].min() for kind in ("damage", SET_ASIDE) if len(self.opened(kind))]
-            return f"Alarm since {moment(min(starts, default=self.last))}"
-        if self.state == "watch":
-            return f"Watch since {moment(self.opened('watch')['start'].min())}: no alarm, but a raised damage index"
-        if self.state == "healthy":
-            return "Healthy: no alarm"
-        if self.state == "attention":
-            return "No alarm, but much stiffness has been lost slowly"
-        return self.doubt.headline
+    @property
+    def alarm_since(self) -> pd.Timestamp:
+        """When the first of the open events began that make an alarm."""
+        starts = [opened["start"].min() for kind in ("damage", SET_ASIDE) if len(opened := self.opened(kind))]
+        return min(starts, default=self.last)
 
-    def explanation(self) -> str:
-        """What the headline means, and why."""
-        if self.state == "alarm":
-            text = (
-                "The natural frequencies are not those of the healthy structure in this weather. That may be damage; "
-                "an engineer should look at the structure and at the records."
-            )
-            if not len(self.opened("damage")) and len(self.opened(SET_ASIDE)):
-                text = "A response moved too far to be evaluated. Its sensor or the structure has changed."
-            if self.status.is_late:
-                text += f" No record has come since {moment(self.last)}, so that nothing is known of the days since."
-            return f"{text} {self.error}." if self.error else text
-        if self.state == "attention":
-            return (
-                f"{listed(self.worn)} {'has' if len(self.worn) == 1 else 'have'} lost {percent(self.limit)} or more of "
-                "the stiffness since the baseline. The monitor takes slow drift out before it evaluates, so that this "
-                "raises no alarm. An engineer should evaluate whether the structure can bear it."
-            )
-        if self.state == "watch":
-            return (
-                "The damage index is above the level from which on the structure is to be watched, and below that of "
-                f"an alarm. A healthy structure has {counted_number(self.monitor.watch_per_year, 'such event')} a year."
-            )
-        if self.state == "healthy":
-            return f"The newest record, of {moment(self.last)}, is as those of the healthy structure."
-        return f"{self.doubt.explanation}. Whether the structure is healthy now is not known."
+    @property
+    def is_set_aside(self) -> bool:
+        """Whether a response that moved too far is all that makes an alarm."""
+        return not len(self.opened("damage")) and bool(len(self.opened(SET_ASIDE)))
+
+    @property
+    def hold(self) -> pd.Timedelta:
+        """Time for which the index stays low until an event ends."""
+        return pd.Timedelta(self.monitor.false_alarm_estimate_.rule.hold)
 
     @property
     def doubt(self) -> Doubt:
         """Why it is not known whether the structure is healthy, and since when."""
-        last, gone = moment(self.last), duration_text(self.now - self.last)
-        if self.error:
-            return Doubt(self.last, "Not evaluated: its new records could not be used", self.error)
-        if not self.has_records:
-            text = f"No record has come since the baseline, which ends on {last}"
-            return Doubt(self.last, "Not evaluated: no record since the baseline", text)
-        if self.status.is_ahead:
-            text = f"The newest record is of {last}, a time after {moment(self.now)}, when this page was written"
-            return Doubt(self.last, "Not evaluated: the dates of the records are wrong", text)
-        if self.status.is_late:
-            text = f"A record usually comes every {self.step_text}; the newest is {gone} old"
-            return Doubt(self.last, f"Not evaluated: no record since {last}", text)
-        reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
-        since = self.not_evaluated_since
-        return Doubt(since, f"Not evaluated since {moment(since)}", f"Because: {reason or 'no reason is given'}")
-
-    @property
-    def step_text(self) -> str:
-        """Usual time between records, as in "every day"."""
-        return duration_text(self.status.step).removeprefix("1 ")
+        since, reason = self.last, ""
+        if self.errors:
+            kind = "error"
+        elif not self.has_records:
+            kind = "no records"
+        elif self.status.is_ahead or self.status.is_late:
+            kind = "ahead" if self.status.is_ahead else "late"
+        else:
+            kind, since = "reason", self.not_evaluated_since
+            reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
+        return Doubt(kind, since, self.last, self.now, self.status.step, self.errors, reason)
 
     @property
     def not_evaluated_since(self) -> pd.Timestamp:
@@ -175,20 +167,86 @@ class Standing:
         first = max(last - YEAR, days.index[0]).normalize() if len(days) else last
         return days.reindex(pd.date_range(first, max(first, last), freq="D"))
 
-    def recent(self) -> str:
-        """How many records of the last month were evaluated."""
+    @property
+    def recent(self) -> tuple[int, int]:
+        """How many records came in the month up to the newest one, and how many of them were evaluated."""
         days = self.monitor.days_
         days = days[days.index > self.last - MONTH]
-        number, evaluated = int(days["n_records"].sum()), int(days["n_evaluated"].sum())
-        which = f"{evaluated:,}" if evaluated < number else "all"
-        return f"Of {counted(number, 'record')} in the month up to the newest one, {which} were evaluated."
+        return int(days["n_records"].sum()), int(days["n_evaluated"].sum())
 
+    @property
+    def newest(self) -> Row | None:
+        """The newest record, if it was evaluated."""
+        rows = rows_of(self.evaluations.tail(1))
+        return rows[0] if rows and np.isfinite(rows[0]["index"]) else None
 
-def moment(time: Time, *, is_short: bool = False) -> str:
-    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
-    if pd.isna(time):
-        return ""
-    stamp = pd.Timestamp(time)
-    month = stamp.month_name()[: 3 if is_short else None]
-    day = SPACE.join([str(stamp.day), month, str(stamp.year)])
-    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
+    @cached_property
+    def history(self) -> list[Row]:
+        """Events, the newest first, each with the sensors that failed in its time."""
+        return [{**event, "failed": self._failing(event)} for event in rows_of(self.events[::-1])]
+
+    @property
+    def waiting(self) -> list[int]:
+        """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch."""
+        events = self.events[self.events["kind"] != "watch"]
+        return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of events by kind."""
+        return {str(kind): int(number) for kind, number in self.events["kind"].value_counts().items()}
+
+    def _failing(self, event: Row) -> list[str]:
+        """Sensors that failed in the time of an event, before the monitor had noticed."""
+        faults, end = self.monitor.faults_, event["end"] or self.last
+        during = [one for one in rows_of(faults) if one["since"] <= end and event["start"] < one["detected"] + ONE_DAY]
+        return sorted({str(fault["column"]) for fault in during})
+
+    @property
+    def faults(self) -> list[Row]:
+        """Faults of sensors, the newest first."""
+        return rows_of(self.monitor.faults_[::-1])
+
+    @property
+    def drift(self) -> list[Row] | None:
+        """Change of the stiffness of each group, and when a loss of the limit is reached; None where it is not
+        followed."""
+        found = self.monitor.drift_
+        if found is None:
+            return None
+        return [{**row, "reached": self._reached(row)} for row in rows_of(found)]
+
+    def _reached(self, row: Row) -> Reached | None:
+        """When a loss of so much is reached at this rate; None if it is not."""
+        left = self.limit + row["change"]
+        if not np.isfinite(row["per_year"]) or (left > 0 and row["per_year"] >= 0):
+            return None
+        if left <= 0:
+            return Reached(is_past=True)
+        rate, error = -row["per_year"], row["per_year_error"]
+        if left / rate > FARTHEST:
+            return Reached(is_far=True)
+        speeds = [rate, *([] if not np.isfinite(error) else [rate + N_ERRORS * error, rate - N_ERRORS * error])]
+        spans = [left / speed if speed > 0 else np.inf for speed in speeds]
+        return Reached(False, False, *(self.last + span * YEAR if span <= FARTHEST else None for span in spans))
+
+    @property
+    def unknown(self) -> dict[str, Any]:
+        """How many records were not evaluated, why, as far as that is kept, and how many days had no record."""
+        counts, days = self.monitor.counts_, self.monitor.days_
+        is_unknown = self.evaluations["state"] == "not evaluated"
+        remarks = self.evaluations.loc[~is_unknown, "reason"]
+        explained = int(is_unknown.sum()) + sum(int(counts.get(name, 0)) for name in ("n_too_late", "n_ahead"))
+        n_days = (days.index[-1] - days.index[0]).days + 1
+        return {
+            "number": int(counts["n_not_evaluated"]),
+            "forgotten": int(counts["n_not_evaluated"]) - explained,
+            "n_days": n_days,
+            "silent": n_days - len(days),
+            "noticed": [
+                name for name, number in counts.items() if number and name not in ("n_records", "n_not_evaluated")
+            ],
+            "since": self.evaluations.index[0] if len(self.evaluations) else None,
+            "reasons": list(self.evaluations.loc[is_unknown, "reason"].value_counts().items()),
+            "remarks": list(remarks[remarks != ""].value_counts().items()),
+        }

@@ -1,0 +1,152 @@
+"""Pages from templates: the package's own, or changed ones in a folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import traceback
+from base64 import b64encode
+from collections.abc import Mapping
+from functools import lru_cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from skthermo._tables import text
+from skthermo._tables.arrays import check_path
+from skthermo._tables.frames import midnight
+from skthermo._validation import import_optional
+from skthermo.reporting._html import Html
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from jinja2 import Environment
+
+Row: TypeAlias = dict[str, Any]
+ENDING = ".html.j2"
+STYLE, SCRIPT = (
+    Html("\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8"))
+    for name in ("page.css", "page.js")
+)
+POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+    f"script-src 'sha256-{b64encode(sha256(SCRIPT.encode()).digest()).decode()}'"
+)
+"""What a browser may load: drawings within the page, and the page's own script; nothing from a network."""
+
+
+def rendered(name: str, facts: Mapping[str, Any], folder: str = "") -> str:
+    """A page from its template and facts; templates in a folder go before those of the package.
+
+    Raises
+    ------
+    ValueError
+        If a template is wrong: the error names its file and line.
+    ImportError
+        If jinja2 is not installed.
+    """
+    jinja2 = import_optional("jinja2", extra="pages")
+    try:
+        return environment_of(folder).get_template(name + ENDING).render(facts)
+    except ImportError:  # of what draws
+        raise
+    except Exception as error:
+        place = _place(error, folder)
+        if not folder or not (place or isinstance(error, jinja2.TemplateError | UnicodeDecodeError)):
+            raise
+        raise ValueError(f"{place or folder}: {error}") from error
+
+
+def check_templates(folder: str | os.PathLike[str] | None) -> str:
+    """The folder as text, "" for none; an error for one that holds no template of a page, or without jinja2."""
+    import_optional("jinja2", extra="pages")
+    if folder is None:
+        return ""
+    path = check_path(folder, "templates")
+    known = sorted(one.name for one in files("skthermo.reporting").joinpath("templates").iterdir())
+    if not path.is_dir():
+        raise ValueError(f"templates is {str(path)!r}, and there is no such folder; expected one with {known[0]!r}")
+    if not any((path / name).is_file() for name in known):
+        raise ValueError(f"templates is {str(path)!r}; expected a folder with one of {', '.join(known)}")
+    return str(path.resolve())
+
+
+@lru_cache(maxsize=8)
+def environment_of(folder: str = "") -> Environment:
+    """What finds and writes templates, with the filters that they may use."""
+    jinja2 = import_optional("jinja2", extra="pages")
+    own = jinja2.PackageLoader("skthermo.reporting")
+    changed = [jinja2.FileSystemLoader(folder)] if folder else []
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader([*changed, own, jinja2.PrefixLoader({"skthermo": own})]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=_printable,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT}
+    environment.tests["finite"] = np.isfinite
+    environment.filters |= {one.__name__: one for one in FILTERS}
+    return environment
+
+
+def rows_of(table: pd.DataFrame) -> list[Row]:
+    """Rows by the names of the columns, their label as "name"; a missing time is None, a missing number NaN."""
+    rows = table.to_dict("index") if table.index.is_unique else dict(enumerate(table.to_dict("records")))
+    return [
+        {"name": label, **{str(key): None if one is pd.NaT else one for key, one in row.items()}}
+        for label, row in rows.items()
+    ]
+
+
+def sections_of(page: str) -> list[tuple[str, Html]]:
+    """Anchors and headings of the sections of a page."""
+    found = re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
+    return [(anchor, Html(title)) for anchor, title in found]
+
+
+def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
+    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
+    if pd.isna(time):
+        return ""
+    stamp = pd.Timestamp(time)
+    month = stamp.month_name()[: 3 if is_short else None]
+    day = text.SPACE.join([str(stamp.day), month, str(stamp.year)])
+    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
+
+
+def day(time: str | datetime | None) -> str:
+    """A time as text with the month's name cut to three letters."""
+    return moment(time, is_short=True)
+
+
+def grouped(number: int) -> str:
+    """A whole number with its thousands apart."""
+    return f"{number:,}"
+
+
+FILTERS = [
+    *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
+    *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
+    *(moment, day, grouped, rows_of, sections_of),
+]
+"""What templates write numbers and times with."""
+
+
+def _printable(value: Any) -> Any:
+    """What a template writes: nothing for None, and text without control characters."""
+    if value is None:
+        return ""
+    return value if hasattr(value, "__html__") else text.printable(value)
+
+
+def _place(error: Exception, folder: str = "") -> str:
+    """File and line of the innermost template, perhaps of those in a folder, through which an error came."""
+    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+    found = [(file, line) for file, line in frames if file.startswith(folder) and file.endswith(ENDING)]
+    return f"{found[-1][0]}, line {found[-1][1]}" if found else ""
