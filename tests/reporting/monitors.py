@@ -55,12 +55,7 @@ class FakeMonitor:
         false_alarms_per_year=1.0,
         watch_per_year=None,
     ):
-        self.false_alarms_per_year, self.sensors, self.direction, self.fem = (
-            false_alarms_per_year,
-            sensors,
-            "both",
-            None,
-        )
+        self.false_alarms_per_year, self.sensors, self.fem = false_alarms_per_year, sensors, None
         stamps = pd.date_range("2025-01-01", periods=n_days, freq=freq, tz=zone)
         index = 1 + np.abs(np.sin(np.arange(len(stamps))))
         index[len(index) - n_not_evaluated if n_not_evaluated is not None else 0 :] = np.nan
