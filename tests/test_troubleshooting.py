@@ -11,6 +11,7 @@ from skthermo.preprocessing.checks._kinds import WARNINGS
 
 ROOT = Path(__file__).parents[1]
 SOURCE = "\n".join(path.read_text() for path in sorted((ROOT / "skthermo").rglob("*.py")))
+TEMPLATES = "\n".join(path.read_text() for path in sorted((ROOT / "skthermo").rglob("*.j2")))
 
 
 def entries(page):
@@ -33,6 +34,6 @@ def test_every_warning_has_an_entry_and_every_entry_a_warning():
 
 @pytest.mark.parametrize("page", ["report_lines", "errors"])
 def test_every_entry_is_part_of_a_sentence_of_the_source(page):
-    said = re.sub(r'"\s*\n\s*[rf]*"', "", SOURCE)
+    said = re.sub(r'"\s*\n\s*[rf]*"', "", SOURCE) + " ".join(TEMPLATES.split())
     assert len(entries(page)) > 20
     assert [one for one in entries(page) if not all(part.strip() in said for part in one.split("…"))] == []

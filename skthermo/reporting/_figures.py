@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -25,7 +25,7 @@ from skthermo.plotting import (
     StructureDisplay,
 )
 from skthermo.reporting._html import Html, image
-from skthermo.reporting._readable import Values, readable
+from skthermo.reporting._readable import Values, csv_link, readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,3 +195,13 @@ def chosen_sensor(T: pd.DataFrame, F: pd.DataFrame) -> pd.Series:
     both = pd.DataFrame(np.hstack([X, y])).corr().to_numpy()[: X.shape[1], X.shape[1] :]
     closeness = np.nan_to_num(np.abs(both)).mean(axis=1)
     return T.iloc[:, int(closeness.argmax())]
+
+
+def identified_facts(identified: IdentifiedDamage) -> dict[str, Any]:
+    """What the template of the section is given."""
+    groups = Values("identified damage", identified.table.rename_axis("group"))
+    return {
+        "found": identified,
+        "draw": draw_identified_damage,
+        "saved": csv_link(groups, "Table of all groups (CSV)"),
+    }

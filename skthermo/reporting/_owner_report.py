@@ -139,7 +139,7 @@ def owner_report(
     elif kind == "Monitor":
         facts = monitor_facts(Standing.of(subject, now, limit), structure)
         if identified is not None:
-            from skthermo.reporting._identified import identified_facts
+            from skthermo.reporting._figures import identified_facts
 
             facts["identified"] = identified_facts(identified)
         write_when_complete(file, rendered("monitor", facts | {"title": title}, folder))

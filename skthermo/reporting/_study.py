@@ -12,9 +12,8 @@ from skthermo._validation import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import Structure
 from skthermo.reporting._choice import Choice
-from skthermo.reporting._figures import draw_curve, draw_damage_indices, draw_groups, draw_mode
+from skthermo.reporting._figures import draw_curve, draw_damage_indices, draw_groups, draw_mode, identified_facts
 from skthermo.reporting._findings import LEVEL, REFERENCE, SIMULATED, Finding, findings_of, with_severities
-from skthermo.reporting._identified import identified_facts
 from skthermo.reporting._model import over_temperature, records_of, training_tables
 from skthermo.reporting._settings import settings_of, versions
 from skthermo.reporting._templates import Row, rows_of
