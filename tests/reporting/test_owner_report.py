@@ -14,7 +14,7 @@ from skthermo._tables.text import bounds_text, chance_text, share_text
 from skthermo.datasets import kw51_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report
-from skthermo.reporting._identified import identified_facts
+from skthermo.reporting._figures import identified_facts
 from skthermo.reporting._study import study_facts
 from skthermo.reporting._templates import STYLE, rendered
 from skthermo.reporting.service import Standing, monitor_facts

@@ -7,7 +7,7 @@ import pytest
 
 from skthermo._tables.text import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
-from skthermo.reporting._identified import identified_facts
+from skthermo.reporting._figures import identified_facts
 from skthermo.reporting._templates import environment_of
 from skthermo.studies.identification._identified import explanation_text
 from skthermo.studies.identification._observe import ComparedRecords
