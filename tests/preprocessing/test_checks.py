@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
-from skthermo.preprocessing import LagFeatures, check_records, residual_trend
+from skthermo.preprocessing import LagFeatures, check_records, residual_trend, set_aside
 from skthermo.preprocessing.checks._signs import stuck_runs
 
 YEAR = make_truss_campaign(random_state=0)
@@ -84,6 +84,20 @@ class TestStuck:
     def test_a_value_at_which_a_sensor_rests_again_and_again_is_not_stuck(self):
         sun = np.maximum(np.sin(2 * np.pi * np.arange(24 * 100) / 24), 0.0) * np.random.default_rng(0).random(2400)
         assert stuck_runs(sun) == []
+
+    @pytest.mark.parametrize("first", [0, 100])
+    def test_values_of_any_stuck_column_are_set_aside_from_the_first_record_on_too(self, first):
+        rows = slice(first, first + 40)
+        warm, stiff = T.copy(), F.copy()
+        warm.iloc[rows, 1], stiff.iloc[rows, 2] = 20.0, F.iloc[first, 2]
+        with pytest.warns(UserWarning, match="'T2' is 20 °C in 40 of .*; 'f3' is .* Hz in 40 of "):
+            found = set_aside(warm, stiff)
+        assert found.table["what"].tolist() == ["stuck-sensor", "stuck-mode"]
+        assert found.temperatures.isna().to_numpy().sum() == found.frequencies.isna().to_numpy().sum() == 40
+        assert check_records(warm, stiff).table["what"].tolist() == ["stuck-sensor", "stuck-mode"]
+
+    def test_lags_begin_with_copies_and_are_not_set_aside(self):
+        assert set_aside(LagFeatures([0, 24]).fit_transform(T), F).table.empty
 
     @pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
     def test_lags_of_a_sensor_are_no_sensors(self, kind):

@@ -19,10 +19,7 @@ APART, GAP = 8.0, 5.0  # standard deviations: from the middle of the usual value
 EMPTY = 1 / 3  # share of all that a column spans, between two levels
 FEW_LEVELS, MANY_VALUES = 3, 5  # different values that repeat, far from so many others
 FEW_VALUES, LEAST_KNOWN = 4, 50  # different values of a column of so many
-NARROWEST, SPAN = (
-    0.4,
-    1.049,
-)  # share of the values of a column, and standard deviations that it spans if they are normal
+NARROWEST, SPAN = 0.4, 1.049  # share of the values of a column, and the standard deviations that it spans if normal
 AMONG = np.ones(3)  # rows, of which the middle one is as doubtful as the two others
 
 

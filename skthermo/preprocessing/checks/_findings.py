@@ -26,7 +26,7 @@ from skthermo.preprocessing.checks._signs import (
     best_shift,
     explained,
     largest_step,
-    stuck_runs,
+    stuck_columns,
     swapped_modes,
     trend_table,
     with_past,
@@ -178,14 +178,12 @@ def _stuck(records: _Records) -> Iterator[Finding]:
         ("stuck-sensor", records.T, records.sensors, " °C"),
         ("stuck-mode", records.F, records.modes, records.unit),
     ):
-        for name, column in zip(names, table.T, strict=True):
-            for rows in stuck_runs(column):
-                if rows[0] == 0 and np.count_nonzero(table[0] == column[0]) > 1:
-                    continue  # a lag of another column, which begins with copies of its first value
-                detail = f"{name!r} is {column[rows[0]]:.6g}{unit} in {len(rows)} rows, {records.period(rows)}"
-                yield records.finding(what, name, rows, detail)
-                column[rows] = np.nan
-                records.has_faulty_sensors |= table is records.T
+        for place, rows in stuck_columns(table):
+            name, value = names[place], table[rows[0], place]
+            detail = f"{name!r} is {value:.6g}{unit} in {len(rows)} rows, {records.period(rows)}"
+            yield records.finding(what, name, rows, detail)
+            table[rows, place] = np.nan
+            records.has_faulty_sensors |= table is records.T
 
 
 def _against_weather(records: _Records) -> Iterator[Finding]:

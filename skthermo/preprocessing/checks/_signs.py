@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -74,6 +74,14 @@ def stuck_runs(column: Array) -> list[NDArray[np.intp]]:
         if _is_outstanding(values[first], lengths, run) and _others_vary(values, lengths, lengths[run], step):
             found.append(rows[first[run] : first[run] + lengths[run]])
     return sorted(found, key=lambda run: run[0])
+
+
+def stuck_columns(table: Array) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Place of a column and rows of each run at which it was stuck; what begins as another column is a lag of it."""
+    for place, column in enumerate(table.T):
+        for rows in stuck_runs(column):
+            if rows[0] > 0 or np.count_nonzero(table[0] == column[0]) == 1:
+                yield place, rows
 
 
 def _is_outstanding(values: Array, lengths: NDArray[np.intp], run: np.intp) -> bool:
