@@ -319,22 +319,23 @@ def test_silence_of_the_sensors_longer_than_what_is_kept():
 def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_failed():
     faults = pd.DataFrame(
         {
-            "column": ["T1", "f2"],
-            "kind": ["stuck", "swapped"],
-            "since": pd.to_datetime(["2025-03-01", "2025-04-01"]),
-            "detected": pd.to_datetime(["2025-03-05", "2025-04-02"]),
-            "until": pd.to_datetime([None, "2025-05-01"]),
-            "detail": ["repeats 7", ""],
+            "column": ["T1", "f2", "strain"],
+            "kind": ["stuck", "swapped", "left out"],
+            "since": pd.to_datetime(["2025-03-01", "2025-04-01", "2025-01-01"]),
+            "detected": pd.to_datetime(["2025-03-05", "2025-04-02", "2025-01-01"]),
+            "until": pd.to_datetime([None, "2025-05-01", None]),
+            "detail": ["repeats 7", "", "'strain' is 12"],
         }
     )
     page = part_of(FakeMonitor(faults=faults), "sensors")
     assert f"Thermometer T1: repeats one value, since 1{SPACE}March{SPACE}2025 (repeats 7)." in page.text
     assert "Mode f2" not in page.text
+    assert f"Column strain: left out, since 1{SPACE}January" in page.text
     assert "is swapped with another" in page.cells
     seen = [event_row("2025-03-03", "2025-03-09", note="cold"), event_row("2025-03-20", "2025-03-21")]
     notes = part_of(FakeMonitor(faults=faults, events=seen), "events").text
     assert notes.count("failed at that time") == notes.count("cold; T1 failed at that time") == 1
-    assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:])).text
+    assert "All sensors work." in today_of(FakeMonitor(faults=faults[1:2])).text
     assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
 
 
