@@ -120,9 +120,9 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the responses; records go through ``corrections`` before. There is an estimate of false alarms for each
-    kind of event that has a damage index. After a new baseline, ``prior`` are records
-    from before the intervention, which was complete ``since`` then.
+    the responses; records go through ``corrections`` before. There is an estimate of false alarms for each kind of
+    event that has a damage index. After a new baseline, ``prior`` are records from before the intervention, which was
+    complete ``since`` then.
     """
 
     detector: Any

@@ -28,8 +28,9 @@ NEAR = 15  # days of the year, up to which a record stands for the season around
 SEASON = 30  # days of the year, before and after each, whose records give its scale
 LEAST_INDEX = 0.1  # share of the median index above 0, as which smaller ones count for the scale of a season
 FEWEST_PEAKS = 3
-QUIET, CLOSES = 0.5, 0.98  # shares of the days of a baseline that stay within a level: what lies above is an excursion,
-# and an event that is open ends
+USUALLY, NEARLY_ALWAYS = 0.5, 0.98
+"""Shares of the days of a baseline that stay within a level: an excursion goes on beyond the first, an event beyond the
+second."""
 DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to be far beyond the others
 HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
@@ -234,16 +235,15 @@ def _quantiles(k: int) -> Array:
     return np.asarray(gamma.ppf((np.arange(N_NODES) + 0.5) / N_NODES, k))
 
 
-def release_level(
-    index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1, share: float = CLOSES
-) -> float:
-    """The level that a healthy structure stays within for the time of ``hold``, in this share of such times."""
+def quiet_levels(index: pd.Series, hold: str | pd.Timedelta = "1D", persistence: int = 1) -> tuple[float, float]:
+    """The levels that a healthy structure stays within for the time of ``hold``, usually and nearly always."""
     hold, known = pd.Timedelta(hold), index.dropna()
     stamps = known.index.as_unit("ns").asi8
     whole = stamps - stamps[:1] >= hold.value
     level = pd.Series(levels(known.to_numpy(), persistence)[0], known.index)
     highest = level.rolling(hold, closed="both").max().to_numpy()
-    return float(np.quantile(highest[whole] if whole.any() else highest, share))
+    usual, release = np.quantile(highest[whole] if whole.any() else highest, [USUALLY, NEARLY_ALWAYS])
+    return float(usual), float(release)
 
 
 def seasonal_scale(index: pd.Series) -> pd.Series:
@@ -304,7 +304,7 @@ def estimate_false_alarms(
         warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-excursions")
     asked = per_year * found.n_years
     tail = Tail.of(found.squares, asked, found.scales)
-    usual, release = (release_level(known, hold, persistence, share) for share in (QUIET, CLOSES))
+    usual, release = quiet_levels(known, hold, persistence)
     half = max(tail.threshold((tail.k + 1) / 2), usual)
     n_events = len(find_events(known.to_numpy(), known.index, EventRule(half, min(release, half), hold, persistence)))
     per_excursion = max(n_events / max((found.table["index"] > half).sum(), 1), 1.0)
@@ -337,7 +337,7 @@ class Excursions:
         """Of indices in order of time, all of them finite."""
         scale = seasonal_scale(known)
         standard = known / np.sqrt(scale)
-        quiet = release_level(standard, hold, persistence, QUIET)
+        quiet, _ = quiet_levels(standard, hold, persistence)
         table = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
         table["index"] = table["peak"] * np.sqrt(scale[table["peak_time"]].to_numpy())
         scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)

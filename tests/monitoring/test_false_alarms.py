@@ -10,12 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.monitoring._false_alarms import (
-    QUIET,
     EventRule,
     EventState,
     estimate_false_alarms,
     find_events,
-    release_level,
+    quiet_levels,
     seasonal_scale,
 )
 
@@ -154,7 +153,7 @@ def test_fewer_alarms_need_a_higher_threshold():
     index = pd.Series(chi(np.random.default_rng(2), 730), stamps(730))
     thresholds = [estimate_false_alarms(index, rate).rule.threshold for rate in (30.0, 5.0, 1.0, 0.5)]
     assert thresholds == sorted(thresholds)
-    assert thresholds[0] > release_level(index, share=QUIET)
+    assert thresholds[0] > quiet_levels(index)[0]
 
 
 def test_an_index_that_is_mostly_zero_has_a_threshold():
@@ -168,7 +167,7 @@ def test_an_index_that_is_mostly_zero_has_a_threshold():
 def test_as_many_alarms_as_excursions_come_from_their_order_alone():
     index = pd.Series(chi(np.random.default_rng(3), 365), stamps(365))
     estimate = estimate_false_alarms(index, 30.0)
-    until_usual = replace(estimate.rule, release=release_level(index, share=QUIET))
+    until_usual = replace(estimate.rule, release=quiet_levels(index)[0])
     excursions, events = (find_events(index.to_numpy(), index.index, rule) for rule in (until_usual, estimate.rule))
     assert abs(len(excursions) - 30) <= 1
     assert len(excursions) <= len(events) <= 1.15 * len(excursions)  # an excursion may be two events

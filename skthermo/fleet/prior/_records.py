@@ -197,9 +197,9 @@ def read_pair(T: ArrayLike, Y: ArrayLike) -> ReadBridge:
     values = as_columns(check_array(Y, ensure_2d=False, **options))
     check_same_rows(T, Y, ("temperatures", "quantities"))
     inputs = as_columns(inputs)
-    named = Y if np.ndim(Y) == 2 else None
-    options = {"unit": "", "exclude": {"no-rows", "constant"}, "needs_all": True}
-    found = set_aside(frame_like(T, inputs), frame_like(named, values), **options)
+    found = set_aside(
+        frame_like(T, inputs), frame_like(Y, values), unit="", exclude={"no-rows", "constant"}, needs_all=True
+    )
     inputs, values = np.asarray(found.temperatures), np.asarray(found.frequencies)
     if isinstance(Y, pd.Series):
         names = ["f1" if Y.name is None else Y.name]
