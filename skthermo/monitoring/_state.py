@@ -157,15 +157,11 @@ class MonitorState(SavesFrames):
         outside = active.extrapolated(records.iloc[n_memory:])
         is_blind = active.is_blind(records, n_memory, outside) & ~seen.is_held
         is_doubtful = seen.is_held | is_contested
-        kinds = [kind for kind in (DAMAGE, WATCH) if kind in active.estimates]
-        series = dict.fromkeys(kinds, _not_closing(index, is_doubtful, active))
+        series = dict.fromkeys(active.estimates, _not_closing(index, is_doubtful, active))
         times = raw.index.asi8
         after = (rules[kind].follow(begin.log.state(kind), one, times)[0] for kind, one in series.items())
         rows = np.flatnonzero(np.any(list(after), axis=0) & ~np.isnan(index))
-        modes, effects = np.full(len(raw), "", dtype=object), [{} for _ in range(len(raw))]
-        modes[rows] = active.drivers(records, rows + n_memory)
-        for row, one in zip(rows, active.groups(records, rows + n_memory), strict=True):
-            effects[row] = one
+        modes, effects = _drivers(active, records, n_memory, rows)
         series |= {MEASUREMENT: seen.n_held}
         drivers = dict.fromkeys(series, (modes, effects)) | {MEASUREMENT: (seen.held, [{}] * len(raw))}
         log, numbers, points = _followed(rules, begin.log, states, series, drivers, raw.index)
@@ -390,6 +386,18 @@ def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: 
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
     drivers, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
     return _answers(stamps, nothing, threshold, drivers, list(reasons), {DAMAGE: number}, is_held)
+
+
+def _drivers(
+    active: ActiveDetector, records: pd.DataFrame, n_memory: int, rows: NDArray[np.intp]
+) -> tuple[NDArray[np.object_], list[dict[str, float]]]:
+    """Modes that drive the index of some records after the memory, and effects of damage groups; none of the others."""
+    n_records = len(records) - n_memory
+    modes, effects = np.full(n_records, "", dtype=object), [{} for _ in range(n_records)]
+    modes[rows] = active.drivers(records, rows + n_memory)
+    for row, one in zip(rows, active.groups(records, rows + n_memory), strict=True):
+        effects[row] = one
+    return modes, effects
 
 
 def _answers(
