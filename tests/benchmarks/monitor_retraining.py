@@ -26,6 +26,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._memory import Memory
 from skthermo.monitoring.retraining import begun_again, retrained
@@ -50,9 +51,13 @@ class ByRecords(ActiveDetector):
     def threshold(self):
         return limit(self.detector)
 
+    @property
+    def estimate(self):
+        return SimpleNamespace(rule=SimpleNamespace(persistence=Monitor().persistence))
+
     @classmethod
     def of(cls, detector, trained):
-        return cls(detector, trained, None, list(detector.feature_names_in_), *[None] * 8)
+        return cls(detector, trained, None, list(detector.feature_names_in_), *[None] * 7)
 
 
 def no_events():
