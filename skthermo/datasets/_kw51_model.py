@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._tables.arrays import check_flag
+from skthermo._tables.arrays import check_flag, positive_integer
 from skthermo.datasets._sections import Section, box, channel, pipe, rectangle, tee, times
 from skthermo.fem import AffineModel, Beam, Membrane, Structure
 
@@ -271,6 +271,7 @@ def make_kw51(
         names = tuple(parameters) if isinstance(parameters, Collection) else ()
     if not names or len(set(names)) < len(names) or not set(names) <= set(PARAMETERS):
         raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(PARAMETERS)}")
+    n_modes = positive_integer(n_modes, "n_modes")
     if not check_flag(updated, "updated"):
         return kw51_structure().assemble({name: PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)
     return updated_model(kw51_structure(), {name: PARAMETERS[name] for name in names}, n_modes)

@@ -56,6 +56,7 @@ def make_truss(n_modes: int = 6) -> AffineModel:
     >>> make_truss().frequencies([[1.0, 1.0, 1.0, 1.0]]).round(3)
     array([[ 7.485, 27.5  , 37.842, 62.614, 67.17 , 95.412]])
     """
+    n_modes = positive_integer(n_modes, "n_modes")
     return truss_structure().assemble(PARAMETERS, groups=PARAMETERS, n_modes=n_modes)
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._io import read_matlab
-from skthermo._tables.arrays import check_path
+from skthermo._tables.arrays import check_path, positive_integer
 from skthermo.datasets._results import Z24Monitoring
 from skthermo.fem import AffineModel, Beam, Spring, Structure
 
@@ -243,6 +243,7 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     >>> model.damaged({"soil": 0.3}).frequencies([[1.0, 1.0, 1.0, 1.0]]).round(1)
     array([[ 3.9,  4.8, 10. , 10.6]])
     """
+    n_modes = positive_integer(n_modes, "n_modes")
     return z24_structure().assemble(PARAMETERS, groups=DAMAGE_GROUPS, n_modes=n_modes, track=track)
 
 

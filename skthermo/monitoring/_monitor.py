@@ -371,8 +371,8 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If the records are no frame on a ``DatetimeIndex`` with the columns and the time zone of the baseline; if
-            values are infinite; if a known stamp comes with other values. The monitor then stays as it was.
+            If the records are no frame on a ``DatetimeIndex`` with the columns and the time zone of the baseline; if a
+            known stamp comes with other values. The monitor then stays as it was.
 
         Warns
         -----
@@ -625,9 +625,9 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         if records is not None:
-            records = self.active_.corrections.cleaned(self._read(records))
             options = {"exclude": OF_TRAINING, "is_baseline": False}
-            records, _ = without_what_cannot_be(records, self.targets_, self.units_, **options)
+            records, _ = without_what_cannot_be(self._read(records), self.targets_, self.units_, **options)
+            records = self.active_.corrections.cleaned(records)
         retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
