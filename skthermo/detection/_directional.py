@@ -373,24 +373,18 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
         return pd.DataFrame(-np.eye(n_modes), modes, modes)
     if _is_fem(directions):
         directions = damage_directions(directions)
-    table = directions if isinstance(directions, pd.DataFrame) else pd.DataFrame(real_array(directions, "directions"))
-    labels = list(table.columns)
-    if (
-        isinstance(directions, pd.DataFrame)
-        and all(isinstance(one, str) for one in [*labels, *modes])
-        and names is not None
-    ):
-        if set(labels) != set(modes):
-            raise ValueError(f"directions have the columns {labels}; expected the modes {modes}")
-        table = table[modes]
-    values = as_floats(table)
+    is_frame = isinstance(directions, pd.DataFrame)
+    if is_frame and names is not None and all(isinstance(one, str) for one in [*directions.columns, *modes]):
+        if set(directions.columns) != set(modes):
+            raise ValueError(f"directions have the columns {list(directions.columns)}; expected the modes {modes}")
+        directions = directions[modes]
+    values = as_floats(directions) if is_frame else real_array(directions, "directions")
     if values.ndim != 2 or values.shape[1] != n_modes or not len(values):
         raise ValueError(
             f"directions have the shape {values.shape}; expected (n_directions, {n_modes}): a relative change of each "
             f"of the modes {modes}"
         )
-    is_frame = isinstance(directions, pd.DataFrame)
-    own = list(map(str, table.index)) if is_frame else [f"direction {n + 1}" for n in range(len(values))]
+    own = list(map(str, directions.index)) if is_frame else [f"direction {n + 1}" for n in range(len(values))]
     wrong = ~np.isfinite(values).all(axis=1) | ~values.any(axis=1)
     if wrong.any():
         raise ValueError(

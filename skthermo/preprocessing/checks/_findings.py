@@ -100,8 +100,6 @@ def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", mode
              what  n_rows
     0  time-shift     305
     """
-    if not isinstance(unit, str):
-        raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
     tables = {"temperatures": temperatures, "frequencies": frequencies}
     cleaned = CleanedRecords.of(tables, unit=unit, model=model)
     if not cleaned.belong_together:

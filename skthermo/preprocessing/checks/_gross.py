@@ -54,7 +54,7 @@ def gross_errors(
     Raises
     ------
     ValueError
-        If the model is no FE model.
+        If the unit is no text, or the model no FE model.
 
     Examples
     --------
@@ -85,6 +85,8 @@ class CleanedRecords:
     @classmethod
     def of(cls, given: Mapping[str, Any], *, unit: str, model: Any) -> CleanedRecords:
         """Read temperatures, frequencies or both."""
+        if not isinstance(unit, str):
+            raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
         records = cls([Reading.of(table, what, unit) for what, table in given.items()])
         tables = [reading for reading in records.readings if reading.is_table]
         for reading in tables:
