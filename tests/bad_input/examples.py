@@ -1001,6 +1001,18 @@ fitted(
     covariance=(None, estimators("None")),
 )
 fitted(
+    detection.DirectionalDetector,
+    (F, WATCHED),
+    usual="contamination threshold",
+    after=DAMAGE_INDEX,
+    directions=(
+        "softening",
+        bad(None, "down", 3, True, NAN, [], np.zeros((0, 6)), np.full((1, 6), NAN), np.ones((1, 5))),
+    ),
+    omnibus=(0.2, number(-0.1, 1.1)),
+    covariance=(None, estimators("None")),
+)
+fitted(
     OutlierDetector,
     (F, WATCHED),
     usual="contamination",
@@ -1015,6 +1027,7 @@ fitted(
     window=(3, durations("negative", "zero") | bad(0, "-1h", None)),
     rule=("m-of-n", choice()),
     m=(2, count(9)),
+    detector=(None, estimators("None")),
 )
 PAIR = [
     ("a", MahalanobisDetector()),
@@ -1370,6 +1383,7 @@ use(
     identified=(FOUND, instead() | bad([FOUND])),
     title=("Bridge", texts("empty")),
     structure=(None, instead()),
+    templates=(None, bad(3, True, NAN, ["a"], Path, "no such folder", str(FOLDER), FOLDER / "report.html")),
 )
 use(
     "plotting.PredictionDisplay.from_predictions",
@@ -1391,6 +1405,13 @@ RECORDS = {"temperatures": (T, weather(T, fixed=False)), "frequencies": (F, freq
 MODEL = (TRUSS, {cause: value for cause, value in models().items() if cause != "None"})
 for name in ("check_records", "gross_errors"):
     use(f"preprocessing.{name}", **RECORDS, model=MODEL)
+use(
+    "preprocessing.set_aside",
+    lambda **a: preprocessing.set_aside(**a).others,
+    **RECORDS,
+    model=MODEL,
+    unit=("Hz", texts("empty")),
+)
 use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
 fitted(
     OutlierDetector,
@@ -1784,6 +1805,7 @@ NOT_CALLED |= {
     "fem.LocalModes": "made by a model's local_modes",
     "surrogate.FitReport": "made by a chain's fit",
     "preprocessing.RecordFindings": "made by check_records",
+    "preprocessing.SetAside": "made by set_aside",
     "studies.IdentifiedDamage": "made by identify_damage",
     "studies.LocatedDamage": "made by locate_damage",
     "studies.locate_damage": "not tried: it wants a structure whose model is fitted",
@@ -1805,8 +1827,9 @@ UNTRIED |= {
     "preprocessing.ExponentialMeans": {"sensors", "time_constants"},
     "preprocessing.check_records": {"unit"},
     "preprocessing.gross_errors": {"unit"},
+    "preprocessing.set_aside": {"exclude", "is_baseline", "needs_all"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
-    "studies.DetectabilityStudy": {"models", "n_replicates"},
+    "studies.DetectabilityStudy": {"memory", "models", "n_replicates"},
     "studies.detection_task": {"columns", "gaps", "outliers"},
     "studies.identify_damage": {"n_jobs"},
     "studies.compare_extensions": {"detector"},

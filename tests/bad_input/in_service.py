@@ -213,7 +213,7 @@ LEGAL |= {
     "max_age": {("zero", f"{owner}.status"): "any age is too old" for owner in ("monitoring.Monitor", "fleet.Fleet")},
     "new": {
         (cause, "monitoring.Monitor.update"): "left out, with its reason in the row and in the counts"
-        for cause in ("1e308 inside", "a slipped point")
+        for cause in ("1e308 inside", "a slipped point", "infinite inside")
     },
     "records": {("no rows", "monitoring.Monitor.refit"): "the answer says that nothing may train"},
 }

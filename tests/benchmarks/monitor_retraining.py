@@ -87,7 +87,9 @@ def in_service(detector, baseline, kept, targets):
 
 
 def joined(campaign):
-    return campaign.temperatures.join(campaign.frequencies)
+    """Records on stamps in nanoseconds, as a monitor keeps them."""
+    records = campaign.temperatures.join(campaign.frequencies)
+    return records.set_axis(records.index.as_unit("ns"))
 
 
 def lines(targets):
@@ -143,10 +145,10 @@ def refit(seeds):
 
 def shifted_only(monitor, own, targets):
     """The old detector on frequencies moved by the mean of what its regression leaves of the new days."""
-    compensator = monitor.detector_[0]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        left = pd.DataFrame(np.asarray(compensator.transform(own)), own.index, targets)
+        compensator = clone(monitor.detector_[0]).set_params(whiten=None).fit(monitor.trained_)
+        left = pd.DataFrame(np.asarray(compensator.transform(own)), own.index, targets)  # in Hz
 
     def moved(records):
         return records.assign(**{name: records[name] - left[name].mean() for name in targets})
@@ -228,6 +230,7 @@ def real(seeds):
         print(f"KW51, measured: {path} is not there\n")
         return 0
     daily = pd.read_csv(path, index_col=0, parse_dates=True).dropna()
+    daily.index = daily.index.as_unit("ns")
     before, after = daily[:"2019-05-14"], daily["2019-09-28":]
     detector = make_pipeline(
         TemperatureCompensator(make_pipeline(HingeFeatures(), LinearRegression()), targets=["f"]),

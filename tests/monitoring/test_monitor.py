@@ -378,7 +378,7 @@ class RunningMean(TransformerMixin, BaseEstimator):
 @pytest.mark.nightly
 def test_memory_of_steps_that_are_not_known_is_asked_for():
     detector = make_pipeline(compensator().set_output(transform="pandas"), RunningMean(), MahalanobisDetector())
-    with pytest.raises(ValueError, match=r"looks at later records, or farther back; expected .* lookback='48h'"):
+    with pytest.raises(ValueError, match=r"uses later records, or earlier ones; expected .* lookback='48h'"):
         Monitor(detector).fit(BASELINE)
     monitor = Monitor(detector, lookback="2D", sensors=False).fit(BASELINE)
     other = copy.deepcopy(monitor)

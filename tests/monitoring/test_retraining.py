@@ -156,7 +156,7 @@ def test_a_change_without_an_alarm_is_not_learned(monitor, records):
     before, detector = decisions(monitor, changed[720:]), monitor.detector_
     found = quietly(monitor.refit)
     assert not found.accepted
-    assert "would not see that change" in found.reasons[0]
+    assert "would not detect that change" in found.reasons[0]
     assert monitor.detector_ is detector
     pd.testing.assert_frame_equal(decisions(monitor, changed[720:]), before, check_exact=True)
     assert (found.shift["change"] < 0).all()
