@@ -1,6 +1,6 @@
 """Residuals of healthy records on the weather: their covariance, the range of weather that they know.
 
-It uses ``_tables``; detectors, chains and monitors use it. Start with ``gaussian.py``, then ``cones.py``.
+It uses ``preprocessing``; detectors, chains and monitors use it. Start with ``gaussian.py``, then ``spread.py``.
 """
 
 __all__: list[str] = []

@@ -1,4 +1,4 @@
-"""Weather of records: its range, similar records, and temperatures that other sensors predict."""
+"""Weather of records: its range, similar records, sensors that predict each other, columns that are no weather."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 from sklearn.neighbors import NearestNeighbors
@@ -15,8 +16,8 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo._estimators.warnings import warn_user, without_warnings
-from skthermo._tables.arrays import Array, as_floats, range_sums
-from skthermo._tables.frames import column_names, frame_like, has_stamps, row_times
+from skthermo._tables.arrays import Array, as_floats, median, range_sums, robust_deviation, spread_evenly
+from skthermo._tables.frames import Table, column_names, frame_like, has_stamps, row_times
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian
@@ -39,6 +40,13 @@ MATTERS = 0.03  # ranges of the training temperatures from which a departure mov
 MOST_COORDINATES = 3  # of the weather, of which there are functions
 COLD_AND_HOT = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
 A_DEGREE = 1.0  # below which thermometers may differ without a fault
+MOST_ROWS, LEAST_ROWS = 2000, 30  # evenly spread, that are looked at
+STEADY = 0.15  # variation of a frequency at most
+AS_STEADY = 3.0  # times the variation of the other modes, at most, of a mode
+UNSTEADY = 5.0  # times the variation of modes, at least, of a temperature
+MAGNITUDES = 10.0  # by which a mode may be below the lowest or above the highest of the others
+TOGETHER, ALIKE = 0.1, 0.6  # rank correlation of two modes, and of two temperatures
+DEGREES, RATIO = 20.0, 3.0  # difference of the medians and ratio of the deviations of two temperatures
 
 
 @dataclass(frozen=True)
@@ -496,3 +504,73 @@ def order_statistic(scores: Array, confidence: float) -> float:
     """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
     rank = int(np.ceil((len(scores) + 1) * confidence))
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
+
+
+def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
+    """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
+    temperatures.
+
+    Frequencies are positive, vary by a few percent of their median, and rise and fall together. Temperatures in degrees
+    Celsius vary by far more, and are nearly equal.
+    """
+    if len(temperatures) < LEAST_ROWS:
+        return
+    T, F = Columns.of(temperatures, "T"), Columns.of(frequencies, "f")
+    steady = F.variation[F.variation <= STEADY]
+    usual = np.median(steady) if len(steady) else np.min(T.variation, initial=STEADY)
+    is_temperature = (F.variation >= UNSTEADY * usual) & (len(steady) > 0 or (T.variation <= STEADY).any())
+    is_mode = (T.variation <= AS_STEADY * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
+    is_mode &= T.variation <= STEADY
+    if not is_mode.any() and not is_temperature.any():
+        return
+    ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=LEAST_ROWS).fillna(0).to_numpy()
+    n_sensors = len(T.names)
+    among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
+    together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
+    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), TOGETHER)
+    is_temperature &= ((across > ALIKE) & T.nearly(F))[~is_mode].any(axis=0)
+    if is_mode.any():
+        yield RecordsWarning(
+            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
+            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
+            "beside them",
+            "modes-among-temperatures",
+        )
+    if is_temperature.any():
+        yield RecordsWarning(
+            f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
+            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
+            "as targets",
+            "temperatures-among-modes",
+        )
+
+
+class Columns:
+    """Columns of a table with their robust statistics."""
+
+    def __init__(self, values: Array, names: list):
+        self.values, self.names = values, names
+        self.median, self.deviation = median(values), robust_deviation(values)
+        positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
+        self.variation = np.divide(self.deviation, self.median, out=np.full(len(names), np.inf), where=positive)
+
+    @classmethod
+    def of(cls, table: Table, default: str) -> Columns:
+        """Rows of a table, evenly spread."""
+        rows = spread_evenly(np.arange(len(table)), MOST_ROWS)
+        return cls(as_floats(table)[rows], column_names(table, default))
+
+    def named(self, chosen: NDArray[np.bool_]) -> list:
+        return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
+
+    def reach(self, others: Columns) -> NDArray[np.bool_]:
+        """Which others have about the magnitude of some of these."""
+        lowest, highest = np.nanmin(self.median) / MAGNITUDES, np.nanmax(self.median) * MAGNITUDES
+        return (others.median >= lowest) & (others.median <= highest)
+
+    def nearly(self, others: Columns) -> NDArray[np.bool_]:
+        """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
+        difference = np.abs(self.median[:, np.newaxis] - others.median)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = self.deviation[:, np.newaxis] / others.deviation
+        return (difference <= DEGREES) & (ratio >= 1 / RATIO) & (ratio <= RATIO)

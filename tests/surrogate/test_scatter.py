@@ -9,7 +9,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
-from skthermo.residuals.scatter import Scatter
+from skthermo.residuals.baseline import Scatter
 
 ROOT = np.array([[1.0, 0.0], [0.6, 0.8]])  # of the correlations of two modes
 NEAR = 25  # number of neighbours in weather

@@ -11,7 +11,7 @@ from scipy import stats
 from skthermo._effects import healthy_frequencies
 from skthermo._tables.arrays import Array, check_noise, means_of_known, median, robust_deviation
 from skthermo._tables.frames import has_stamps, row_times
-from skthermo.residuals.scatter import PSEUDO_RECORDS, Scatter
+from skthermo.residuals.baseline import PSEUDO_RECORDS, Scatter
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it

@@ -65,8 +65,7 @@ from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, set_aside
 from skthermo.residuals.baseline import BaselineResiduals
-from skthermo.residuals.misplaced import misplaced_columns
-from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.residuals.weather import SensorRegression, TrainingRange, misplaced_columns
 from skthermo.surrogate._regression import TemperatureMapper
 from skthermo.surrogate._simulator import Simulator, tolerance
 from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
