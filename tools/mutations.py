@@ -295,7 +295,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("residuals/gaussian.py", "detection/test_whitening.py"): [
         ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
     ],
-    ("detection/_patterns.py", "detection/test_gaps.py"): [
+    ("detection/_mahalanobis.py", "detection/test_gaps.py"): [
         ("distances in few modes", "here, there = 2 / (9 * n_present)", "here, there = 2 / (8 * n_present)"),
         ("factors of patterns", "-line - _effects(", "-line - 0 * _effects("),
         ("factors of one pattern", "np.where(same.any(axis=1), same @ self.by_pattern, 1.0)", "1.0"),
@@ -304,13 +304,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_mahalanobis.py", "detection/test_thresholds.py"): [
         ("records that a covariance estimator learns from", "clone(self.covariance).fit(others)", "self.covariance_"),
     ],
-    ("residuals/neighbourhoods.py", "detection/test_thresholds.py"): [
+    ("residuals/folds.py", "detection/test_thresholds.py"): [
         ("size of a neighbourhood", "REACH = 2 ", "REACH = 1 "),
         ("neighbours in time", "np.median(steps)", "1.0"),
         ("mean of the others", "mean = -range_sums(", "mean = range_sums("),
         ("neighbours of a block", "before[stop] == before[first]", "~chosen[self.order]"),
     ],
-    ("residuals/neighbourhoods.py", "detection/test_outlier.py"): [
+    ("residuals/folds.py", "detection/test_outlier.py"): [
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
@@ -320,10 +320,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be evaluated", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
-    ("detection/_thresholds.py", "detection/test_thresholds.py"): [
+    ("detection/_base.py", "detection/test_thresholds.py"): [
         ("rank of the threshold", "(len(ordered) + 1 / share)", "len(ordered)"),
     ],
-    ("residuals/local_covariance.py", "detection/test_local_covariance.py"): [
+    ("residuals/spread.py", "detection/test_local_covariance.py"): [
         ("neighbours in time", ">= self.near", ">= 0"),
         ("likelihood of a smoothing", "(white**2).sum() + log_determinants.sum()", "(white**2).sum()"),
         ("weight of all records", "filled + pseudo * prior.ravel()) / (counts + pseudo)", "filled) / counts"),
@@ -332,16 +332,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),
         ("unknown weather", "len(self.covariances) - 1)", "0)"),
     ],
-    ("detection/_laws.py", "detection/test_windowed_alarm.py"): [
+    ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
         ("correlation in a window", "sums**2 - squares", "sums**2"),
         ("variance of a mean", "self.correlation * counts**2", "self.correlation * counts"),
         ("records of a partial window", "self.m * count / self.n", "self.m"),
-    ],
-    ("detection/_windows.py", "detection/test_windowed_alarm.py"): [
         ("records before a run of windows", "before = self.first[start]", "before = start"),
         ("edge of a window of time", 'side="right"', 'side="left"'),
-    ],
-    ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
         ("periods of windows", "baseline.away_from(np.isin(np.arange(n_rows), fold))", "np.arange(n_rows)"),
         ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
@@ -363,7 +359,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_estimators/threads.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
-    ("residuals/scatter.py", "surrogate/test_scatter.py"): [
+    ("residuals/baseline.py", "surrogate/test_scatter.py"): [
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
         ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],

@@ -1,10 +1,13 @@
-"""The part that all damage detectors share: threshold, scores and alarms."""
+"""The part that all damage detectors share: threshold, scores and alarms, and where their columns come from."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Self, overload
+from weakref import finalize
 
 import numpy as np
 import pandas as pd
@@ -16,12 +19,12 @@ from skthermo._estimators.warnings import explain_rows, explained_rows, warn_eac
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import Table, frame_like, row_times
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
-from skthermo.detection._origin import log_volumes, mean_log_density
-from skthermo.detection._thresholds import warn_of_blindness
-from skthermo.exceptions import UnevaluatedRowsWarning
+from skthermo.exceptions import FewRecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing import set_aside
 
 OF_ORDER = {"repeated-stamps", "unsorted-stamps"}  # which only what looks at earlier records depends on
+FEWEST_INDEPENDENT = 50  # baseline records, from which one baseline's rate of false alarms is close to the mean
+FAR_ABOVE = 2.5  # times as far from the median of a baseline's own indices as their quantile is
 
 
 class DamageDetector(OutlierMixin, Estimator, ABC):
@@ -70,6 +73,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
+    _seen_at: Callable[[float], str] | None = None
+    """Hook: text that says which shift has a threshold as its damage index; with it, `fit` checks its threshold."""
 
     def __init__(self, contamination: float = 0.02):
         self.contamination = contamination
@@ -99,14 +104,6 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     @abstractmethod
     def _index(self, F: Any) -> Array:
         """Damage index of rows; higher is more damaged, NaN where there is none."""
-
-    def _own_index(self, F: Any) -> Array:
-        """Hook: damage index of the baseline as of any rows, beside which the threshold is checked; by default none."""
-        return np.empty(0)
-
-    def _seen_at(self, threshold: float) -> str:
-        """Hook: which shift has the threshold as its damage index, as text."""
-        return ""
 
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         """Why some rows have no damage index."""
@@ -155,7 +152,8 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
-        warn_of_blindness(self._own_index(records), self.threshold_, self.contamination, self._seen_at)
+        if self._seen_at is not None:
+            self._warn_of_blindness(self._index(records))
         return self
 
     @overload
@@ -273,8 +271,26 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         """
         check_is_fitted(self)
         F = self._validated(X, reset=False, order="C")
-        densities = self._log_densities(F) + log_volumes(X)
+        origin = origin_of(X)
+        densities = self._log_densities(F) + (0.0 if origin is None else origin.log_volumes())
         return mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
+
+    def _warn_of_blindness(self, own: Array) -> None:
+        """Warn if the threshold is far above the indices that the detector gives its own baseline."""
+        own = own[~np.isnan(own)]
+        if not own.size:
+            return
+        middle, suggested = np.quantile(own, [0.5, 1 - self.contamination])
+        if self.threshold_ - middle > FAR_ABOVE * (suggested - middle):
+            warn_user(
+                f"the threshold is {self.threshold_:.3g}. It is more than {FAR_ABOVE:g} times as far from the median "
+                f"of the baseline's own indices as {suggested:.3g}, which {self.contamination:.2g} of them exceed. The "
+                "baseline has few records, records that depend on each other, or outliers"
+                f"{self._seen_at(self.threshold_)}. Give a longer baseline, or one without outliers; "
+                "threshold='quantile' takes the lower value, with more false alarms",
+                FewRecordsWarning,
+                "high-threshold",
+            )
 
     def _warn_of_not_evaluated(self, X: Any, rows: NDArray[np.bool_]) -> None:
         first = int(rows.argmax())
@@ -285,3 +301,113 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             UnevaluatedRowsWarning,
             "not-evaluated",
         )
+
+
+def conformal_threshold(
+    index: Array, contamination: float, share: float = 1.0, what: str = "records", n_independent: float | None = None
+) -> float:
+    """The ceil((n + 1)(1 - contamination))-th smallest index, which a new one exceeds with that probability at most.
+
+    Each index comes from a detector that was not fitted on its record; NaN is left out. ``share`` is the number of
+    independent records for each record by which the rank is chosen, where they depend on their neighbours in time;
+    ``n_independent`` the number of which warnings speak (by default that of the rank).
+    """
+    ordered = np.sort(index[~np.isnan(index)])
+    n_independent = share * len(ordered) if n_independent is None else n_independent
+    rank = int(np.ceil((len(ordered) + 1 / share) * (1 - contamination) - 1e-9))
+    threshold = float(ordered[min(rank, len(ordered)) - 1])
+    if threshold == np.inf:
+        raise ValueError(
+            f"{len(ordered)} baseline rows are too few for their number of modes: some single row decides alone "
+            "about a direction; expected more rows"
+        )
+    if rank > len(ordered):
+        warn_user(
+            f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a false-alarm rate of "
+            f"{contamination:.2g} (expected {np.ceil(1 / contamination - 1):.0f} or more). The threshold is the "
+            f"largest index, which later {what} exceed at a rate of about {1 / (n_independent + 1):.2g}. Give a longer "
+            "baseline, or a higher contamination",
+            FewRecordsWarning,
+            "few-baseline-records",
+        )
+    elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
+        warn_user(
+            f"the {len(ordered)} baseline {what} depend on each other in time and count as {n_independent:.0f} "
+            f"independent ones (expected {FEWEST_INDEPENDENT} or more). On average over such baselines, false alarms "
+            f"are {contamination:.2g} of the records; after this one, they may be several times as many. Give a longer "
+            "baseline, or a regression whose residuals depend less on each other",
+            FewRecordsWarning,
+            "few-baseline-records",
+        )
+    return threshold
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What relative changes of frequencies make of the columns: some matrices, and which of them is that of each row.
+
+    The matrices are (n_matrices, n_columns, n_modes), ``which`` is (n_rows,).
+    """
+
+    matrices: Array
+    which: NDArray[np.intp]
+
+    @classmethod
+    def of_all(cls, matrix: Array, n_rows: int) -> Changes:
+        """The same for all rows."""
+        return cls(matrix[np.newaxis], np.zeros(n_rows, dtype=np.intp))
+
+    def of(self, rows: Any) -> Changes:
+        """Those of some rows."""
+        return Changes(self.matrices, self.which[rows])
+
+    def typical(self) -> Array:
+        """The mean over the rows, (n_columns, n_modes)."""
+        counts = np.bincount(self.which, minlength=len(self.matrices))
+        return np.einsum("k,kij->ij", counts / counts.sum(), self.matrices)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How an array was made of frequencies in Hz.
+
+    ``log_volumes`` gives the logarithms of the factors by which the volume of each row was changed, ``changes`` the
+    `Changes` of its columns. Both are computed if they are asked for.
+    """
+
+    log_volumes: Callable[[], Array]
+    changes: Callable[[], Changes]
+
+
+_origins: dict[int, tuple[tuple[int, ...], Origin]] = {}
+"""Shapes and origins of arrays by the address of their numbers, while they exist."""
+
+
+def with_origin(values: Array, origin: Origin) -> Array:
+    """The array, of which `origin_of` knows the origin while it exists."""
+    _origins[values.ctypes.data] = values.shape, origin
+    finalize(values, _origins.pop, values.ctypes.data, None)
+    return values
+
+
+def origin_of(table: Any) -> Origin | None:
+    """The origin of an array, also of a frame of it; None where no step has said it."""
+    values = np.asarray(table)
+    shape, origin = _origins.get(values.ctypes.data, (None, None))
+    return origin if shape == values.shape else None
+
+
+def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
+    """Mean over the values that are there, from the logarithm of the density of each row; NaN without any value.
+
+    A warning says so where most rows have none.
+    """
+    known = present.any(axis=1)
+    if 2 * known.sum() < len(known):
+        warn_user(
+            f"the score is of {known.sum()} of {len(known)} rows: the others have no value. Compare scores of the same "
+            "rows only",
+            UnevaluatedRowsWarning,
+            "rows-not-scored",
+        )
+    return float(densities[known].sum() / present.sum()) if known.any() else float("nan")

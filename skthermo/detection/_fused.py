@@ -12,8 +12,7 @@ from sklearn.base import clone
 from skthermo._estimators.warnings import checked_once, explain_rows, explained_rows, warnings_once
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._validation import _BaseComposition, last_step
-from skthermo.detection._base import DamageDetector
-from skthermo.detection._thresholds import conformal_threshold
+from skthermo.detection._base import DamageDetector, conformal_threshold
 
 
 class FusedDetector(DamageDetector, _BaseComposition):

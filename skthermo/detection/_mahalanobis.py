@@ -1,27 +1,34 @@
-"""Damage index and alarm by Mahalanobis distance."""
+"""Damage index and alarm by Mahalanobis distance, which means the same whichever modes a record has."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+import scipy  # which loads scipy.signal once it is used
+from numpy.typing import NDArray
 from scipy.stats import chi2
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
 
 from skthermo._estimators.warnings import warn_user, without_warnings
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, patterns
 from skthermo._validation import HasMethods, StrOptions
-from skthermo.detection._base import DamageDetector
-from skthermo.detection._patterns import PatternScale, as_if_complete
-from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.exceptions import FewRecordsWarning
-from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, modes_text
-from skthermo.residuals.neighbourhoods import Neighbourhoods
+from skthermo.residuals.folds import Neighbourhoods
+from skthermo.residuals.gaussian import Gaussian, Mask, check_invertible, check_not_empty, modes_text
 
 ROWS_AT_ONCE = 20_000  # whose distances are computed, which bounds memory
+N_SIMULATED, MOST_SIMULATED, N_NEW, START = 200, 400, 50, 200
+"""Number of simulated baselines, most records of each, new records that each evaluates, records before the first."""
 N_FOLDS = 10  # of the baseline, whose distances come from the others where there is no closed form
+CHANCE = 0.95  # groups of rows get factors only if they differ by more than chance would with this probability
+PATTERN_SHARE = 0.1  # of a pattern's rows above the level that gives its factor; alarms alone are too few for that
+FEWEST_ROWS = 50  # of a group that gets a factor of its own
 
 
 class MahalanobisDetector(DamageDetector):
@@ -126,14 +133,11 @@ class MahalanobisDetector(DamageDetector):
         if self.threshold == "chi2":
             return float(np.sqrt(chi2.isf(self.contamination, self.n_features_in_)))
         if self.threshold == "quantile":
-            return quantile_threshold(index, self.contamination)
+            return float(np.nanquantile(index, 1 - self.contamination))
         return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
 
     def _index(self, F: Array) -> Array:
         return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
-
-    def _own_index(self, F: Array) -> Array:
-        return self._index(F)
 
     def _seen_at(self, threshold: float) -> str:
         single = 1 / np.sqrt(np.diag(np.linalg.inv(self.covariance_.covariance_)))
@@ -234,3 +238,114 @@ def _fit_complete(covariance: BaseEstimator, F: Array, names: Sequence[str] | No
     fitted = clone(covariance).fit(complete)
     check_invertible(fitted.covariance_, complete, names=names)
     return fitted
+
+
+@lru_cache
+def factor_of_few(n_records: int, n_modes: int, correlation_time: float, contamination: float) -> float:
+    """What the indices of a short, dependent baseline are multiplied by, so that they are as those of new records.
+
+    Normally distributed baselines of so many records and modes are drawn, in which each mode is an autoregression of
+    first order with the given correlation time. It is the ratio of the distance that new, independent records exceed
+    at the rate asked for, on the mean over such baselines, to that which as many of a baseline's own records exceed.
+    """
+    n_drawn = min(n_records, MOST_SIMULATED)  # longer steps stand for a long baseline
+    memory = ((correlation_time - 1) / (correlation_time + 1)) ** (n_records / n_drawn)
+    rate, random = max(contamination, 1 / (n_records + 1)), np.random.RandomState(0)
+    shocks = random.standard_normal((N_SIMULATED, START + n_drawn, n_modes))
+    rows = scipy.signal.lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], shocks, axis=1)[:, START:]
+    mean = rows.mean(axis=1, keepdims=True)
+    precision = np.linalg.inv(np.einsum("rij,rik->rjk", rows - mean, rows - mean) / n_drawn)
+    new = random.standard_normal((N_SIMULATED, N_NEW, n_modes))
+    own, later = (
+        np.sqrt(np.einsum("rij,rjk,rik->ri", some - mean, precision, some - mean, optimize=True))
+        for some in (rows, new)
+    )
+    return float(np.quantile(later / np.quantile(own, 1 - rate, axis=1)[:, np.newaxis], 1 - rate))
+
+
+def as_if_complete(distances: Array, n_present: Array, n_modes: int) -> Array:
+    """Distance in ``n_modes`` dimensions that a normal record exceeds as often as its own in ``n_present``.
+
+    By the approximation of Wilson and Hilferty: the cube root of a chi-square number is nearly normal.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        here, there = 2 / (9 * n_present), 2 / (9 * n_modes)
+        normal = (np.cbrt(distances**2 / n_present) - (1 - here)) / np.sqrt(here)
+        squared = n_modes * (1 - there + normal * np.sqrt(there)) ** 3
+        mapped = np.sqrt(squared)
+    return np.where(n_present == n_modes, distances, np.where(n_present == 0, np.nan, mapped))
+
+
+@dataclass(frozen=True)
+class PatternScale:
+    """Factors that make the indices of every pattern of missing modes exceed one threshold equally often.
+
+    A pattern's factor is that of all rows with as many modes, at the threshold, times its own, at the highest tenth of
+    its rows. Both are drawn to 1 as far as groups differ no more than by chance. Complete rows have the factor 1.
+    """
+
+    by_number: Array
+    masks: Mask
+    by_pattern: Array
+
+    @classmethod
+    def of(cls, index: Array, present: Mask, contamination: float) -> PatternScale:
+        """Learned from the indices of a baseline."""
+        known = np.isfinite(index)
+        index, present = index[known], present[known]
+        by_number = _factors(index, present.sum(axis=1), present.shape[1] + 1, contamination, trend=True)
+        masks, of_row = patterns(present)
+        by_pattern = _factors(
+            index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, PATTERN_SHARE)
+        )
+        scale = cls(by_number, masks, by_pattern)
+        complete = scale._raw(np.ones((1, present.shape[1]), dtype=bool))[0]
+        return cls(by_number / complete, masks, by_pattern)
+
+    def __call__(self, present: Mask) -> Array:
+        """Factors of rows, by which of their modes are there."""
+        masks, of_row = patterns(present)
+        return self._raw(masks)[of_row]
+
+    def _raw(self, masks: Mask) -> Array:
+        same = (masks[:, np.newaxis] == self.masks).all(axis=2)
+        return self.by_number[masks.sum(axis=1)] * np.where(same.any(axis=1), same @ self.by_pattern, 1.0)
+
+
+def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float, *, trend: bool = False) -> Array:
+    """Factors that make the groups exceed one level equally often, 1 where a group is small.
+
+    With ``trend``, they are drawn to a straight line over the numbers of the groups.
+    """
+    counts = np.bincount(group, minlength=n_groups)
+    large = np.flatnonzero(counts >= max(FEWEST_ROWS, 1 / share))
+    if len(large) < 2:
+        return np.ones(n_groups)
+    logs = np.log(index)
+    values = np.array([np.quantile(logs[group == one], 1 - share) for one in large])
+    low, high = 1 - min(2 * share, 0.9), 1 - share / 2
+    steepness = np.diff(np.quantile(logs, [low, high]))[0] / (high - low)
+    factors = np.ones(n_groups)
+    variances = share * (1 - share) * steepness**2 / counts[large]
+    line = _line(large, values, variances) if trend else 0.0
+    factors[large] = np.exp(-line - _effects(values - line, variances))
+    return factors
+
+
+def _line(numbers: Array, values: Array, variances: Array) -> Array:
+    """Differences from the mean on a straight line, shrunk; zero if chance may have caused them."""
+    weights = 1 / variances
+    x = numbers - np.average(numbers, weights=weights)
+    information = (weights * x * x).sum()
+    slope = (weights * x * values).sum() / information
+    evidence = slope**2 * information
+    return slope * (1 - 1 / evidence) * x if evidence > chi2.ppf(CHANCE, 1) else np.zeros(len(x))
+
+
+def _effects(values: Array, variances: Array) -> Array:
+    """Differences from the mean, shrunk as in a random-effects model; zero if chance may have caused them."""
+    weights = 1 / variances
+    differences = values - np.average(values, weights=weights)
+    excess = (weights * differences**2).sum() - chi2.ppf(CHANCE, len(values) - 1)
+    between = max(excess / (weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
+    return differences * between / (between + variances)

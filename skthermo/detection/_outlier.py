@@ -15,9 +15,8 @@ from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import column_names
 from skthermo._tables.text import listed
 from skthermo._validation import HasMethods, Interval, StrOptions
-from skthermo.detection._base import DamageDetector
-from skthermo.detection._thresholds import conformal_threshold, quantile_threshold
-from skthermo.residuals.neighbourhoods import Neighbourhoods
+from skthermo.detection._base import DamageDetector, conformal_threshold
+from skthermo.residuals.folds import Neighbourhoods
 
 N_FOLDS = 5  # of the baseline, each evaluated by a clone that was fitted on the others
 
@@ -134,7 +133,7 @@ class OutlierDetector(DamageDetector):
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "quantile":
-            return quantile_threshold(index, self.contamination)
+            return float(np.nanquantile(index, 1 - self.contamination))
         return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
 
     def _index(self, F: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from skthermo.detection._detectability import Detectability, JoinedTests, Tail
+from skthermo.detection._directional import Detectability, JoinedTests, Tail
 
 
 def test_each_test_has_its_share_of_the_false_alarms():

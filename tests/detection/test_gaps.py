@@ -10,7 +10,7 @@ from scipy.stats import chi, multivariate_normal
 from sklearn.covariance import LedoitWolf
 
 from skthermo.detection import MahalanobisDetector
-from skthermo.detection._patterns import as_if_complete
+from skthermo.detection._mahalanobis import as_if_complete
 from skthermo.residuals.gaussian import Gaussian, patterns
 
 MEAN = np.array([4.0, 9.0, 12.0])

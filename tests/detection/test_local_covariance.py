@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from skthermo.residuals.gaussian import Gaussian
-from skthermo.residuals.local_covariance import CANDIDATES, History, LocalCovariance, Smoothing, whitened
+from skthermo.residuals.spread import CANDIDATES, History, LocalCovariance, Smoothing, whitened
 from skthermo.residuals.weather import NearestPlaces, mean_of_nearest, nearest
 from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 

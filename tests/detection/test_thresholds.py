@@ -14,10 +14,11 @@ from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
 from skthermo._tables.frames import correlation_time
 from skthermo.detection import MahalanobisDetector
-from skthermo.detection._thresholds import conformal_threshold, factor_of_few, quantile_threshold
+from skthermo.detection._base import conformal_threshold
+from skthermo.detection._mahalanobis import factor_of_few
 from skthermo.exceptions import FewRecordsWarning
+from skthermo.residuals.folds import Neighbourhoods
 from skthermo.residuals.gaussian import Gaussian
-from skthermo.residuals.neighbourhoods import Neighbourhoods
 
 REMEMBERED = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
 FAR_ABOVE = pytest.mark.filterwarnings("ignore:.*high-threshold")
@@ -82,7 +83,8 @@ def test_dependent_records_raise_the_threshold_as_if_there_were_fewer():
 
 def test_the_quantile_leaves_out_records_without_an_index():
     index = np.random.default_rng(0).random(100)
-    assert quantile_threshold(np.append(index, np.nan), 0.02) == np.quantile(index, 0.98)
+    limit = MahalanobisDetector(threshold="quantile")._limit(np.append(index, np.nan))
+    assert limit == np.quantile(index, 0.98)
 
 
 def test_an_index_with_the_probability_asked_is_exceeded_by_a_new_one():

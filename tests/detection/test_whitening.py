@@ -15,7 +15,7 @@ from sklearn.model_selection import TimeSeriesSplit
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.residuals.local_covariance import Smoothing
+from skthermo.residuals.spread import Smoothing
 from skthermo.residuals.weather import nearest
 from skthermo.surrogate import TemperatureMapper
 
@@ -40,7 +40,7 @@ def compensator(whiten="local", estimator=None, **options):
 
 
 X, LATER = campaign(), campaign(3000, 1)
-SOURCE = "skthermo.residuals.local_covariance"
+SOURCE = "skthermo.residuals.spread"
 
 
 @cache

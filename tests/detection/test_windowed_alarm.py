@@ -12,8 +12,7 @@ from scipy.signal import lfilter
 from scipy.stats import binom, chi
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
-from skthermo.detection._laws import CountLaw, MeanLaw, robust_means
-from skthermo.detection._windows import Windows
+from skthermo.detection._windowed_alarm import CountLaw, MeanLaw, Windows, robust_means
 from skthermo.metrics import time_to_detection
 
 RULES = ["mean", "m-of-n"]
