@@ -110,11 +110,12 @@ temperatures = np.linspace(-15, 35, 101)
 
 def draw_effects(ax, part):
     """Change of a stiffness with temperature: of single bridges, of the fleet and of the new girder."""
-    of_fleet = prior.effects(temperatures, families[girder][part], reference=june.mean())
+    family = families[girder][part]
+    of_fleet = prior.effects(temperatures, family, reference=june.mean())
     singles = 100 * np.expm1(of_fleet.drop(columns=["mean", "standard_deviation"]))
     lines = ax.plot(temperatures, singles, color="0.6", linewidth=0.7)
     lines[0].set_label("single bridges")
-    of_girder = mapper.effects(temperatures, part, reference=june.mean())
+    of_girder = prior.effects(temperatures, family, mapper=mapper, reference=june.mean())
     for label, effect, colour in (("fleet", of_fleet, "tab:blue"), ("new girder", of_girder, "tab:orange")):
         low, mean, high = (100 * np.expm1(effect["mean"] + k * effect["standard_deviation"]) for k in (-2, 0, 2))
         ax.fill_between(temperatures, low, high, color=colour, alpha=0.25, linewidth=0)

@@ -36,7 +36,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "scatter = covariances",
         ),
     ],
-    ("fleet/prior/_comparison.py", "fleet/prior/test_posterior.py"): [
+    ("fleet/prior/_prior.py", "fleet/prior/test_posterior.py"): [
         ("a bridge that predicts itself", " if i not in group]", "]"),
     ],
     ("datasets/_fleet_site.py", "datasets/test_fleet.py"): [

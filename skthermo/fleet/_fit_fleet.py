@@ -14,10 +14,8 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._io import with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo.exceptions import SkthermoWarning
-from skthermo.fleet._bridge import BridgeFit, seed_of, standing_of
-from skthermo.fleet._fleet import Fleet, named, warn_of_bridges
-from skthermo.fleet._storage import Storage
-from skthermo.fleet._workers import run_tasks
+from skthermo.fleet._fleet import Fleet, Storage, named, warn_of_bridges
+from skthermo.fleet._workers import BridgeFit, run_tasks, seed_of, standing_of
 from skthermo.monitoring import Monitor
 
 

@@ -1,20 +1,377 @@
-"""Work over joblib's workers, of which processes may be killed."""
+"""What workers do for one bridge, what comes back from there, and joblib's processes, which may be killed."""
 
 from __future__ import annotations
 
+import pickle
+import sys
+import time
+import traceback
+import zlib
 from collections import Counter
-from collections.abc import Generator, Hashable, Iterable, Iterator, Mapping
-from contextlib import closing
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from itertools import islice
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from joblib import Parallel, delayed, effective_n_jobs
+import joblib
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed, effective_n_jobs, parallel_config, wrap_non_picklable_objects
+from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator, clone
 
-from skthermo.fleet._bridge import Failure, by_value
+from skthermo._estimators.answers import content_of
+from skthermo._estimators.memory import identity_of
+from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.warnings import counted_warnings
+from skthermo._io import without_bars
+from skthermo._validation import seed_parts
+from skthermo.metrics import mape
+from skthermo.monitoring import Monitor, MonitorStatus
 
+SPEED = 1  # fastest compression of zlib, which adds a checksum
+LIBRARIES = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "dask", "distributed"}
+NOT_WATCHED = {
+    "state": "",
+    "last": pd.NaT,
+    "n_evaluated": 0,
+    "not_evaluated": np.nan,
+    "alarm_rate": np.nan,
+    "n_events": 0,
+    "n_open": 0,
+    "drift": np.nan,
+    "drift_group": "",
+}
+"""What is said of a bridge without a monitor."""
 MOST_LOST = 2  # processes that were killed while a task may have run in them, before it is run alone
 KILLED = ("TerminatedWorkerError", "BrokenProcessPool", "KilledWorker", "WorkerCrashedError", "OutOfMemoryError")
 WAVE = 4  # tasks for each worker of a back end that gives all results at the end
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An error of one bridge: in which stage, its type and text, and the last line of the package's or user's code."""
+
+    stage: str
+    type: str
+    message: str
+    where: str
+
+    @classmethod
+    def of(cls, stage: str, error: BaseException) -> Failure:
+        return cls(stage, type(error).__name__, str(error), _place(error))
+
+    def __str__(self) -> str:
+        return f"{self.type}: {self.message}"
+
+
+Table = ArrayLike | pd.DataFrame
+Warned = tuple[str, str, int]  # kind and text of a warning, and how often it came
+
+
+@dataclass(frozen=True)
+class BridgeOutcome:
+    """All that is known of a bridge, fitted or not, beside its fitted objects, which are bytes.
+
+    ``content`` identifies the records, estimator and versions by which it was fitted.
+    """
+
+    name: Hashable
+    content: str = ""
+    is_fitted: bool = False
+    facts: dict[str, float] = field(default_factory=dict)
+    standing: dict[str, Any] = field(default_factory=lambda: dict(NOT_WATCHED))
+    events: pd.DataFrame | None = None
+    status: MonitorStatus | None = None  # at the time of the newest record
+    warnings: tuple[Warned, ...] = ()
+    late_warnings: tuple[Warned, ...] = ()  # of the last update
+    failures: tuple[Failure, ...] = ()
+    seconds: float = 0.0
+    n_bytes: float = 0
+
+    def status_at(self, now: Any, max_age: Any) -> MonitorStatus:
+        """How the bridge is at a time; after an error nothing is known of its newest records."""
+        error = "; ".join(str(failure) for failure in self.failures)
+        if self.status is None or not self.is_fitted:
+            return MonitorStatus("not evaluated", error or "there is no monitor").at(now)
+        status = self.status.at(now, max_age=max_age)
+        if not error:
+            return status
+        return replace(status, state="alarm" if status.state == "alarm" else "not evaluated", reason=error)
+
+    @property
+    def is_watched(self) -> bool:
+        return self.events is not None
+
+
+class Result(NamedTuple):
+    """What a worker sends back: fitted objects as bytes where they are new, and evaluations of new records."""
+
+    outcome: BridgeOutcome
+    fitted: bytes | None = None
+    answers: pd.DataFrame | None = None
+    is_as_before: bool = False
+
+
+@dataclass(frozen=True)
+class BridgeFit:
+    """A bridge to be fitted, unless that has been done with the same content before (``known``)."""
+
+    name: Hashable
+    maker: BaseEstimator | Callable[[], BaseEstimator]
+    records: Any
+    monitor: Callable[[BaseEstimator], Monitor] | None
+    seed: int
+    known: BridgeOutcome | None
+
+    def __call__(self) -> Result:
+        """What was found, and fitted objects as bytes; those of what is known stay as they were."""
+        start, stage, outcome = time.perf_counter(), "records", BridgeOutcome(self.name)
+        with _on_its_own() as counts:
+            try:
+                T, F = pair(call(self.records), self.name)
+                outcome = replace(outcome, facts=_facts(T, F))
+                stage = "maker"
+                estimator = clone(call(self.maker))
+                seed_parts(estimator, np.random.RandomState(self.seed))
+                content = identity_of(joblib.__version__, *map(content_or_code, (estimator, T, F, self.monitor)))
+                if self.known is not None and self.known.content == content:
+                    return Result(self.known, is_as_before=True)
+                outcome, stage = replace(outcome, content=content), "fit"
+                chain = estimator.fit(T, F)
+                outcome = replace(outcome, facts=outcome.facts | {"mape": _error(chain, T, F)})
+                outcome, watch = self._watched(outcome, chain, T, F)
+                stage = "saving"
+                fitted = pickled((chain, watch))
+                outcome = replace(outcome, is_fitted=True, n_bytes=len(fitted))
+            except (Exception, SystemExit) as error:
+                failure, fitted = Failure.of(stage, error), None
+                if not outcome.content:
+                    return self.lost(failure, outcome.facts, warned(counts))
+                outcome = BridgeOutcome(self.name, facts=outcome.facts, failures=(failure,))
+        return Result(replace(outcome, warnings=warned(counts), seconds=time.perf_counter() - start), fitted)
+
+    def _watched(
+        self, outcome: BridgeOutcome, chain: BaseEstimator, T: Table, F: Table
+    ) -> tuple[BridgeOutcome, Monitor | None]:
+        """The monitor of a fitted chain; where it fails, it is tried again in the next call."""
+        if self.monitor is None:
+            return outcome, None
+        try:
+            monitor = _watching(self.monitor(chain), self.seed, T, F)
+            return replace(outcome, **known_of(monitor)), monitor
+        except (Exception, SystemExit) as error:
+            return replace(outcome, content="", failures=(Failure.of("monitor", error),)), None
+
+    def lost(
+        self, failure: Failure, facts: dict[str, float] | None = None, warnings: tuple[Warned, ...] = ()
+    ) -> Result:
+        """What is known if the records or the estimator cannot be had: what was fitted before, not evaluated any
+        more."""
+        if self.known is not None and self.known.is_fitted:
+            return Result(not_evaluated(self.known, failure, warnings))
+        return Result(BridgeOutcome(self.name, facts=facts or {}, failures=(failure,), warnings=warnings))
+
+
+@dataclass(frozen=True)
+class BridgeUpdate:
+    """New records for the monitor of a bridge."""
+
+    name: Hashable
+    outcome: BridgeOutcome
+    records: Any
+    storage: Any
+    fitted: bytes = b""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What travels to a worker: fitted objects are read when it is its turn, and once if it travels on."""
+        fitted = self.fitted if self.storage is None else self.storage.fitted(self.name)
+        return vars(self) | {"storage": None, "fitted": fitted}
+
+    def __call__(self) -> Result:
+        """What is known now, fitted objects as bytes, and evaluations."""
+        stage = "new records"
+        with _on_its_own() as counts:
+            try:
+                new = call(self.records)
+                new = joined(*new) if isinstance(new, tuple) else new
+                stage = "update"
+                chain, monitor = unpickled(self.fitted or self.storage.fitted(self.name))
+                if monitor is None:
+                    raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
+                answers = monitor.update(new)
+                fitted = pickled((chain, monitor))
+                known = known_of(monitor)
+            except (Exception, SystemExit) as error:
+                return self.lost(Failure.of(stage, error), warned(counts))
+        known |= {"failures": (), "late_warnings": warned(counts), "n_bytes": len(fitted)}
+        return Result(replace(self.outcome, **known), fitted, _answers(self.name, answers))
+
+    def lost(self, failure: Failure, warnings: tuple[Warned, ...] = ()) -> Result:
+        """The bridge as it was, with one row that says why no new record is evaluated."""
+        failure = replace(failure, stage="new records" if failure.stage == "new records" else "update")
+        return Result(not_evaluated(self.outcome, failure, warnings), None, _no_answer(self.name, failure))
+
+
+def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warned, ...] = ()) -> BridgeOutcome:
+    """The bridge as it was; it is not healthy, because nothing is known of it."""
+    standing = dict(outcome.standing)
+    if outcome.is_watched:
+        standing["state"] = "alarm" if standing["state"] == "alarm" else "not evaluated"
+    return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
+
+
+@contextmanager
+def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
+    """Work of one bridge: one core, no bar, its own warnings."""
+    with ExitStack() as stack:
+        stack.enter_context(parallel_config("sequential"))
+        stack.enter_context(single_blas_thread())
+        stack.enter_context(without_bars())
+        yield stack.enter_context(counted_warnings())
+
+
+def call(given: Any) -> Any:
+    """What a function or a class gives; anything else is given as it is. Estimators are no functions."""
+    is_function = callable(given) and (isinstance(given, type) or not hasattr(given, "get_params"))
+    return given() if is_function else given
+
+
+def pair(records: Any, name: Hashable) -> tuple[Table, Table]:
+    """Temperatures and frequencies."""
+    if not isinstance(records, tuple | list) or len(records) != 2:
+        raise ValueError(f"records of {name!r} are {type(records).__name__!r}; expected a pair (T, F)")
+    shapes = [np.shape(table) for table in records]
+    if not all(shape and shape[0] for shape in shapes):
+        raise ValueError(
+            f"records of {name!r} have the shapes {shapes[0]} and {shapes[1]}; expected tables of temperatures and "
+            "frequencies, a row for each record"
+        )
+    return records[0], records[1]
+
+
+def joined(T: Table, F: Table) -> pd.DataFrame:
+    """Temperatures and frequencies side by side, as monitors want them."""
+    if not (isinstance(T, pd.DataFrame) and isinstance(F, pd.DataFrame) and T.index.equals(F.index)):
+        raise ValueError(
+            f"records for a monitor are {type(T).__name__} and {type(F).__name__}; expected two frames with the same "
+            "stamps"
+        )
+    return T.join(F)
+
+
+def _watching(monitor: Monitor, seed: int, T: Table, F: Table) -> Monitor:
+    if not hasattr(monitor, "update") or not hasattr(monitor, "fit"):
+        raise ValueError(f"monitor gave {type(monitor).__name__!r}; expected an unfitted Monitor")
+    seed_parts(monitor, np.random.RandomState(seed))
+    return monitor.fit(joined(T, F))
+
+
+def _facts(T: Table, F: Table) -> dict[str, float]:
+    missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
+    return {"n_records": len(F), "gaps": float(missing.mean()) if missing.size else np.nan}
+
+
+def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
+    report = getattr(chain, "report_", None)
+    errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
+    return float(np.mean(errors))
+
+
+def known_of(monitor: Monitor) -> dict[str, Any]:
+    """What an outcome holds of a monitor."""
+    status = monitor.status(monitor.last_)
+    return {"standing": standing_of(monitor), "events": monitor.events_, "status": status}
+
+
+def standing_of(monitor: Monitor) -> dict[str, Any]:
+    """What a monitor says of its bridge."""
+    days, events, drift = monitor.days_, monitor.events_, monitor.drift_
+    damage = events[events["kind"] == "damage"]
+    n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
+    standing = NOT_WATCHED | {
+        "state": monitor.state(),
+        "last": monitor.last_ if len(monitor.records_) else pd.NaT,
+        "n_evaluated": n_evaluated,
+        "not_evaluated": 1 - n_evaluated / n_records if n_records else np.nan,
+        "alarm_rate": days["n_alarms"].sum() / n_evaluated if n_evaluated else np.nan,
+        "n_events": len(damage),
+        "n_open": int(damage["end"].isna().sum()),
+    }
+    certain = drift[drift["significant"]] if drift is not None else []
+    if len(certain):
+        group = certain["change"].abs().idxmax()
+        standing |= {"drift": float(certain.loc[group, "change"]), "drift_group": str(group)}
+    return standing
+
+
+def _answers(name: Hashable, evaluations: pd.DataFrame) -> pd.DataFrame:
+    table = evaluations.rename_axis("time").reset_index()
+    table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
+    return table
+
+
+def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
+    row = {
+        "bridge": name,
+        "time": pd.NaT,
+        "state": "not evaluated",
+        "index": np.nan,
+        "reason": str(failure),
+        "event": 0,
+    }
+    return pd.DataFrame([row | {"revised": False}])
+
+
+def warned(counts: Counter[tuple[str, str]]) -> tuple[Warned, ...]:
+    """Kind, text and number of warnings, in the order in which they first came."""
+    return tuple((kind, text, times) for (kind, text), times in counts.items())
+
+
+def pickled(fitted: Any) -> bytes:
+    """Fitted objects as bytes, also if they hold functions of a notebook."""
+    return zlib.compress(by_value(fitted), SPEED)
+
+
+def unpickled(content: bytes) -> Any:
+    """Fitted objects from bytes."""
+    return pickle.loads(zlib.decompress(content))
+
+
+def by_value(thing: Any) -> bytes:
+    """Bytes of an object, with the code of functions that no module holds."""
+    return pickle.dumps(wrap_non_picklable_objects(thing, keep_wrapper=False))
+
+
+def seed_of(base: int, name: Hashable) -> int:
+    """The seed of a bridge, whatever the others are."""
+    return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
+
+
+def content_or_code(part: Any) -> str:
+    """A text that is another one for another content; functions of scripts and notebooks count with their code."""
+    code = by_value(part)
+    if b"__main__" not in code:
+        try:
+            return content_of(part)
+        except pickle.PicklingError:  # a function within a function
+            pass
+    return content_of(code)
+
+
+def _place(error: BaseException) -> str:
+    """File, line and function of the last line in the package or in the user's code."""
+    frames = list(traceback.walk_tb(error.__traceback__))
+    packages = [str(frame.f_globals.get("__name__", "")).partition(".")[0] for frame, _ in frames]
+    foreign = LIBRARIES | sys.stdlib_module_names
+    own = [one for one, package in zip(frames, packages, strict=True) if package not in foreign]
+    if not own:
+        return ""
+    frame, line = own[-1]
+    return f"{Path(frame.f_code.co_filename).name}:{line} in {frame.f_code.co_name}"
 
 
 def run_tasks(tasks: Mapping[Hashable, Any], n_jobs: int | None) -> Iterator[tuple[Hashable, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -73,7 +73,7 @@ class Scatter:
         of_fold = residuals.less_similar(residuals.values)
         own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
         n_records = (~np.isnan(own)).sum(axis=0)
-        found = covariances(own, of_fold, int(np.clip(len(own) // 4, 2, MOST_LAGS)))
+        found = lagged_covariances(own, of_fold, range(int(np.clip(len(own) // 4, 2, MOST_LAGS))))
         known = np.flatnonzero((n_records >= FEWEST) & (np.diag(found[0]) > 0))
         parts, memory = np.zeros((2, *found[0].shape)), 0.0
         if known.size:
@@ -129,14 +129,14 @@ class Scatter:
         return self.parts * np.array([weights.T @ weights, weights.T @ (before + after - weights)])
 
 
-def covariances(first: Array, second: Array, n_lags: int) -> Array:
-    """Mean products of columns 0, 1, ... records apart, (n_lags, n_modes, n_modes), over pairs that are known."""
+def lagged_covariances(first: Array, second: Array, lags: Sequence[int]) -> Array:
+    """Mean products of columns some records apart, (n_lags, n_modes, n_modes), over pairs that are known."""
     known = [(~np.isnan(table)).astype(float) for table in (first, second)]
     filled = [np.nan_to_num(table) for table in (first, second)]
-    found = np.empty((n_lags, first.shape[1], first.shape[1]))
-    for lag in range(n_lags):
+    found = np.empty((len(lags), first.shape[1], first.shape[1]))
+    for place, lag in enumerate(lags):
         sums, pairs = (a[lag:].T @ b[: len(b) - lag] + b[lag:].T @ a[: len(a) - lag] for a, b in (filled, known))
-        found[lag] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
+        found[place] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
     return found
 
 

@@ -363,9 +363,8 @@ class WeatherFunctions:
     def of(cls, weather: Array) -> WeatherFunctions:
         """The functions for records, (n_records, n_inputs), without gaps in those that count."""
         known = weather[~np.isnan(weather).any(axis=1)]
-        scaler, components = (step for _, step in weather_coordinates(known).steps)
-        directions = components.components_[:MOST_COORDINATES] / scaler.scale_
-        centre = scaler.mean_ + components.mean_ * scaler.scale_
+        centre, directions = weather_axes(known)
+        directions = directions[:MOST_COORDINATES]
         spread = ((known - centre) @ directions.T).std(axis=0)
         directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
         places = (known - centre) @ directions.T
@@ -386,9 +385,21 @@ class WeatherFunctions:
         return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
 
 
-def weather_coordinates(weather: Array) -> Pipeline:
+def weather_coordinates(weather: Array, explained: float = EXPLAINED) -> Pipeline:
     """Principal components of the standardised weather, in which similar records are near each other."""
-    return make_pipeline(StandardScaler(), PCA(EXPLAINED)).fit(weather)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of weather that is always the same
+        return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
+
+
+def weather_axes(weather: Array, explained: float = EXPLAINED) -> tuple[Array, Array]:
+    """The middle of the weather, (n_inputs,), and its principal directions per degree, (n_coordinates, n_inputs).
+
+    A direction has the sign that does not depend on rounding where two inputs weigh alike.
+    """
+    scaler, components = (step for _, step in weather_coordinates(weather, explained).steps)
+    vectors = components.components_
+    signs = np.where(vectors @ np.linspace(2, 1, vectors.shape[1]) < 0, -1.0, 1.0)
+    return scaler.mean_ + components.mean_ * scaler.scale_, signs[:, np.newaxis] * vectors / scaler.scale_
 
 
 class NearestPlaces:

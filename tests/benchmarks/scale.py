@@ -39,8 +39,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_fleet, make_truss
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.fleet import Fleet
-from skthermo.fleet._bridge import BridgeOutcome, known_of, pickled
-from skthermo.fleet._storage import Storage
+from skthermo.fleet._fleet import Storage
+from skthermo.fleet._workers import BridgeOutcome, known_of, pickled
 from skthermo.monitoring import Monitor
 from skthermo.plotting import DamageIndexDisplay, MonitorDisplay, PredictionDisplay
 from skthermo.preprocessing import (

@@ -24,7 +24,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fleet import Fleet, fit_fleet
-from skthermo.fleet._bridge import by_value
+from skthermo.fleet._workers import by_value
 from skthermo.monitoring import Monitor
 
 MODES = ["f1", "f2"]

@@ -1,4 +1,4 @@
-"""What the records of a bridge tell of its response to the weather, and of their noise."""
+"""Functions of the weather of a fleet, and what the records of a bridge tell of its response and noise."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from skthermo._tables.arrays import Array, rows_by_pattern
+from skthermo._tables.arrays import Array, piecewise_linear, rows_by_pattern
 from skthermo._tables.frames import correlation_time
-from skthermo.fleet.prior._basis import FleetBasis
-from skthermo.fleet.prior._posterior import OwnPrior, posterior
+from skthermo.fleet.prior._posterior import CoefficientPosterior, OwnPrior
 from skthermo.fleet.prior._records import BridgeRecords
 from skthermo.preprocessing import HampelFilter
+from skthermo.residuals.baseline import lagged_covariances
 from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.weather import weather_axes
 
+SMALLEST = 1e-5  # share of the variance of the inputs that is left out
+BREAKING = 0.02  # share from which lines in a component break
 ROUNDS = 4  # of noise and coefficients in turn
 USUAL = 0.99  # share of the records, if normal, that count in full; others the less the farther away they are
 PSEUDO_ROWS = 20.0  # independent records as which the noise of the fleet counts beside that of a new bridge
@@ -24,6 +27,49 @@ FAR_IN_TIME = 1e-3  # weight of such a row before it is known whether the weathe
 LEAST_LEFT = 0.25  # share of the records that regression leaves to the noise, at least
 SMALLEST_VARIANCE = 1e-18  # of ln y
 JITTER = 1e-9  # share of its variance that each output has of its own
+
+
+@dataclass(frozen=True)
+class FleetBasis:
+    """Principal components of the inputs, and piecewise-linear functions of the largest, of zero mean in the fleet.
+
+    The lines break at quantiles of the weather of all bridges and have unit variance there. Beyond the weather of the
+    fleet they go on straight.
+    """
+
+    middle: Array
+    components: Array
+    knots: Array
+    centre: Array
+    scale: Array
+
+    @classmethod
+    def of(cls, weather: Array, n_knots: int) -> FleetBasis:
+        """The basis for weather, (n_samples, n_inputs) without gaps."""
+        middle, components = weather_axes(weather, 1 - SMALLEST)
+        places = (weather - middle) @ components.T
+        shares = places.var(axis=0)
+        n_breaking = max(int((shares > BREAKING * shares.sum()).sum()), 1)
+        knots = np.quantile(places[:, :n_breaking], np.linspace(0, 1, n_knots + 2)[1:-1], axis=0)
+        plain = cls(middle, components, knots, np.zeros(1), np.ones(1))
+        lines = plain(weather)
+        scale = np.where(np.arange(lines.shape[1]) < places.shape[1], 1.0, np.maximum(lines.std(axis=0), 1e-12))
+        return replace(plain, centre=lines.mean(axis=0), scale=scale)
+
+    @property
+    def n_functions(self) -> int:
+        return len(self.scale)
+
+    def steady(self, temperatures: Array) -> Array:
+        """The functions where all inputs have been at one temperature for long."""
+        return self(np.repeat(temperatures[:, np.newaxis], len(self.middle), axis=1))
+
+    def __call__(self, inputs: Array) -> Array:
+        """The functions at rows of complete inputs, (n_samples, n_functions)."""
+        places = (inputs - self.middle) @ self.components.T
+        n_breaking = self.knots.shape[1]
+        lines = piecewise_linear(places[:, :n_breaking], self.knots)[:, n_breaking:]
+        return (np.hstack([places, lines]) - self.centre) / self.scale
 
 
 @dataclass(frozen=True)
@@ -151,7 +197,7 @@ class Information:
         noise = RowNoise.before(y, expected, memory)
         for _ in range(ROUNDS):
             found = cls.given(noise, records, X, y, level, centre)
-            state = posterior(found.J, found.h, *own.fitted(found.J, found.h, families))
+            state = CoefficientPosterior(found.J, found.h, *own.fitted(found.J, found.h, families))
             dof = 1 + np.einsum("ij,ji->", found.J, state.covariance) / q
             left = y - X[:, 1:] @ state.mean.reshape(q, -1).T
             noise = noise.updated(left, records.weights, dof, expected, memory)
@@ -195,12 +241,12 @@ class Information:
 
 def slow_variance(residuals: Array, step: float) -> Array:
     """Mean autocovariance of columns over some days, which noise has forgotten, and weather has not."""
-    found = []
-    for days in SLOW_DAYS:
-        lag = max(round(days / step), 1)
-        products = residuals[lag:] * residuals[:-lag]
-        found.append(_mean(products) if len(products) > FEWEST else np.zeros(residuals.shape[1]))
-    return np.mean(found, axis=0)
+    lags = [max(round(days / step), 1) for days in SLOW_DAYS]
+    lags = [lag for lag in lags if len(residuals) - lag > FEWEST]
+    if not lags:
+        return np.zeros(residuals.shape[1])
+    found = lagged_covariances(residuals, residuals, lags)
+    return np.diagonal(found, axis1=1, axis2=2).sum(axis=0) / len(SLOW_DAYS)
 
 
 def _mean(values: Array, weights: Array | None = None) -> Array:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._tables.arrays import Array, as_columns, check_flag
+from skthermo._tables.arrays import Array, as_columns, check_flag, spread_evenly
 from skthermo._tables.frames import (
     check_same_rows,
     column_names,
@@ -20,23 +20,25 @@ from skthermo._tables.frames import (
     row_weights,
 )
 from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
-from skthermo.fleet.prior._basis import FleetBasis, steady_changes
-from skthermo.fleet.prior._covariates import Covariates
-from skthermo.fleet.prior._families import CoefficientFamily, Member
-from skthermo.fleet.prior._information import FleetNoise, Information
+from skthermo.fleet.prior._families import CoefficientFamily, Covariates, Member
+from skthermo.fleet.prior._information import FleetBasis, FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import set_aside
 from skthermo.residuals.weather import TrainingRange, parts, warn_of_implausible
 
+ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
 ALLOWED = ("no-rows", "stuck-sensor", "implausible-values", "constant")  # findings in rows of any order, of any inputs
 
 
 @dataclass(frozen=True)
 class FleetKnowledge:
-    """Functions of the weather, noise, and the prior of coefficients, on a bridge's own and by pooled families."""
+    """Functions of the weather, noise, and the prior of coefficients, on a bridge's own and by pooled families.
+
+    ``inputs`` are the names of those of the fleet, None where they have none.
+    """
 
     basis: FleetBasis
     noise: FleetNoise | None
@@ -45,11 +47,12 @@ class FleetKnowledge:
     families: Mapping[Hashable, CoefficientFamily] = field(default_factory=dict)
     chances: Mapping[Hashable, float] = field(default_factory=dict)
     scales: Mapping[Hashable, float] = field(default_factory=dict)
+    inputs: Sequence[Hashable] | None = None
 
     @classmethod
     def none(cls, inputs: Array, n_knots: int) -> FleetKnowledge:
         """Without a fleet: functions of a bridge's own weather."""
-        basis = FleetBasis.of([inputs], n_knots)
+        basis = FleetBasis.of(pooled_weather([inputs]), n_knots)
         return cls(basis, None, OwnPrior(np.ones(basis.n_functions)))
 
     def posterior(
@@ -187,7 +190,8 @@ class FleetMapper(RegressorMixin, Estimator):
         self.coefficients_, self.covariance_ = with_levels(found, state)
         self.misfit_ = (FleetNoise() if known.noise is None else known.noise).misfit(found, families)
         self.own_range_ = TrainingRange.of(frame_like(X, inputs), trained)
-        own, fleet = self.own_range_, known.basis.reach
+        own = self.own_range_
+        fleet = own if self.prior is None else self.prior.reach_
         lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)
         self.reach_ = TrainingRange(lowest, highest, own.names)
         return self
@@ -255,42 +259,6 @@ class FleetMapper(RegressorMixin, Estimator):
         outside = (self.own_range_.excess(inputs) > 0).any(axis=1)
         return outside & (self.reach_.excess(inputs) == 0).all(axis=1)
 
-    def effects(
-        self, temperatures: ArrayLike, name: Hashable = None, *, reference: float | None = None
-    ) -> pd.DataFrame:
-        """How ln y (y, if linear) changes from a reference temperature to others, where inputs have been so for long.
-
-        Parameters
-        ----------
-        temperatures : array-like of shape (n_temperatures,)
-            In degrees Celsius.
-        name : str, optional
-            Of the output; by default the first.
-        reference : float, optional
-            Temperature at which the change is 0; by default the middle of the bridge's own weather.
-
-        Returns
-        -------
-        DataFrame
-            On an index of temperatures: ``mean`` and ``standard_deviation`` of the posterior of the change.
-
-        Raises
-        ------
-        ValueError
-            If there is no such output.
-        """
-        check_is_fitted(self)
-        names = list(self.families_)
-        name = names[0] if name is None else name
-        if name not in names:
-            raise ValueError(f"name is {name!r}; expected one of {names}")
-        row = names.index(name)
-        values, d = steady_changes(self.basis_, temperatures, reference, self.own_range_)
-        variances = np.einsum("ti,ij,tj->t", d, self.covariance_[row, 1:, row, 1:], d)
-        columns = {"mean": d @ self.coefficients_[row, 1:], "standard_deviation": np.sqrt(variances)}
-        scale = np.nan_to_num(self.link_.scales[row], nan=1.0)
-        return scale * pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
-
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over outputs.
 
@@ -328,13 +296,13 @@ class FleetMapper(RegressorMixin, Estimator):
         if self.prior is None:
             return
         check_is_fitted(self.prior)
-        basis = self.prior.knowledge_.basis
-        if self.n_features_in_ != basis.n_inputs:
-            raise ValueError(f"X has {self.n_features_in_} inputs; expected the {basis.n_inputs} of the fleet")
-        names = getattr(X, "columns", None)
-        if names is None or basis.names is None or basis.n_inputs == 1 or list(names) == list(basis.names):
+        known = self.prior.knowledge_
+        n_inputs, names = len(known.basis.middle), getattr(X, "columns", None)
+        if self.n_features_in_ != n_inputs:
+            raise ValueError(f"X has {self.n_features_in_} inputs; expected the {n_inputs} of the fleet")
+        if names is None or known.inputs is None or n_inputs == 1 or list(names) == list(known.inputs):
             return
-        raise ValueError(f"X has the inputs {list(names)[:20]}; expected those of the fleet, {list(basis.names)[:20]}")
+        raise ValueError(f"X has the inputs {list(names)[:20]}; expected those of the fleet, {list(known.inputs)[:20]}")
 
     def _names_of(self, y: ArrayLike, n_outputs: int) -> list[Hashable]:
         """Names of the outputs, or those of the fleet in their order."""
@@ -392,3 +360,8 @@ def with_levels(found: Information, state: Mixture) -> tuple[Array, Array]:
     whole[:, 1:, :, 0] = cross.T.reshape(n_outputs, n_functions, n_outputs)
     whole[:, 1:, :, 1:] = covariance.reshape(n_outputs, n_functions, n_outputs, n_functions)
     return np.column_stack([found.level - found.gain @ b, b.reshape(n_outputs, n_functions)]), whole
+
+
+def pooled_weather(tables: Sequence[Array]) -> Array:
+    """Rows of the weather of some bridges, (n_samples, n_inputs) without gaps, in which each bridge counts alike."""
+    return np.concatenate([table[spread_evenly(np.arange(len(table)), ROWS_EACH)] for table in tables])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -38,18 +39,11 @@ class CoefficientPrior(NamedTuple):
     root: Array
 
 
-class CoefficientPosterior(NamedTuple):
-    """Log evidence, up to a constant of the records, mean and covariance of all coefficients."""
+class CoefficientPosterior:
+    """N(mean, C C') times exp(-b'J b / 2 + h'b); C is block diagonal with the roots of a `CoefficientPrior`.
 
-    evidence: float
-    mean: Array
-    covariance: Array
-
-
-class CoefficientUpdate:
-    """N(mean, C C') times exp(-b'J b / 2 + h'b); C is block diagonal with the roots.
-
-    With K = I + C'J C = L L' and e = h - J m: b ~ N(m + C K^-1 C'e, C K^-1 C').
+    With K = I + C'J C = L L' and e = h - J m: b ~ N(m + C K^-1 C'e, C K^-1 C'). ``evidence`` is its logarithm, up to a
+    constant of the records.
     """
 
     def __init__(self, J: Array, h: Array, mean: Array, root: Array):
@@ -58,32 +52,21 @@ class CoefficientUpdate:
         half = J.reshape(-1, n_outputs, n_functions).transpose(1, 0, 2) @ root  # J C by columns of outputs
         whole = root.transpose(0, 2, 1) @ half.transpose(1, 0, 2).reshape(n_outputs, n_functions, -1)
         whole = whole.reshape(J.shape)
-        self.root, self.m = root, m
-        self.L = np.linalg.cholesky(np.eye(len(m)) + (whole + whole.T) / 2)
-        e = h - J @ m
-        self.shift = cho_solve((self.L, True), self._transposed(e), check_finite=False)
-        self.evidence = float(
-            m @ h - m @ J @ m / 2 - np.log(np.diag(self.L)).sum() + self._transposed(e) @ self.shift / 2
-        )
+        self._root = root
+        self._L = np.linalg.cholesky(np.eye(len(m)) + (whole + whole.T) / 2)
+        moved = np.einsum("aij,ai->aj", root, (h - J @ m).reshape(n_outputs, -1)).ravel()  # C'e
+        shift = cho_solve((self._L, True), moved, check_finite=False)
+        self.evidence = float(m @ h - m @ J @ m / 2 - np.log(np.diag(self._L)).sum() + moved @ shift / 2)
+        self.mean = m + np.einsum("aij,aj->ai", root, shift.reshape(n_outputs, -1)).ravel()
 
-    def _transposed(self, e: Array) -> Array:
-        """C'e."""
-        return np.einsum("aij,ai->aj", self.root, e.reshape(len(self.root), -1)).ravel()
-
-    @property
-    def posterior(self) -> CoefficientPosterior:
-        """Log evidence, up to a constant of the records, mean and covariance."""
-        n_outputs, n_functions = self.root.shape[:2]
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of all coefficients."""
+        n_outputs, n_functions = self._root.shape[:2]
         transposed = np.zeros((n_outputs, n_functions, n_outputs, n_functions))
-        transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = self.root.transpose(0, 2, 1)
-        B = solve_triangular(self.L, transposed.reshape(self.L.shape), lower=True, check_finite=False)
-        shift = np.einsum("aij,aj->ai", self.root, self.shift.reshape(n_outputs, -1)).ravel()
-        return CoefficientPosterior(self.evidence, self.m + shift, B.T @ B)
-
-
-def posterior(J: Array, h: Array, mean: Array, root: Array) -> CoefficientPosterior:
-    """Log evidence, mean and covariance of a Gaussian prior times a bridge's information."""
-    return CoefficientUpdate(J, h, mean, root).posterior
+        transposed[np.arange(n_outputs), :, np.arange(n_outputs)] = self._root.transpose(0, 2, 1)
+        B = solve_triangular(self._L, transposed.reshape(self._L.shape), lower=True, check_finite=False)
+        return B.T @ B
 
 
 @dataclass(frozen=True)
@@ -107,7 +90,7 @@ class OwnPrior:
             ratios, variances = np.full(n_functions, SHAPE_COUNT), {}
             for one_J, one_h, of_output in zip(J, h, families, strict=True):
                 prior = found.fitted(one_J, one_h, of_output)
-                state = posterior(one_J, one_h, *prior)
+                state = CoefficientPosterior(one_J, one_h, *prior)
                 taus = prior.root[:, 0, 0] ** 2 / found.shape[0]
                 second = (state.mean**2 + np.diag(state.covariance)).reshape(len(of_output), n_functions)
                 ratios += (second / taus[:, np.newaxis]).sum(axis=0)
@@ -125,7 +108,7 @@ class OwnPrior:
         start = np.array([self.typical.get(family, middle) for family in families])
         count, variances = TYPICAL_COUNT if self.typical else 0.0, start
         for _ in range(STEPS):
-            found = posterior(J, h, zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * roots)
+            found = CoefficientPosterior(J, h, zeros, np.sqrt(variances)[:, np.newaxis, np.newaxis] * roots)
             scaled = np.stack([found.mean**2, np.diag(found.covariance)]).reshape(2, n_outputs, -1) / self.shape
             squares, left_open = scaled.sum(axis=2)
             known = np.maximum(n_functions - left_open / variances, JITTER)  # coefficients that the records determine
@@ -171,7 +154,7 @@ def mixture(
     pooled = [family for family in probabilities if family in families]
     chances = np.array([probabilities[family] for family in pooled])
     place = {family: i for i, family in enumerate(pooled)}
-    known: dict[tuple[bool, ...], tuple[float, CoefficientUpdate]] = {}
+    known: dict[tuple[bool, ...], tuple[float, CoefficientPosterior]] = {}
 
     def weight(flags: tuple[bool, ...]) -> float:
         """Log evidence of a combination, and its probability before any record."""
@@ -179,7 +162,7 @@ def mixture(
             is_followed = np.array([family in place and flags[place[family]] for family in families])
             mean = np.where(is_followed[:, np.newaxis], fleet.mean, own.mean)
             root = np.where(is_followed[:, np.newaxis, np.newaxis], fleet.root, own.root)
-            update = CoefficientUpdate(J, h, mean, root)
+            update = CoefficientPosterior(J, h, mean, root)
             known[flags] = log_chance(flags, chances) + update.evidence, update
         return known[flags][0]
 
@@ -189,7 +172,7 @@ def mixture(
     logs = np.array([log for log, _ in known.values()])
     total = float(logsumexp(logs))
     shares = np.exp(logs - total)
-    found = [(s, update.posterior) for s, (_, update) in zip(shares, known.values(), strict=True) if s > NEGLIGIBLE]
+    found = [(s, update) for s, (_, update) in zip(shares, known.values(), strict=True) if s > NEGLIGIBLE]
     mean = sum(share * one.mean for share, one in found)
     covariance = sum(share * (one.covariance + np.outer(one.mean - mean, one.mean - mean)) for share, one in found)
     with_family, without_family = (

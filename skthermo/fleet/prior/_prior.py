@@ -1,4 +1,4 @@
-"""A prior that a fleet of bridges gives to a new one."""
+"""A prior that a fleet of bridges gives to a new one, and whether pooling helps."""
 
 from __future__ import annotations
 
@@ -9,17 +9,27 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy.stats import t as student
 
+from skthermo._tables.arrays import Array, real_array
 from skthermo._tables.text import counted
 from skthermo._validation import Estimator, Interval, check_is_fitted
-from skthermo.fleet.prior._basis import FleetBasis, steady_changes
-from skthermo.fleet.prior._comparison import LEAST_BRIDGES, PoolingComparison
-from skthermo.fleet.prior._covariates import Covariates
-from skthermo.fleet.prior._families import Member
-from skthermo.fleet.prior._information import FleetNoise, Information
-from skthermo.fleet.prior._mapper import FleetKnowledge, FleetMapper
-from skthermo.fleet.prior._posterior import OwnPrior
+from skthermo.fleet.prior._families import CoefficientFamily, Covariates, Member, expect, learn_families
+from skthermo.fleet.prior._information import FleetBasis, FleetNoise, Information
+from skthermo.fleet.prior._mapper import FleetKnowledge, FleetMapper, pooled_weather
+from skthermo.fleet.prior._posterior import ATYPICAL, CoefficientPosterior, Mixture, OwnPrior, follow_chance, mixture
 from skthermo.fleet.prior._records import Link, bridges_of, common_inputs, families_by_name, linear_scales, read_bridge
+from skthermo.residuals.weather import TrainingRange
+
+LEAST_BRIDGES = 3
+LEAST_DEVIATION = 1.0  # of a bridge's gain: that a few are alike is chance
+LEVEL = 0.95  # probability with which a gain must be one
+COUNT = 10.0  # bridges as which it counts that few are atypical
+MOST_LEFT_OUT = 50  # bridges that are left out one at a time; of more, groups are
+FEW = 60  # bridges of which one changes little of what is known of the others: fewer take more steps without it
+FAR, FEW_MEMBERS = 3.0, 5  # times the median distance from the median: atypical, among at least so many
+SETTLED = 0.05
+ROUNDS = 3  # in which atypical are found, and the families learned without them
 
 
 class FleetPrior(Estimator):
@@ -139,7 +149,8 @@ class FleetPrior(Estimator):
             one.records(name, inputs, Link.of(self.link, own, one.values, scales))
             for (name, one), own in zip(read.items(), families, strict=True)
         ]
-        basis = FleetBasis.of([one.inputs for one in records], self.n_knots, inputs)
+        weather = pooled_weather([one.inputs for one in records])
+        basis = FleetBasis.of(weather, self.n_knots)
         plain = OwnPrior(np.ones(basis.n_functions))
         found = [Information.of(basis, one, own, plain) for one, own in zip(records, families, strict=True)]
         own = OwnPrior.of([one.J for one in found], [one.h for one in found], families, basis.n_functions)
@@ -149,13 +160,16 @@ class FleetPrior(Estimator):
             for one, of_output, z, covariance in zip(found, families, Z, unknown, strict=True)
         ]
         names = sorted({family for of_output in families for family in of_output if family is not None}, key=str)
-        compared = PoolingComparison.of(members, list(read), names, basis.covariance)
+        covariance = np.atleast_2d(np.cov(basis(weather), rowvar=False))
+        pooled, chances, self.comparison_, self.bridges_, self.coefficients_ = compare_pooling(
+            members, list(read), names, covariance
+        )
         noise = FleetNoise.of(found, families)
-        self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, compared.families, compared.probabilities, scales)
-        self.comparison_, self.bridges_ = compared.by_family, compared.by_bridge
-        self.coefficients_, self.bridge_families_ = compared.coefficients, of_bridge
+        self.knowledge_ = FleetKnowledge(basis, noise, own, encoding, pooled, chances, scales, inputs)
+        self.bridge_families_ = of_bridge
         self.parameter_names_ = list(dict.fromkeys(name for by_name in of_bridge.values() for name in by_name))
-        self.reach_ = basis.reach
+        ends = np.array([end(one.inputs, axis=0) for one in records for end in (np.min, np.max)])
+        self.reach_ = TrainingRange.of(ends if inputs is None else pd.DataFrame(ends, columns=inputs), slice(None))
         return self
 
     def mapper(
@@ -179,7 +193,12 @@ class FleetPrior(Estimator):
         return FleetMapper(self, covariates=covariates, families=families)
 
     def effects(
-        self, temperatures: ArrayLike, family: Hashable = None, *, reference: float | None = None
+        self,
+        temperatures: ArrayLike,
+        family: Hashable = None,
+        *,
+        mapper: FleetMapper | None = None,
+        reference: float | None = None,
     ) -> pd.DataFrame:
         """How ln y (y, if linear) changes from a reference temperature to others, where inputs have been so for long.
 
@@ -189,36 +208,53 @@ class FleetPrior(Estimator):
             In degrees Celsius.
         family : str, optional
             By default the first.
+        mapper : FleetMapper, optional
+            Fitted to the records of a bridge: the change of that bridge, and not of any other one.
         reference : float, optional
             Temperature at which the change is 0; by default the middle of the fleet's weather.
 
         Returns
         -------
         DataFrame
-            On an index of temperatures: ``mean`` and ``standard_deviation`` of another bridge of the fleet, of unknown
-            covariates (NaN for a family that is not pooled), and a column for each bridge with its own.
+            On an index of temperatures: ``mean`` and ``standard_deviation`` of the mapper's bridge or, without one, of
+            another bridge of the fleet, of unknown covariates (NaN for a family that is not pooled), and a column for
+            each bridge of the fleet with its own.
 
         Raises
         ------
         ValueError
-            If there is no such family.
+            If there is no such family, or the mapper's bridge has none of it.
         """
         check_is_fitted(self)
+        values = np.atleast_1d(real_array(temperatures, "temperatures"))
+        if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+            raise ValueError(f"temperatures are {temperatures!r:.100}; expected finite degrees Celsius in one row")
         family = self.comparison_.index[0] if family is None else family
         if family not in self.comparison_.index:
             raise ValueError(f"family is {family!r}; expected one of {list(self.comparison_.index)}")
-        basis, known = self.knowledge_.basis, self.knowledge_.families
-        values, d = steady_changes(basis, temperatures, reference, self.reach_)
-        columns = {"mean": np.full(len(d), np.nan), "standard_deviation": np.full(len(d), np.nan)}
-        if family in known:
-            mean, covariance = known[family].predictive(*self.knowledge_.covariates.row(None))
-            columns = {"mean": d @ mean, "standard_deviation": np.sqrt(np.einsum("ti,ij,tj->t", d, covariance, d))}
+        middle = np.mean([self.reach_.lowest, self.reach_.highest]) if reference is None else reference
+        known, at = self.knowledge_, np.append(values, middle)
+        places = known.basis.steady(at)
+        changes = own = places[:-1] - places[-1]
+        size = changes.shape[1]
+        mean, covariance = np.full(size, np.nan), np.full((size, size), np.nan)
+        if mapper is not None:
+            check_is_fitted(mapper)
+            rows = [row for row, of_output in enumerate(mapper.families_.values()) if of_output == family]
+            if not rows:
+                raise ValueError(f"family is {family!r}; expected one of the mapper's, {mapper.families_}")
+            places = mapper.basis_.steady(at)
+            own = places[:-1] - places[-1]
+            mean = mapper.coefficients_[rows, 1:].mean(axis=0)
+            covariance = mapper.covariance_[rows, 1:][:, :, rows, 1:].mean(axis=(0, 2))
+        elif family in known.families:
+            mean, covariance = known.families[family].predictive(*known.covariates.row(None))
+        columns = {"mean": own @ mean, "standard_deviation": np.sqrt(np.einsum("ti,ij,tj->t", own, covariance, own))}
         for bridge, by_name in self.bridge_families_.items():
             rows = [i for i, of_output in enumerate(by_name.values()) if of_output == family]
             if rows:
-                columns[bridge] = d @ self.coefficients_[bridge][rows].mean(axis=0)
-        scale = self.knowledge_.scales.get(family, 1.0)
-        return scale * pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
+                columns[bridge] = changes @ self.coefficients_[bridge][rows].mean(axis=0)
+        return known.scales.get(family, 1.0) * pd.DataFrame(columns, index=pd.Index(values, name="temperature"))
 
     def summary(self) -> str:
         """What the comparison says, in sentences.
@@ -243,3 +279,117 @@ class FleetPrior(Estimator):
                     "own records alone"
                 )
         return "\n".join(lines)
+
+
+def groups(n_bridges: int) -> list[list[int]]:
+    """Bridges that are left out together."""
+    n_groups = min(n_bridges, MOST_LEFT_OUT)
+    return [list(range(i, n_bridges, n_groups)) for i in range(n_groups)]
+
+
+def left_out(
+    members: Sequence[Member],
+    names: Sequence[Hashable],
+    follows: Mapping[tuple[int, Hashable], float],
+    families: Mapping[Hashable, CoefficientFamily],
+    probabilities: Mapping[Hashable, float],
+) -> list[Mixture]:
+    """Every bridge's posterior by families that are learned without it."""
+    found: dict[int, Mixture] = {}
+    moments, n_steps = expect(members, families), FEW // len(members)
+    for group in groups(len(members)):
+        kept = [i for i in range(len(members)) if i not in group]
+        others = {(place, name): follows.get((i, name), 1.0) for place, i in enumerate(kept) for name in names}
+        rest = [members[i] for i in kept]
+        known = [name for name in names if sum(name in member.families for member in rest) > 0]
+        without = learn_families(rest, known, others, [moments[i] for i in kept], n_steps)
+        for i in group:
+            member = members[i]
+            prior = member.prior(without, predictive=True)
+            chances = {name: p for name, p in probabilities.items() if name in without}
+            found[i] = mixture(member.information.J, member.information.h, member.families, prior, member.own, chances)
+    return [found[i] for i in range(len(members))]
+
+
+def compare_pooling(
+    members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
+) -> tuple[dict[Hashable, CoefficientFamily], dict[Hashable, float], pd.DataFrame, pd.DataFrame, dict[Hashable, Array]]:
+    """Pooled families, the probability of following each, tables by family and by bridge, and bridges' coefficients.
+
+    Families are learned, bridges left out, and families learned again without the weight of atypical ones.
+    """
+    probabilities = dict.fromkeys(names, 1 - ATYPICAL)
+    several = [name for name in names if sum(name in member.families for member in members) > 1]
+    follows = seem_to_follow(members, several, covariance)
+    families = learn_families(members, names, follows)
+    for _ in range(ROUNDS):
+        before = follows
+        chances = {name: probabilities[name] for name in several}
+        found = left_out(members, several, follows, families, chances)
+        follows = {(i, name): share for i, one in enumerate(found) for name, share in one.follows.items()}
+        for name in several:
+            shares = [follows[i, name] for i, member in enumerate(members) if name in member.families]
+            probabilities[name] = (sum(shares) + (1 - ATYPICAL) * COUNT) / (len(shares) + COUNT)
+        families = learn_families(members, names, follows, expect(members, families))
+        if max((abs(share - before.get(key, 1.0)) for key, share in follows.items()), default=0.0) < SETTLED:
+            break
+    table = by_bridge(found, bridges, probabilities)
+    comparison = by_family(table, members, names)
+    pooled = {name: families[name] for name in names if comparison.loc[name, "is_pooled"]}
+    chances = {name: probabilities[name] for name in pooled}
+    coefficients = {
+        bridge: mixture(
+            member.information.J, member.information.h, member.families, member.prior(pooled), member.own, chances
+        ).mean.reshape(member.information.n_outputs, -1)
+        for bridge, member in zip(bridges, members, strict=True)
+    }
+    return pooled, chances, comparison, table, coefficients
+
+
+def seem_to_follow(
+    members: Sequence[Member], names: Sequence[Hashable], covariance: Array
+) -> dict[tuple[int, Hashable], float]:
+    """1, or 0 for bridges that on their own respond far from the median of their family, in the fleet's weather."""
+    own = [
+        CoefficientPosterior(m.information.J, m.information.h, *m.own).mean.reshape(len(m.families), -1)
+        for m in members
+    ]
+    follows = {}
+    for name in names:
+        of_family = [(i, own[i][j]) for i, m in enumerate(members) for j, f in enumerate(m.families) if f == name]
+        b = np.array([coefficients for _, coefficients in of_family])
+        away = b - np.median(b, axis=0)
+        distances = np.sqrt(np.einsum("ij,jk,ik->i", away, covariance, away))
+        far = (distances > FAR * np.median(distances)) & (len(b) >= FEW_MEMBERS)
+        for (i, _), is_far in zip(of_family, far, strict=True):
+            follows[i, name] = min(follows.get((i, name), 1.0), 0.0 if is_far else 1.0)
+    return follows
+
+
+def by_bridge(
+    found: Sequence[Mixture], bridges: Sequence[Hashable], probabilities: Mapping[Hashable, float]
+) -> pd.DataFrame:
+    """Log likelihoods alone, and by the mixture of following the others and being on its own."""
+    rows = []
+    for bridge, one in zip(bridges, found, strict=True):
+        for name, share in one.follows.items():
+            alone, chance = one.without_family[name], follow_chance(probabilities[name])
+            pooled = float(np.logaddexp(np.log(chance) + one.with_family[name], np.log1p(-chance) + alone))
+            rows.append((bridge, name, alone, pooled, pooled - alone, share))
+    columns = ["bridge", "family", "alone", "pooled", "gain", "pooling_probability"]
+    return pd.DataFrame(rows, columns=columns).set_index(["bridge", "family"])
+
+
+def by_family(table: pd.DataFrame, members: Sequence[Member], names: Sequence[Hashable]) -> pd.DataFrame:
+    """Sums over bridges; a family is pooled where its gain is clearly positive and enough bridges have it."""
+    rows = []
+    for name in names:
+        n_bridges = sum(name in member.families for member in members)
+        part = table[table.index.get_level_values("family") == name]
+        gain, error = float(part["gain"].sum()), np.nan
+        if n_bridges > 1:
+            error = float(max(part["gain"].std(), LEAST_DEVIATION) * np.sqrt(n_bridges))
+        is_pooled = n_bridges >= LEAST_BRIDGES and gain > student.ppf(LEVEL, n_bridges - 1) * error
+        rows.append((name, n_bridges, part["alone"].sum(), part["pooled"].sum(), gain, error, bool(is_pooled)))
+    columns = ["family", "n_bridges", "alone", "pooled", "gain", "standard_error", "is_pooled"]
+    return pd.DataFrame(rows, columns=columns).set_index("family")

@@ -5,11 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from skthermo.fleet.prior._basis import FleetBasis
-from skthermo.fleet.prior._comparison import left_out
 from skthermo.fleet.prior._families import Member, learn_families
-from skthermo.fleet.prior._information import Information, RowNoise
-from skthermo.fleet.prior._posterior import CoefficientPrior, OwnPrior, mixture, posterior
+from skthermo.fleet.prior._information import FleetBasis, Information, RowNoise
+from skthermo.fleet.prior._posterior import CoefficientPosterior, CoefficientPrior, OwnPrior, mixture
+from skthermo.fleet.prior._prior import left_out
 from skthermo.fleet.prior._records import BridgeRecords
 
 FUNCTIONS = 3
@@ -47,7 +46,7 @@ def test_posterior_is_that_of_all_rows_at_once(gaps):
     noise = RowNoise(S, memory, np.ones(len(y)))
     centre = X[:, 1:].mean(axis=0)
     found = Information.given(noise, records, X - np.append(0, centre), y, np.zeros(2), centre)
-    state = posterior(found.J, found.h, *prior)
+    state = CoefficientPosterior(found.J, found.h, *prior)
 
     mean, covariance = dense(prior)  # now the same with levels of huge variance, as one regression on all values
     whole = np.zeros((2, 1 + FUNCTIONS, 2, 1 + FUNCTIONS))
@@ -81,7 +80,7 @@ def test_evidences_differ_as_likelihoods_of_the_rows():
     logs, expected = [], []
     for _ in range(3):
         prior = random_prior(random)
-        logs.append(posterior(X.T @ X, X.T @ y, *prior).evidence)
+        logs.append(CoefficientPosterior(X.T @ X, X.T @ y, *prior).evidence)
         mean, covariance = dense(prior)
         expected.append(multivariate_normal(X @ mean, X @ covariance @ X.T + np.eye(9)).logpdf(y))
     assert_allclose(np.diff(logs), np.diff(expected))
@@ -100,7 +99,7 @@ def test_a_mixture_averages_over_what_is_followed():
             usual, atypical = (0.9 if a else 0.1) * (0.6 if b else 0.4), (0.2 if a else 0.8) * (0.2 if b else 0.8)
             chance = 0.95 * usual + 0.05 * atypical
             mean = np.where(rows, fleet.mean, own.mean)
-            state = posterior(J, h, mean, np.where(rows[..., np.newaxis], fleet.root, own.root))
+            state = CoefficientPosterior(J, h, mean, np.where(rows[..., np.newaxis], fleet.root, own.root))
             parts.append((chance * np.exp(state.evidence - found.evidence), state, a))
     shares = np.array([share for share, _, _ in parts])
     assert_allclose(shares.sum(), 1)
@@ -173,7 +172,7 @@ def test_a_shape_is_learned_and_not_the_response():
 
 def test_basis_goes_on_straight_beyond_the_fleet():
     T = np.random.default_rng(7).normal(10, 8, (500, 2))
-    basis = FleetBasis.of([T[:200], T[200:]], 4)
+    basis = FleetBasis.of(T, 4)
     far = basis.steady(np.array([80.0, 90.0, 100.0]))
     assert_allclose(np.diff(far, n=2, axis=0), 0, atol=1e-9)
     assert np.abs(np.diff(far, axis=0)).max() > 0
@@ -186,5 +185,5 @@ def test_a_bridge_that_is_left_out_has_no_say():
     everybody = [*members, *odd]
     found = left_out(everybody, ["g"], {}, learn_families(everybody, ["g"], {}), {"g": 0.5})[-1]
     prior = odd[0].prior(learn_families(members, ["g"], {}), predictive=True)
-    expected = posterior(odd[0].information.J, odd[0].information.h, *prior).evidence
+    expected = CoefficientPosterior(odd[0].information.J, odd[0].information.h, *prior).evidence
     assert_allclose(found.with_family["g"], expected, atol=3)

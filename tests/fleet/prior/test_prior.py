@@ -204,11 +204,12 @@ def test_uncertainty_grows_with_what_has_not_been_seen(prior):
 def test_effects_are_changes_of_the_logarithm(prior):
     T, F, _ = records(50, 60)
     mapper = prior.mapper().fit(T, F)
-    effects = mapper.effects([-10.0, 5.0, 25.0], "f2", reference=5.0)
+    effects = prior.effects([-10.0, 5.0, 25.0], "f2", mapper=mapper, reference=5.0)
     predicted = mapper.predict(pd.DataFrame({"T1": effects.index, "T2": effects.index}))["f2"]
     assert_allclose(effects["mean"], np.log(predicted / predicted[1]), atol=1e-12)
     assert effects["standard_deviation"].iloc[1] < 1e-12 < effects["standard_deviation"].iloc[0]
     fleet = prior.effects([-10.0, 5.0, 25.0], "f2", reference=5.0)
+    assert fleet[list(FLEET)].equals(effects[list(FLEET)])
     assert list(fleet) == ["mean", "standard_deviation", *FLEET]
     assert (np.abs(fleet[list(FLEET)].sub(fleet["mean"], axis=0)).mean(axis=1) <= fleet["standard_deviation"]).all()
 
