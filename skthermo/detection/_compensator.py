@@ -442,9 +442,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         names = _check_feature_names_in(self, None)
         named = pd.DataFrame(values, getattr(X, "index", None), names, copy=False)
         T, F = named.drop(columns=names[self.targets_]), named[names[self.targets_]]
-        usable = measured(named, list(T))
+        needed = partial(set_aside, unit="", needs_all=True)  # inputs need not be temperatures, and may be constant
+        usable = [needed(frequencies=F).frequencies, needed(frequencies=T, exclude={"constant"}).frequencies]
         warn_each(misplaced_columns(T, F))
         findings = findings_of(partial(check_records, unit=""), T, F)
+        usable = pd.concat(usable, axis=1)[list(named)]
         return *split_columns(X, as_floats(usable), self.targets_), findings
 
     def _learn(self, temperatures: Any, frequencies: Any, findings: RecordFindings) -> tuple[Array, PredictionError]:
@@ -455,10 +457,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.training_range_ = TrainingRange.of(filled, ~np.isnan(measured).all(axis=1))
         self.levels_ = means_of_known(measured)
         with warnings_once():
-            learn = partial(LearnedRegression.of, self.estimator, filled, frequencies, findings, folds)
-            learned = answer_once(type(self), (self.estimator, filled, frequencies, folds), measured.size, learn)
-        self.regression_, folds, stated = learned.regression, learned.folds, learned.errors
-        predicted = learned.out_of_fold.copy()
+            learn = partial(learn_regression, self.estimator, filled, frequencies, findings, folds)
+            asked = self.estimator, filled, frequencies, folds
+            self.regression_, folds, predicted, stated = answer_once(type(self), asked, measured.size, learn)
+        predicted = predicted.copy()
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         if not self.regression_.states_errors:
@@ -520,27 +522,19 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         return "contiguous"
 
 
-@dataclass(frozen=True)
-class LearnedRegression:
-    """A fitted regression, and its predictions out of fold in Hz with their errors."""
+def learn_regression(
+    estimator: BaseEstimator, temperatures: Any, frequencies: Any, findings: RecordFindings, folds: Folds
+) -> tuple[Regression, Folds, Array, PredictionError]:
+    """A regression on all rows, its predictions out of fold in Hz and their errors.
 
-    regression: Regression
-    folds: Folds
-    out_of_fold: Array
-    errors: PredictionError
-
-    @classmethod
-    def of(
-        cls, estimator: BaseEstimator, temperatures: Any, frequencies: Any, findings: RecordFindings, folds: Folds
-    ) -> LearnedRegression:
-        """Learn from all rows, and again on other folds; these are longer where residuals depend on each other."""
-        regression = Regression.of(estimator, temperatures, frequencies, findings)
-        predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
-        longer = folds.longer(temperatures, as_floats(frequencies) - predicted)
-        if longer is not None:
-            folds = longer
-            predicted, stated = regression.out_of_fold(temperatures, frequencies, folds)
-        return cls(regression, folds, predicted, stated)
+    The folds are longer than asked for where residuals depend on each other.
+    """
+    regression = Regression.of(estimator, temperatures, frequencies, findings)
+    predicted, errors = regression.out_of_fold(temperatures, frequencies, folds)
+    longer = folds.longer(temperatures, as_floats(frequencies) - predicted)
+    if longer is None:
+        return regression, folds, predicted, errors
+    return regression, longer, *regression.out_of_fold(temperatures, frequencies, longer)
 
 
 def fill_temperatures(sensors: SensorRegression, temperatures: Any) -> Any:
@@ -565,18 +559,7 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     """The other columns and the targets, as frames if X is one."""
     columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
     others = np.delete(np.arange(len(columns)), targets)
-    temperatures, frequencies = (frame_like(X, values[:, part], columns[part]) for part in (others, targets))
-    return temperatures, frequencies
-
-
-def measured(baseline: pd.DataFrame, inputs: list[Hashable]) -> pd.DataFrame:
-    """A baseline without values that cannot be; an error where nothing can be learned from it.
-
-    Inputs need not be temperatures, and one that is constant does no harm.
-    """
-    F = set_aside(frequencies=baseline.drop(columns=inputs), unit="", needs_all=True).frequencies
-    T = set_aside(frequencies=baseline[inputs], unit="", exclude={"constant"}, needs_all=True).frequencies
-    return pd.concat([T, F], axis=1)[list(baseline)]
+    return frame_like(X, values[:, others], columns[others]), frame_like(X, values[:, targets], columns[targets])
 
 
 @dataclass(frozen=True)
@@ -589,11 +572,7 @@ class Regression:
     estimator: BaseEstimator
     head: Pipeline | None
     rest: CompleteRowsRegressor
-
-    @property
-    def states_errors(self) -> bool:
-        """Whether the estimator says how uncertain its predictions are."""
-        return offers(self.rest.regressor_, "predict_covariance")
+    states_errors: bool
 
     @classmethod
     def of(cls, estimator: BaseEstimator, X: Any, y: Any, findings: RecordFindings) -> Regression:
@@ -601,8 +580,11 @@ class Regression:
         head, rest = split_pipeline(estimator)
         head = None if head is None else clone(head)
         fitted = CompleteRowsRegressor(rest, findings).fit(X if head is None else head.fit_transform(X), y)
-        whole = fitted.regressor_ if head is None else joined(estimator, head, fitted.regressor_)
-        return cls(whole, head, fitted)
+        whole = last = fitted.regressor_
+        if head is not None:
+            tail = last.steps if isinstance(last, Pipeline) else [(estimator.steps[-1][0], last)]
+            whole = Pipeline([*head.steps, *tail], memory=estimator.memory, verbose=estimator.verbose)
+        return cls(whole, head, fitted, offers(last, "predict_covariance"))
 
     def predict(self, X: Any) -> NDArray[np.float64]:
         """Predictions, NaN for rows that the estimator does not accept."""
@@ -668,12 +650,47 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         self.states_errors = states_errors
 
     def fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
+        self.takes_nan_ = takes_nan(self.estimator)
+        self.n_targets_ = y.shape[1]
+        usable, present = self._predictable(X), ~np.isnan(as_floats(y))
+        if is_model(getattr(last_step(self.estimator), "model", None)):
+            present[:] = True  # with an FE model, it leaves out incomplete rows itself, after its lags
+        in_use = usable[:, np.newaxis] & present
+        if not in_use.any(axis=0).all():
+            wanted = "that target" if self.takes_nan_ else "that target and every other column"
+            target = column_names(y, "target ")[in_use.any(axis=0).argmin()]
+            raise ValueError(
+                f"{target!r} has none of {len(y)} rows to learn from, of all or in a fold; expected rows with {wanted} "
+                f"for {type(self.estimator).__name__}"
+            )
+        is_whole = (in_use == usable[:, np.newaxis]).all()
         with reported_by_caller(REPORTED, self.findings):  # also in a worker process
-            return self._fit(X, y)
+            if is_whole:
+                y = y[usable]  # a single target as a vector, unless the regressor always takes columns
+                takes_columns = y.shape[1] > 1 or not get_tags(last_step(self.estimator)).target_tags.single_output
+                self.regressor_ = fit_outputs(self.estimator, X[usable], y if takes_columns else y.squeeze(axis=1))
+                return self
+            self.regressor_ = MultiOutputRegressor(self.estimator)
+            # Named, so that a regressor may know which target it learns.
+            targets = [column for _, column in y.items()] if isinstance(y, pd.DataFrame) else as_floats(y).T
+            self.regressor_.estimators_ = [
+                clone(self.estimator).fit(X[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
+            ]
+        return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:
-        with reported_by_caller(REPORTED):
-            predicted = self._predict(X)
+        usable = self._predictable(X)
+        predicted = np.full((X.shape[0], self.n_targets_), np.nan)
+        if usable.any():
+            with reported_by_caller(REPORTED):
+                values = as_columns(self.regressor_.predict(X[usable]))
+            expected = (int(usable.sum()), self.n_targets_)
+            if values.shape != expected:
+                raise ValueError(
+                    f"{type(self.regressor_).__name__} predicted the shape {values.shape}; expected {expected}, a "
+                    "column for each target"
+                )
+            predicted[usable] = values
         if not self.states_errors:
             return predicted
         return np.hstack([predicted, self.predict_covariance(X).reshape(len(predicted), -1)])
@@ -691,45 +708,6 @@ class CompleteRowsRegressor(RegressorMixin, BaseEstimator):
         if rows.any():
             rows[rows] = rows_from_fleet(self.regressor_, X[rows])
         return rows
-
-    def _fit(self, X: Any, y: Any) -> CompleteRowsRegressor:
-        self.takes_nan_ = takes_nan(self.estimator)
-        self.n_targets_ = y.shape[1]
-        usable, present = self._predictable(X), ~np.isnan(as_floats(y))
-        if takes_missing_targets(self.estimator):
-            present[:] = True
-        in_use = usable[:, np.newaxis] & present
-        if not in_use.any(axis=0).all():
-            wanted = "that target" if self.takes_nan_ else "that target and every other column"
-            target = column_names(y, "target ")[in_use.any(axis=0).argmin()]
-            raise ValueError(
-                f"{target!r} has none of {len(y)} rows to learn from, of all or in a fold; expected rows with {wanted} "
-                f"for {type(self.estimator).__name__}"
-            )
-        if (in_use == usable[:, np.newaxis]).all():
-            self.regressor_ = fit_outputs(self.estimator, X[usable], as_target(self.estimator, y[usable]))
-        else:
-            self.regressor_ = MultiOutputRegressor(self.estimator)
-            # Named, so that a regressor may know which target it learns.
-            targets = [column for _, column in y.items()] if isinstance(y, pd.DataFrame) else as_floats(y).T
-            self.regressor_.estimators_ = [
-                clone(self.estimator).fit(X[rows], target[rows]) for rows, target in zip(in_use.T, targets, strict=True)
-            ]
-        return self
-
-    def _predict(self, X: Any) -> NDArray[np.float64]:
-        usable = self._predictable(X)
-        predicted = np.full((X.shape[0], self.n_targets_), np.nan)
-        if usable.any():
-            values = as_columns(self.regressor_.predict(X[usable]))
-            expected = (int(usable.sum()), self.n_targets_)
-            if values.shape != expected:
-                raise ValueError(
-                    f"{type(self.regressor_).__name__} predicted the shape {values.shape}; expected {expected}, a "
-                    "column for each target"
-                )
-            predicted[usable] = values
-        return predicted
 
     def _predictable(self, inputs: Any) -> NDArray[np.bool_]:
         if self.takes_nan_ or scipy.sparse.issparse(inputs):
@@ -756,19 +734,6 @@ def has_lags_behind(estimator: BaseEstimator) -> bool:
     return any(hasattr(type(part), "lookback_") for part in parts)
 
 
-def joined(pipeline: Pipeline, head: Pipeline, rest: BaseEstimator) -> Pipeline:
-    """A fitted pipeline of its fitted parts."""
-    tail = rest.steps if isinstance(rest, Pipeline) else [(pipeline.steps[-1][0], rest)]
-    return Pipeline([*head.steps, *tail], memory=pipeline.memory, verbose=pipeline.verbose)
-
-
-def as_target(estimator: BaseEstimator, y: Any) -> Any:
-    """The targets as the regressor takes them: a single one as a vector, unless it always takes columns."""
-    if y.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output:
-        return y
-    return y.squeeze(axis=1)
-
-
 def takes_nan(estimator: BaseEstimator) -> bool:
     """Whether an estimator accepts NaN in X, also inside a wrapper, of which scikit-learn's tag does not say so."""
     if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
@@ -792,8 +757,3 @@ def learns_from_y(transformer: BaseEstimator | str | None) -> bool:
     if transformer is None or isinstance(transformer, str):
         return False
     return get_tags(transformer).target_tags.required or hasattr(transformer, "estimator")
-
-
-def takes_missing_targets(estimator: BaseEstimator) -> bool:
-    """Whether an estimator accepts NaN in y: one with an FE model leaves out incomplete rows itself, after its lags."""
-    return is_model(getattr(last_step(estimator), "model", None))

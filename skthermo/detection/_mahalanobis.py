@@ -137,7 +137,14 @@ class MahalanobisDetector(DamageDetector):
         return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
 
     def _index(self, F: Array) -> Array:
-        return np.concatenate([self._of_few(F[i : i + ROWS_AT_ONCE]) for i in range(0, len(F), ROWS_AT_ONCE)])
+        index = np.empty(len(F))
+        for start in range(0, len(F), ROWS_AT_ONCE):
+            rows = F[start : start + ROWS_AT_ONCE]
+            distances, present = self._distances(rows), ~np.isnan(rows)
+            if not present.all():
+                distances = as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
+            index[start : start + ROWS_AT_ONCE] = distances
+        return index
 
     def _seen_at(self, threshold: float) -> str:
         single = 1 / np.sqrt(np.diag(np.linalg.inv(self.covariance_.covariance_)))
@@ -151,12 +158,6 @@ class MahalanobisDetector(DamageDetector):
     def _log_densities(self, F: Array) -> Array:
         return self._normal.log_densities(F)
 
-    def _of_few(self, F: Array) -> Array:
-        distances, present = self._distances(F), ~np.isnan(F)
-        if present.all():
-            return distances
-        return as_if_complete(distances, present.sum(axis=1), F.shape[1]) * self.pattern_scale_(present)
-
     def _distances(self, F: Array) -> Array:
         """Distances of rows in the modes that they have; NaN where there is none."""
         if self.covariance is not None and not np.isnan(F).any():
@@ -164,18 +165,16 @@ class MahalanobisDetector(DamageDetector):
         return self._normal.distances(F)
 
     def _as_if_new(self, baseline: Neighbourhoods) -> Array:
-        """Distances of baseline rows, as large as those of new records."""
-        if self.covariance is not None or np.isnan(baseline.records).any() or not baseline.is_short:
-            return self._left_out(baseline)
-        n_records, n_modes = baseline.records.shape
-        time = round(baseline.correlation_time, 2)
-        return self._distances(baseline.records) * factor_of_few(n_records, n_modes, time, self.contamination)
-
-    def _left_out(self, baseline: Neighbourhoods) -> Array:
-        """Distances of baseline rows from the others."""
-        distances, complete = self._distances(baseline.records), ~np.isnan(baseline.records).any(axis=1)
-        known = complete if self.covariance is not None else ~np.isnan(baseline.records).all(axis=1)
-        some = Neighbourhoods(baseline.times[known], baseline.records[known])
+        """Distances of baseline rows from the others, as large as those of new records."""
+        records = baseline.records
+        distances, complete = self._distances(records), ~np.isnan(records).any(axis=1)
+        if self.covariance is None and complete.all():
+            if not baseline.is_short:
+                return baseline.distances(self._normal)
+            time = round(baseline.correlation_time, 2)
+            return distances * factor_of_few(*records.shape, time, self.contamination)
+        known = complete if self.covariance is not None else ~np.isnan(records).all(axis=1)
+        some = Neighbourhoods(baseline.times[known], records[known])
         if self.covariance is not None:
             distances[known] = some.out_of_fold(N_FOLDS, self._distances_from)
         elif complete[known].all():
@@ -299,17 +298,15 @@ class PatternScale:
             index * by_number[present.sum(axis=1)], of_row, len(masks), max(contamination, PATTERN_SHARE)
         )
         scale = cls(by_number, masks, by_pattern)
-        complete = scale._raw(np.ones((1, present.shape[1]), dtype=bool))[0]
+        complete = scale(np.ones((1, present.shape[1]), dtype=bool))[0]
         return cls(by_number / complete, masks, by_pattern)
 
     def __call__(self, present: Mask) -> Array:
         """Factors of rows, by which of their modes are there."""
         masks, of_row = patterns(present)
-        return self._raw(masks)[of_row]
-
-    def _raw(self, masks: Mask) -> Array:
         same = (masks[:, np.newaxis] == self.masks).all(axis=2)
-        return self.by_number[masks.sum(axis=1)] * np.where(same.any(axis=1), same @ self.by_pattern, 1.0)
+        factors = self.by_number[masks.sum(axis=1)] * np.where(same.any(axis=1), same @ self.by_pattern, 1.0)
+        return factors[of_row]
 
 
 def _factors(index: Array, group: NDArray[np.intp], n_groups: int, share: float, *, trend: bool = False) -> Array:

@@ -27,7 +27,6 @@ from skthermo.residuals.weather import (
     mean_of_nearest,
     nearest_in_parts,
     one_in_each_part,
-    order_statistic,
     weather_coordinates,
 )
 
@@ -347,15 +346,13 @@ class BaselineResiduals:
     def _smoothed(self, values: Array, weather: Array, random_state: np.random.RandomState, is_complete: bool) -> Array:
         """Values as drawn, and others of the usual ones, added with the bandwidth of Silverman's rule."""
         similar = self._similar(weather)
-        draws = [self._taken(similar, random_state) for _ in range(2)]
+        taken, other = self._taken(similar, random_state), self._taken(similar, random_state)
         n_modes, n_independent = self.n_modes, len(values) / self.correlation_time
         bandwidth = (4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4))
         angle, mean = np.arctan(bandwidth), similar @ self._levels[0][:, :n_modes]
-        first = self._completed(values[draws[0]], random_state) if is_complete else values[draws[0]]
-        second = self._completed(self.usual[draws[1]], random_state)
-        first, second = (
-            self._carried(of_rows, taken, similar) - mean for of_rows, taken in zip((first, second), draws, strict=True)
-        )
+        first = self._completed(values[taken], random_state) if is_complete else values[taken]
+        second = self._completed(self.usual[other], random_state)
+        first, second = self._carried(first, taken, similar) - mean, self._carried(second, other, similar) - mean
         return mean + np.cos(angle) * first + np.sin(angle) * second
 
     def _completed(self, values: Array, random_state: np.random.RandomState) -> Array:
@@ -379,10 +376,11 @@ class BaselineResiduals:
         The former hold the errors of mappers of fewer records, beside those of the mapper that simulates; the latter
         are too small, and do not count where it has learned noise: where they change less from record to record.
         """
-        own, out_of_fold = (np.diff(values, axis=0) for values in (self.own, self.values))
+        own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
         with without_warnings():  # of modes that are never there twice in a row
-            sizes = [np.nanmean(np.nanmedian(np.abs(changes), axis=0)) for changes in (own, out_of_fold)]
-        return self.values if sizes[0] < OVERFITTED * sizes[1] else (self.values + self.own) / 2
+            size = np.nanmean(np.nanmedian(out_of_fold, axis=0))
+            is_overfitted = np.nanmean(np.nanmedian(own, axis=0)) < OVERFITTED * size
+        return self.values if is_overfitted else (self.values + self.own) / 2
 
     @cached_property
     def level_errors(self) -> Array:
@@ -435,7 +433,7 @@ class BaselineResiduals:
         if len(ends) == n_rows:
             return taken
         logs = np.log(self._levels[1][:, : self.n_modes])
-        here = np.log(self._scatter_at(similar)[:, : self.n_modes])
+        here = np.log(np.sqrt(similar @ self._levels[1] ** 2)[:, : self.n_modes])
         starts = np.union1d([0], ends)
         stops = np.append(starts[1:], n_rows)
         while len(starts):  # runs, each of which may end early, where another one begins
@@ -457,21 +455,16 @@ class BaselineResiduals:
     def _carried(self, values: Array, taken: NDArray[np.intp], similar: scipy.sparse.csr_array) -> Array:
         """Values of the records that rows took, with the mean and the deviation of the weather of the rows."""
         n_columns = values.shape[1]
-        mean, deviation = (level[:, :n_columns] for level in self._levels)
-        scale = self._scatter_at(similar)[:, :n_columns] / deviation[taken]
+        mean, deviation = self._levels[0][:, :n_columns], self._levels[1][:, :n_columns]
+        scale = np.sqrt(similar @ self._levels[1] ** 2)[:, :n_columns] / deviation[taken]
         return np.asarray(similar @ mean + (values - mean[taken]) * scale)
-
-    def _scatter_at(self, similar: scipy.sparse.csr_array) -> Array:
-        return np.sqrt(similar @ self._levels[1] ** 2)
 
     @cached_property
     def _levels(self) -> tuple[Array, Array]:
         """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out."""
         columns = self.usual if self.ratios is None else np.hstack([self.usual, self.ratios])
-        mean, square = (
-            np.nan_to_num(self._local_mean(some, self.weather, SPREAD_OF, MOST_PLACES))
-            for some in (columns, columns**2)
-        )
+        mean = np.nan_to_num(self._local_mean(columns, self.weather, SPREAD_OF, MOST_PLACES))
+        square = np.nan_to_num(self._local_mean(columns**2, self.weather, SPREAD_OF, MOST_PLACES))
         size = np.sqrt(np.maximum(np.nanmax(square, axis=0, initial=0), np.finfo(float).tiny))
         return mean, np.maximum(np.sqrt(np.maximum(square - mean**2, 0.0)), JITTER * size)
 
@@ -539,3 +532,9 @@ class BaselineResiduals:
             spread = self._spread(np.where(test[:, np.newaxis], np.nan, self._scattered), weather, beyond)
             scores[test] = np.abs(self._scattered[test]) / spread
         return scores
+
+
+def order_statistic(scores: Array, confidence: float) -> float:
+    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
+    rank = int(np.ceil((len(scores) + 1) * confidence))
+    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf

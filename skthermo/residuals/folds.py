@@ -118,8 +118,8 @@ class Neighbourhoods:
     @cached_property
     def correlation_time(self) -> float:
         """Mean over the columns, in records, of what the season does not explain: it comes again, and is no memory."""
-        rows, season = self.records[self.order], _season(self.times[self.order])
-        return float(correlation_times(np.column_stack([_without(column, season) for column in rows.T])).mean())
+        rows = _without_season(self.records[self.order], self.times[self.order])
+        return float(correlation_times(rows).mean())
 
     @property
     def n_independent(self) -> float:
@@ -127,18 +127,14 @@ class Neighbourhoods:
         return np.count_nonzero(~np.isnan(self.records).all(axis=1)) / self.correlation_time
 
     @cached_property
-    def reach(self) -> float:
-        """Time up to which records are neighbours, in the unit of the times; 0 if they are independent."""
-        steps = np.diff(self.times[self.order])
-        return float(np.ceil(REACH * (self.correlation_time - 1)) * np.median(steps)) if len(steps) else 0.0
-
-    @cached_property
     def ranges(self) -> tuple[Rows, Rows]:
         """Places in the order of time from which, and before which, the neighbours of each record are, itself too."""
         sorted_times, place = self.times[self.order], np.argsort(self.order)
         most = int(len(place) * (1 - LEAST_KEPT) / 2)
-        first = sorted_times.searchsorted(self.times - self.reach, side="left")
-        stop = sorted_times.searchsorted(self.times + self.reach, side="right")
+        steps = np.diff(sorted_times)
+        reach = float(np.ceil(REACH * (self.correlation_time - 1)) * np.median(steps)) if len(steps) else 0.0
+        first = sorted_times.searchsorted(self.times - reach, side="left")
+        stop = sorted_times.searchsorted(self.times + reach, side="right")
         return np.maximum(first, place - most), np.minimum(stop, place + most + 1)
 
     @property
@@ -186,7 +182,7 @@ class Neighbourhoods:
         scale = np.sqrt(np.diag(learned.covariance))
         standard = ((self.records - learned.mean) / scale)[self.order]
         correlation = learned.covariance / np.outer(scale, scale)
-        first, stop = (ends[self.order] for ends in self.ranges)
+        first, stop = self.ranges[0][self.order], self.ranges[1][self.order]
         distances = np.empty(len(standard))
         for which in parts(len(standard), standard.shape[1] ** 2):
             few = _distances_left_out(standard, correlation, standard[which], first[which], stop[which])
@@ -194,21 +190,20 @@ class Neighbourhoods:
         return distances
 
 
-def _season(times: Array) -> Array:
-    """A constant and the yearly and half-yearly waves, (n_records, 5); the constant alone for less than a year.
+def _without_season(records: Array, times: Array) -> Array:
+    """Columns less their mean and, from a year on, less what the yearly and half-yearly waves explain of them.
 
     A long table without stamps counts as one year.
     """
     span = np.ptp(times)
     year, length = (YEAR.value, span / DAY_NS) if span > MOST_ROWS else (span + 1, len(times))
     phases = 2 * np.pi / year * np.outer(times, [1, 2] if length >= LEAST_YEAR else [])
-    return np.hstack([np.ones((len(times), 1)), np.cos(phases), np.sin(phases)])
-
-
-def _without(column: Array, season: Array) -> Array:
-    """A column less what the season explains of it."""
-    known = ~np.isnan(column)
-    return column - season @ np.linalg.lstsq(season[known], column[known], rcond=None)[0]
+    season = np.hstack([np.ones((len(times), 1)), np.cos(phases), np.sin(phases)])
+    left = np.empty_like(records)
+    for place, column in enumerate(records.T):
+        known = ~np.isnan(column)
+        left[:, place] = column - season @ np.linalg.lstsq(season[known], column[known], rcond=None)[0]
+    return left
 
 
 def _distances_left_out(rows: Array, correlation: Array, some: Array, first: Rows, stop: Rows) -> Array:

@@ -57,7 +57,7 @@ class Gaussian:
     def whiten(self, rows: Array) -> Array:
         """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
         present, all_alike = ~np.isnan(rows), np.zeros(len(rows), dtype=np.intp)
-        return whitenings_of(self.covariance[np.newaxis], all_alike, present).white(rows - self.mean)
+        return Whitenings.of(self.covariance[np.newaxis], all_alike, present).white(rows - self.mean)
 
     def distances(self, rows: Array) -> Array:
         """Mahalanobis distances in the modes that rows have; NaN where there is none."""
@@ -76,7 +76,8 @@ class Gaussian:
         present, correlation = ~np.isnan(rows), self.covariance / np.outer(scale, scale)
         units = present @ np.log(2 * np.pi * scale**2)
         all_alike = np.zeros(len(rows), dtype=np.intp)
-        volumes = units + whitenings_of(correlation[np.newaxis], all_alike, present).log_determinants
+        roots = Whitenings.of(correlation[np.newaxis], all_alike, present)
+        volumes = units + roots.logarithms[roots.pair]
         return -0.5 * (np.nan_to_num(self.distances(rows)) ** 2 + volumes)
 
     def completed(self, rows: Array) -> tuple[Array, Array]:
@@ -115,24 +116,19 @@ class Whitenings:
     logarithms: Array
     pair: NDArray[np.intp]
 
+    @classmethod
+    def of(cls, covariances: Array, which: NDArray[np.intp], present: Mask) -> Whitenings:
+        """Those of rows, each with one of several covariances and a mask of the modes that it has."""
+        masks, pattern = patterns(present)
+        cases, pair = np.unique(which * len(masks) + pattern, return_inverse=True)
+        return cls(*whitenings(covariances[cases // len(masks)], masks[cases % len(masks)]), pair)
+
     def white(self, centred: Array) -> Array:
         """Centred rows in standard deviations and uncorrelated."""
         filled = np.nan_to_num(centred)
         many = len(self.roots) > 1
         white = np.einsum("ij,ijk->ik", filled, self.roots[self.pair]) if many else filled @ self.roots[0]
         return np.where(np.isnan(centred), np.nan, white)
-
-    @property
-    def log_determinants(self) -> Array:
-        """Of the covariance of each row, in the modes that it has."""
-        return self.logarithms[self.pair]
-
-
-def whitenings_of(covariances: Array, which: NDArray[np.intp], present: Mask) -> Whitenings:
-    """The whitenings of rows, each with one of several covariances and a mask of the modes that it has."""
-    masks, pattern = patterns(present)
-    cases, pair = np.unique(which * len(masks) + pattern, return_inverse=True)
-    return Whitenings(*whitenings(covariances[cases // len(masks)], masks[cases % len(masks)]), pair)
 
 
 def precisions(covariance: Array, masks: Mask) -> Array:

@@ -22,7 +22,6 @@ from skthermo.residuals.gaussian import (
     check_invertible,
     no_smaller,
     whitenings,
-    whitenings_of,
 )
 from skthermo.residuals.weather import (
     FAR_OUTSIDE,
@@ -83,9 +82,9 @@ class Extrapolation:
 
 def _outside(trained: TrainingRange, weather: Array) -> Array:
     """How far each row is below and above a range, by its farthest column, in units of that of the column."""
-    below = np.where(weather < trained.lowest, weather, np.nan)
-    above = np.where(weather > trained.highest, weather, np.nan)
-    return np.column_stack([np.nan_to_num(trained.excess(side)).max(axis=1) for side in (below, above)])
+    excess = np.nan_to_num(trained.excess(weather))
+    below, above = np.where(weather < trained.lowest, excess, 0.0), np.where(weather > trained.highest, excess, 0.0)
+    return np.column_stack([below.max(axis=1), above.max(axis=1)])
 
 
 class Smoothing(NamedTuple):
@@ -358,7 +357,7 @@ class Spread:
         """Logarithms of the factors by which `whiten` changes the volume of each row's values."""
         volumes = np.zeros(len(residuals))
         for rows, roots in self._in_parts(weather, ~np.isnan(residuals), errors):
-            volumes[rows] = -0.5 * roots.log_determinants
+            volumes[rows] = -0.5 * roots.logarithms[roots.pair]
         return volumes
 
     def roots(
@@ -409,10 +408,10 @@ class Spread:
 
     def _whitenings(self, weather: Array, present: NDArray[np.bool_], errors: PredictionError) -> Whitenings:
         if self.by_weather is None and self.extrapolation is None and not len(errors.rows):
-            return whitenings_of(self.overall.covariance[np.newaxis], np.zeros(len(weather), dtype=np.intp), present)
+            return Whitenings.of(self.overall.covariance[np.newaxis], np.zeros(len(weather), dtype=np.intp), present)
         covariances = self.covariances(weather)
         covariances[errors.rows] += errors.covariances
-        return whitenings_of(covariances, np.arange(len(covariances)), present)
+        return Whitenings.of(covariances, np.arange(len(covariances)), present)
 
 
 def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:

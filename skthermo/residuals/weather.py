@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -141,7 +141,7 @@ class SensorRegression:
     gaussian: Gaussian
     learned: Array
     reach: TrainingRange
-    usual: Mapping[int, Array] = field(default_factory=dict)
+    usual: dict[int, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, temperatures: Any) -> SensorRegression:
@@ -155,9 +155,10 @@ class SensorRegression:
         reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
         sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
         departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
-        lengths = [length for length in FEWEST << np.arange(20) if length <= LARGEST * len(values)]
-        usual = {length: np.fmax.reduce(np.abs(_running_means(departures, length))) for length in lengths}
-        return replace(sensors, usual=usual)
+        lengths = FEWEST << np.arange(20)
+        for length in lengths[lengths <= LARGEST * len(values)]:
+            sensors.usual[length] = np.fmax.reduce(np.abs(_running_means(departures, length)))
+        return sensors
 
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
@@ -188,10 +189,11 @@ class SensorRegression:
         Records count in which the others are within their training range and it is not far outside, if these are most.
         """
         order = np.argsort(row_times(temperatures), kind="stable")
-        lengths = [length for length in self.usual if length <= len(order)]
-        if not lengths:
+        lengths = np.array(list(self.usual), dtype=int)
+        length = lengths[lengths <= len(order)].max(initial=0)
+        if not length:
             return ""
-        values, length = as_floats(temperatures)[order], max(lengths)
+        values = as_floats(temperatures)[order]
         beyond = np.nan_to_num(self.reach.excess(values))
         outside = beyond > 0
         evaluated = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
@@ -302,13 +304,13 @@ class PredictionError:
 def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
     """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
     filled = deviations > 0
+    if not filled.any():
+        return ""
     sensors = [
         f"{name!r} in {rows.sum()} of {len(rows)} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
         for name, rows, sizes in zip(names, filled.T, deviations.T, strict=True)
         if rows.any()
     ]
-    if not sensors:
-        return ""
     return (
         f"missing temperatures were filled from the other sensors: {', '.join(sensors)}. {consequence}. If a sensor "
         "has failed, leave it out and fit again"
@@ -333,7 +335,9 @@ def unpredicted_text(
 def _running_means(columns: Array, length: int) -> Array:
     """Means of so many consecutive values, NaN where most are missing."""
     first = np.arange(len(columns) - length + 1)
-    sums, counts = (range_sums(part, first, first + length) for part in (np.nan_to_num(columns), ~np.isnan(columns)))
+    sums, counts = np.split(
+        range_sums(np.hstack([np.nan_to_num(columns), ~np.isnan(columns)]), first, first + length), 2, 1
+    )
     return np.where(2 * counts > length, sums / np.maximum(counts, 1), np.nan)
 
 
@@ -408,17 +412,14 @@ class NearestPlaces:
     Results are kept up to `MOST_KEPT` positions, those asked for first. Copies, saved ones too, begin with none.
     """
 
+    _kept: tuple[NDArray[np.void], Array, NDArray[np.int32]] | None = None
+    """Bytes of wanted places in order, mean distances and positions of those nearest to each."""
+
     def __init__(self, places: Array, number: int) -> None:
         self.places, self.number = places, min(number, len(places))
-        self.__setstate__({})
 
     def __getstate__(self) -> dict[str, Any]:
         return {"places": self.places, "number": self.number}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        nowhere = np.empty((0, self.number), dtype=np.int32)
-        self._kept = _row_keys(self.places[:0]), np.empty(0), nowhere  # in order; mean distances and positions
 
     @cached_property
     def _tree(self) -> NearestNeighbors:
@@ -427,28 +428,22 @@ class NearestPlaces:
     def of(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
         """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
         (n_wanted, number)."""
-        keys, found = _row_keys(wanted), self._kept
+        size = wanted.itemsize * wanted.shape[1]
+        keys = np.ascontiguousarray(wanted).view(np.dtype((np.void, size))).ravel()  # equal where all bytes are
+        found = self._kept or (keys[:0], np.empty(0), np.empty((0, self.number), dtype=np.int32))
         at = np.searchsorted(found[0], keys)
         new = np.append(found[0], keys[:1])[at] != keys
         new |= at == len(found[0])
         if new.any():
-            searched = zip(*(self._searched(wanted[new][part]) for part in parts(new.sum(), self.number)), strict=True)
-            both = zip(found, ([keys[new]], *searched), strict=True)
-            joined = [np.concatenate([before, *more]) for before, more in both]
-            first = np.unique(joined[0], return_index=True)[1]
-            found = tuple(part[first] for part in joined)
-            at = np.searchsorted(found[0], keys)
+            distances, near = np.empty(new.sum()), np.empty((new.sum(), self.number), dtype=np.int32)
+            for part in parts(len(near), self.number):
+                lengths, near[part] = self._tree.kneighbors(wanted[new][part])
+                distances[part] = lengths.mean(axis=1)
+            known, first = np.unique(np.append(found[0], keys[new]), return_index=True)
+            found = known, np.append(found[1], distances)[first], np.append(found[2], near, axis=0)[first]
+            at = np.searchsorted(known, keys)
             self._kept = found if found[2].size <= MOST_KEPT else self._kept
         return found[1][at], found[2][at]
-
-    def _searched(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
-        distances, near = self._tree.kneighbors(wanted)
-        return distances.mean(axis=1), near.astype(np.int32)
-
-
-def _row_keys(rows: Array) -> NDArray[np.void]:
-    """One key for each row, equal where all bytes are."""
-    return np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
 
 
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
@@ -497,7 +492,8 @@ def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, nu
 def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:
     """Slices of rows of which all numbers together need little memory."""
     step = max(NUMBERS_AT_ONCE // int(numbers_per_row), 1)
-    return (slice(first, min(first + step, n_rows)) for first in range(0, n_rows, step))
+    for first in range(0, n_rows, step):
+        yield slice(first, min(first + step, n_rows))
 
 
 def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
@@ -511,12 +507,6 @@ def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
     return (shares * n_records / most).astype(np.intp)
 
 
-def order_statistic(scores: Array, confidence: float) -> float:
-    """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
-    rank = int(np.ceil((len(scores) + 1) * confidence))
-    return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
-
-
 def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
     """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
     temperatures.
@@ -526,7 +516,7 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     """
     if len(temperatures) < LEAST_ROWS:
         return
-    T, F = Columns.of(temperatures, "T"), Columns.of(frequencies, "f")
+    T, F = Columns(temperatures, "T"), Columns(frequencies, "f")
     steady = F.variation[F.variation <= STEADY]
     usual = np.median(steady) if len(steady) else np.min(T.variation, initial=STEADY)
     is_temperature = (F.variation >= UNSTEADY * usual) & (len(steady) > 0 or (T.variation <= STEADY).any())
@@ -557,19 +547,14 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
 
 
 class Columns:
-    """Columns of a table with their robust statistics."""
+    """Columns of a table, of rows evenly spread, with their robust statistics."""
 
-    def __init__(self, values: Array, names: list):
-        self.values, self.names = values, names
+    def __init__(self, table: Table, default: str):
+        values = as_floats(table)[spread_evenly(np.arange(len(table)), MOST_ROWS)]
+        self.values, self.names = values, column_names(table, default)
         self.median, self.deviation = median(values), robust_deviation(values)
         positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
-        self.variation = np.divide(self.deviation, self.median, out=np.full(len(names), np.inf), where=positive)
-
-    @classmethod
-    def of(cls, table: Table, default: str) -> Columns:
-        """Rows of a table, evenly spread."""
-        rows = spread_evenly(np.arange(len(table)), MOST_ROWS)
-        return cls(as_floats(table)[rows], column_names(table, default))
+        self.variation = np.divide(self.deviation, self.median, out=np.full(values.shape[1], np.inf), where=positive)
 
     def named(self, chosen: NDArray[np.bool_]) -> list:
         return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]

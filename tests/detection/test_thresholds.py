@@ -227,7 +227,7 @@ def test_distances_without_a_closed_form_are_from_the_records_of_other_blocks(ca
     detector = MahalanobisDetector(covariance=None if case == "gaps" else LedoitWolf(), threshold="chi2")
     for fold in range(10):
         index[folds == fold] = detector.fit(rows[folds != fold])._distances(rows[folds == fold])
-    found = detector.fit(rows)._left_out(Neighbourhoods(np.arange(123.0), rows))
+    found = detector.fit(rows)._as_if_new(Neighbourhoods(np.arange(123.0), rows))
     np.testing.assert_allclose(found, index, rtol=1e-9)
 
 

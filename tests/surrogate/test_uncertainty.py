@@ -17,8 +17,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo._tables.frames import correlation_time
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
-from skthermo.residuals.baseline import BaselineResiduals
-from skthermo.residuals.weather import order_statistic
+from skthermo.residuals.baseline import BaselineResiduals, order_statistic
 from skthermo.surrogate import TemperatureMapper
 from tests.surrogate.chains import F, T, as_measured, inverse, trained
 from tests.surrogate.chains import chain as any_chain
