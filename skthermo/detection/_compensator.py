@@ -64,6 +64,7 @@ from skthermo.residuals.folds import Folds
 from skthermo.residuals.spread import FEWEST, Extrapolation, Spread, rows_near_in_time
 from skthermo.residuals.weather import (
     BEYOND,
+    NO_ERRORS,
     PredictionError,
     SensorRegression,
     TrainingRange,
@@ -395,15 +396,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Weather of new records, predictions in Hz, their errors, and the rows without any."""
         filled = fill_temperatures(self.sensors_, temperatures)
         weather = as_floats(filled)
-        reach, inputs = self.regression_.reach(filled) or (self.training_range_, weather)  # with that of a fleet
+        known, from_fleet, errors = self.regression_.stated(filled)
+        reach, inputs = known or (self.training_range_, weather)  # with that of a fleet
         warn_user(reach.warning(inputs), WeatherWarning, "outside-training-weather")
-        warn_of_fleet(self.regression_.from_fleet(filled), "Their residuals count less, by that uncertainty")
+        warn_of_fleet(from_fleet, "Their residuals count less, by that uncertainty")
         warn_user(self.sensors_.warning(temperatures), RecordsWarning, "sensor-disagrees")
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
         fills = PredictionError.of_fills(self.sensors_, temperatures, filled, self.regression_.predict)
-        return weather, predicted, self.regression_.errors(filled).plus(fills, len(predicted)), unknown
+        return weather, predicted, errors.plus(fills, len(predicted)), unknown
 
     def _split(self, X: Any) -> tuple[Any, Any]:
         """Temperatures and frequencies of new records, with a warning of values that are none."""
@@ -432,7 +434,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _log_volumes_shrunk(self, weather: Array, residuals: Array, errors: PredictionError) -> Array:
         """As `Spread.log_volumes`, of residuals in Hz that are shrunk where predictions are uncertain."""
         known = self._with_spread(residuals)
-        certain = self.spread_.log_volumes(weather, known, PredictionError.none())
+        certain = self.spread_.log_volumes(weather, known, NO_ERRORS)
         return self.spread_.log_volumes(weather, known, errors) - certain
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
@@ -591,12 +593,16 @@ class Regression:
         inputs = self._inputs(X)
         return explain_rows(self.rest.predict(inputs), explained_rows(inputs))
 
-    def errors(self, X: Any) -> PredictionError:
-        """Errors of the predictions as the estimator states them; none where it does not."""
-        if not self.states_errors:
-            return PredictionError.none()
-        with without_warnings():  # which predictions have given, here and below
-            return PredictionError.of_rows(self.rest.predict_covariance(self._inputs(X)))
+    def stated(self, X: Any) -> tuple[tuple[TrainingRange, Any] | None, NDArray[np.bool_], PredictionError]:
+        """The weather that the estimator was fitted in, with X as its last step sees it, rows in weather that only a
+        fleet has shown, and errors of predictions; none of them where the estimator does not say."""
+        last = self.rest.regressor_
+        if not (self.states_errors or offers(last, "reach_") or offers(last, "from_fleet")):
+            return None, np.zeros(len(X), dtype=bool), NO_ERRORS
+        with without_warnings():  # which predictions give
+            inputs = self._inputs(X)
+            errors = PredictionError.of_rows(self.rest.predict_covariance(inputs)) if self.states_errors else NO_ERRORS
+            return reach_of(last, inputs), self.rest.from_fleet(inputs), errors
 
     def out_of_fold(self, X: Any, y: Any, folds: Folds) -> tuple[Any, PredictionError]:
         """Predictions by clones of the rest that are fitted on other rows, and their errors.
@@ -610,7 +616,7 @@ class Regression:
         predicted, covariances = found[:, :n_targets], found[:, n_targets:]
         predicted[folds.untested] = np.nan
         if not self.states_errors:
-            return predicted, self.errors(X)
+            return predicted, NO_ERRORS
         return predicted, PredictionError.of_rows(covariances.reshape(-1, n_targets, n_targets))
 
     def predict_apart(self, X: Any, y: Any, apart: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -618,20 +624,6 @@ class Regression:
         inputs = self._inputs(X)
         with without_warnings():  # which the fit on all rows has given
             return clone(self.rest).fit(inputs[~apart], y[~apart]).predict(inputs[apart])
-
-    def reach(self, X: Any) -> tuple[TrainingRange, Any] | None:
-        """The weather that the estimator was fitted in, and X as its last step sees it; None without ``reach_``."""
-        if not offers(self.rest.regressor_, "reach_"):
-            return None
-        with without_warnings():
-            return reach_of(self.rest.regressor_, self._inputs(X))
-
-    def from_fleet(self, X: Any) -> NDArray[np.bool_]:
-        """Rows in weather that only a fleet has shown."""
-        if not offers(self.rest.regressor_, "from_fleet"):
-            return np.zeros(len(X), dtype=bool)
-        with without_warnings():
-            return self.rest.from_fleet(self._inputs(X))
 
     def _inputs(self, X: Any) -> Any:
         return X if self.head is None else self.head.transform(X)

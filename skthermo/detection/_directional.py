@@ -17,7 +17,7 @@ from skthermo._tables.arrays import Array, as_floats, check_probability, is_mode
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import Changes, origin_of
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector, PatternScale, as_if_complete
-from skthermo.residuals.cones import Cones
+from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import precisions, whitenings
 
 UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
@@ -347,10 +347,9 @@ class DirectionalDetector(MahalanobisDetector):
         cases, case = np.unique(records.changes.which * len(masks) + pattern, return_inverse=True)
         of_case, mask_of_case = effects[cases // len(masks)], cases % len(masks)
         weighted = weights[mask_of_case] @ of_case
-        cones = Cones(of_case.swapaxes(1, 2) @ weighted)
-        standard = normal.centred(records.values) / scale
+        standard = np.nan_to_num(records.values - normal.mean) / scale
         along = standard @ weighted[0] if len(cases) == 1 else np.einsum("ij,ijk->ik", standard, weighted[case])
-        amounts, lengths = cones.project(along, case)
+        amounts, lengths = project_on_cones(of_case.swapaxes(1, 2) @ weighted, along, case)
         amounts[~present.any(axis=1)] = np.nan
         if present.all():
             return amounts, lengths, lengths
@@ -508,7 +507,8 @@ class Detectability:
         draws = np.random.RandomState(0).standard_normal((N_DRAWS, len(self.white)))
         moved = draws + np.outer(amounts, self.white[:, direction])[:, np.newaxis]
         moved = moved.reshape(-1, len(self.white))
-        lengths = Cones.of(self.white).project(moved @ self.white, np.zeros(len(moved), dtype=np.intp))[1]
+        products, all_alike = (self.white.T @ self.white)[np.newaxis], np.zeros(len(moved), dtype=np.intp)
+        lengths = project_on_cones(products, moved @ self.white, all_alike)[1]
         above = self.tests(lengths, np.linalg.norm(moved, axis=1)) > self.threshold
         return above.reshape(len(amounts), -1).mean(axis=1)
 
@@ -517,7 +517,7 @@ def mean_squares(white: Array) -> Array:
     """Mean squared length of the projections of normal rows on the cones of some effects, (n_cones, n_modes, n_dir)."""
     draws = np.random.RandomState(0).standard_normal((N_DRAWS_OF_PATTERN, white.shape[1]))
     which: NDArray[np.intp] = np.repeat(np.arange(len(white)), N_DRAWS_OF_PATTERN)
-    lengths = Cones.of(white).project((draws @ white).reshape(len(which), -1), which)[1]
+    lengths = project_on_cones(white.swapaxes(1, 2) @ white, (draws @ white).reshape(len(which), -1), which)[1]
     return (lengths.reshape(len(white), -1) ** 2).mean(axis=1)
 
 

@@ -31,7 +31,7 @@ from skthermo.detection._directional import (
     mean_squares,
 )
 from skthermo.detection._mahalanobis import MahalanobisDetector, as_if_complete
-from skthermo.residuals.cones import Cones
+from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.folds import Neighbourhoods
 from skthermo.residuals.gaussian import Gaussian, check_invertible, check_not_empty, whitenings
 from skthermo.residuals.weather import parts
@@ -364,7 +364,8 @@ class MeanLaw:
         weights = np.where(counts > 0, 1 / self.deviations(counts), 0.0)
         cases, case = np.unique(weights, axis=0, return_inverse=True)
         effects = cases[:, :, np.newaxis] * self.white_effects
-        return Cones.of(effects).project(np.einsum("ij,ijk->ik", standard, effects[case]), case)
+        along = np.einsum("ij,ijk->ik", standard, effects[case])
+        return project_on_cones(effects.swapaxes(1, 2) @ effects, along, case)
 
     def deviations(self, counts: Array) -> Array:
         """Standard deviations of the means of so many whitened records of each mode."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -332,7 +332,7 @@ class BaselineResiduals:
         is added with a small weight, so that the largest residual of the training records is not the largest of all.
         Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self._smoothed(self.drawn, known, random_state, False))
+        return self._where_known(weather, partial(self._smoothed, self.drawn, random_state, False))
 
     def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
         """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
@@ -341,9 +341,9 @@ class BaselineResiduals:
         same.
         """
         values = self.usual if without_outliers else self.drawn
-        return self._where_known(weather, lambda known: self._smoothed(values, known, random_state, True))
+        return self._where_known(weather, partial(self._smoothed, values, random_state, True))
 
-    def _smoothed(self, values: Array, weather: Array, random_state: np.random.RandomState, is_complete: bool) -> Array:
+    def _smoothed(self, values: Array, random_state: np.random.RandomState, is_complete: bool, weather: Array) -> Array:
         """Values as drawn, and others of the usual ones, added with the bandwidth of Silverman's rule."""
         similar = self._similar(weather)
         taken, other = self._taken(similar, random_state), self._taken(similar, random_state)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
@@ -15,35 +13,21 @@ SMALLEST = 1e-9  # share of the length of a row below which a direction explains
 MOST_STEPS = 3  # for each direction; rows that have not ended then are solved one by one
 
 
-@dataclass(frozen=True)
-class Cones:
-    """Products of the directions of one or several cones, (n_cones, n_directions, n_directions).
+def project_on_cones(products: Array, along: Array, which: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Amounts of the directions and length of the projection of rows w on cones of directions B, their columns.
 
-    The amounts a >= 0 of the directions B that are closest to a row w, min |w - B a|, depend on the products B'B and
-    B'w alone. They are found by the active sets of Lawson and Hanson (1974), for all rows together: those with the same
-    cone and active set share an inverse (Van Benthem and Keenan, 2004).
+    The amounts a >= 0 that are closest to a row, min |w - B a|, depend on products alone: B'B of each cone, (n_cones,
+    n_directions, n_directions), and ``along``, B'w of each row, (n_rows, n_directions), whose cone is ``which``. They
+    are found by the active sets of Lawson and Hanson (1974), for all rows together: those with the same cone and active
+    set share an inverse (Van Benthem and Keenan, 2004).
     """
-
-    products: Array
-
-    @classmethod
-    def of(cls, directions: Array) -> Cones:
-        """Those of directions (..., n_dimensions, n_directions), which are the columns."""
-        directions = directions.reshape(-1, *directions.shape[-2:])
-        return cls(directions.swapaxes(1, 2) @ directions)
-
-    def project(self, along: Array, which: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Amounts of the directions and length of the projection of rows, from their products with the directions.
-
-        ``along`` is B'w, (n_rows, n_directions), and ``which`` the cone of each row.
-        """
-        lengths = np.sqrt(np.einsum("ijj->ij", self.products))
-        scale = np.where(lengths > 0, lengths, 1.0)
-        products = self.products / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
-        along = np.where(lengths[which] > 0, along, 0.0) / scale[which]
-        amounts = _amounts(products + RIDGE * np.eye(products.shape[1]), along, which)
-        squared = 2 * (amounts * along).sum(axis=1) - _squares(products, amounts, which)
-        return amounts / scale[which], np.sqrt(np.maximum(squared, 0.0))
+    lengths = np.sqrt(np.einsum("ijj->ij", products))
+    scale = np.where(lengths > 0, lengths, 1.0)
+    products = products / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
+    along = np.where(lengths[which] > 0, along, 0.0) / scale[which]
+    amounts = _amounts(products + RIDGE * np.eye(products.shape[1]), along, which)
+    squared = 2 * (amounts * along).sum(axis=1) - (amounts * _times(products, amounts, which)).sum(axis=1)
+    return amounts / scale[which], np.sqrt(np.maximum(squared, 0.0))
 
 
 def _amounts(products: Array, along: Array, which: NDArray[np.intp]) -> Array:
@@ -119,7 +103,3 @@ def _times(products: Array, amounts: Array, which: NDArray[np.intp]) -> Array:
     if len(products) == 1:
         return amounts @ products[0]
     return np.einsum("ijk,ik->ij", products[which], amounts)
-
-
-def _squares(products: Array, amounts: Array, which: NDArray[np.intp]) -> Array:
-    return (amounts * _times(products, amounts, which)).sum(axis=1)

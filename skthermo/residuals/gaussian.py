@@ -50,10 +50,6 @@ class Gaussian:
         )
         return cls(centre + scale * mean, covariance * np.outer(scale, scale))
 
-    def centred(self, rows: Array) -> Array:
-        """Rows minus the mean; zero where a mode is missing."""
-        return np.nan_to_num(rows - self.mean)
-
     def whiten(self, rows: Array) -> Array:
         """Rows in standard deviations and uncorrelated; NaN stays where a mode is missing."""
         present, all_alike = ~np.isnan(rows), np.zeros(len(rows), dtype=np.intp)
@@ -65,7 +61,7 @@ class Gaussian:
         masks, of_row = patterns(~np.isnan(rows))
         # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
         inverses = precisions(self.covariance / np.outer(scale, scale), masks)
-        standard = self.centred(rows) / scale
+        standard = np.nan_to_num(rows - self.mean) / scale
         scaled = standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
         squared = np.einsum("ij,ij->i", scaled, standard)
         return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
@@ -87,7 +83,7 @@ class Gaussian:
         """
         masks, of_row = patterns(~np.isnan(rows))
         fill, rest = _conditionals(self.covariance, masks)
-        expected = self.mean + np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
+        expected = self.mean + np.einsum("ijk,ik->ij", fill[of_row], np.nan_to_num(rows - self.mean))
         deviations = np.sqrt(np.maximum(np.einsum("ijj->ij", rest), 0.0))[of_row]
         empty = np.isnan(rows).all(axis=1)[:, np.newaxis]
         filled = np.where(np.isnan(rows), np.where(empty, np.nan, expected), rows)
@@ -104,7 +100,7 @@ class Gaussian:
         """Expected products of the centred modes given those that are there, (n_rows, n_modes, n_modes)."""
         masks, of_row = patterns(~np.isnan(rows))
         fill, rest = _conditionals(self.covariance, masks)
-        complete = np.einsum("ijk,ik->ij", fill[of_row], self.centred(rows))
+        complete = np.einsum("ijk,ik->ij", fill[of_row], np.nan_to_num(rows - self.mean))
         return complete[:, :, np.newaxis] * complete[:, np.newaxis, :] + rest[of_row]
 
 

@@ -25,6 +25,7 @@ from skthermo.residuals.gaussian import (
 )
 from skthermo.residuals.weather import (
     FAR_OUTSIDE,
+    NO_ERRORS,
     NearestPlaces,
     PredictionError,
     TrainingRange,
@@ -234,7 +235,7 @@ def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[A
     """Residuals in standard deviations and uncorrelated, by a covariance each, and their log-likelihood."""
     present = ~np.isnan(residuals)
     roots, log_determinants = whitenings(covariances, present)
-    white = np.einsum("ij,ijk->ik", overall.centred(residuals), roots)
+    white = np.einsum("ij,ijk->ik", np.nan_to_num(residuals - overall.mean), roots)
     return np.where(present, white, np.nan), -0.5 * float((white**2).sum() + log_determinants.sum())
 
 
@@ -248,7 +249,7 @@ class WeatherCovariance:
     """
 
     coordinates: Pipeline
-    places: Array
+    nearest: NearestPlaces
     covariances: Array
     smoothing: Smoothing
     familiar: float
@@ -256,12 +257,8 @@ class WeatherCovariance:
 
     def at(self, weather: Array, overall: Array) -> Array:
         """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
-        distances, near = self._searched.of(self.coordinates.transform(weather))
+        distances, near = self.nearest.of(self.coordinates.transform(weather))
         return self.floored(self.covariances[near[:, 0]], weather, distances, overall)
-
-    @cached_property
-    def _searched(self) -> NearestPlaces:
-        return NearestPlaces(self.places, self.smoothing.n_neighbors)
 
     def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
         """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""
@@ -318,7 +315,8 @@ class Spread:
             return self, white
         familiar = float(np.quantile(local.distances(order=chosen), FAMILIAR))
         trained = TrainingRange.of(weather, usable) if floor else None
-        by_weather = WeatherCovariance(coordinates, places, local.at(), local.smoothing, familiar, trained)
+        searched = NearestPlaces(places, local.smoothing.n_neighbors)
+        by_weather = WeatherCovariance(coordinates, searched, local.at(), local.smoothing, familiar, trained)
         for part in parts(len(usable), local.numbers_per_record):
             block = usable[part]
             here = coordinates.transform(weather[block])
@@ -376,7 +374,9 @@ class Spread:
         again, rows = residuals.copy(), errors.rows
         known = ~np.isnan(residuals[rows]) & (np.diag(self.overall.covariance) > 0)
         shrinkages = self.shrinkages(~np.isnan(residuals), errors)
-        moved = np.einsum("ij,ijk->ik", self.overall.centred(residuals[rows]), shrinkages) + self.overall.mean
+        moved = (
+            np.einsum("ij,ijk->ik", np.nan_to_num(residuals[rows] - self.overall.mean), shrinkages) + self.overall.mean
+        )
         again[rows] = np.where(known, moved, np.nan)
         return again
 
@@ -399,7 +399,7 @@ class Spread:
         self, weather: Array, present: NDArray[np.bool_], errors: PredictionError | None
     ) -> Iterator[tuple[slice, Whitenings]]:
         """Some rows after others, with their whitenings: memory is bounded."""
-        errors = errors or PredictionError.none()
+        errors = errors or NO_ERRORS
         for rows in parts(len(weather), 2 * self.overall.covariance.size):
             some, here = (weather[rows], present[rows]), errors.of_part(rows)
             size = self.overall.covariance.size * len(some[0])

@@ -268,16 +268,11 @@ class PredictionError:
                 middle = middle if moved else predict(filled)
                 moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
             if not moved:
-                return cls.none()
+                return NO_ERRORS
             rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
             start = outcome(middle[rows])
             changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
         return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
-
-    @classmethod
-    def none(cls) -> PredictionError:
-        """That of predictions of which no error is known."""
-        return cls(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
 
     def of_part(self, rows: slice) -> PredictionError:
         """That of some rows of a table, counted from the first of them."""
@@ -299,6 +294,10 @@ class PredictionError:
             return other
         n_modes = other.covariances.shape[1]
         return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
+
+
+NO_ERRORS = PredictionError(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
+"""Of predictions of which no error is known."""
 
 
 def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:

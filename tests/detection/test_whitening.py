@@ -140,7 +140,7 @@ def test_some_of_a_long_baseline_tell_the_spread_of_all(monkeypatch):
     monkeypatch.setattr("skthermo.residuals.spread.MOST_PLACES", 600)
     fitted = compensator()
     white = fitted.fit_transform(X)
-    assert len(fitted.spread_.by_weather.places) == 600
+    assert len(fitted.spread_.by_weather.nearest.places) == 600
     for spread in spreads(white, X):
         np.testing.assert_allclose(spread, np.eye(2), atol=0.3)
 
@@ -167,7 +167,7 @@ def larger(one, other):
 
 def test_in_the_weather_of_the_baseline_the_covariance_follows_the_weather():
     weather = LATER[["T1", "T2"]].to_numpy()
-    by_weather, places = by_default().spread_.by_weather, locally().spread_.by_weather.places
+    by_weather, places = by_default().spread_.by_weather, locally().spread_.by_weather.nearest.places
     distances = nearest(places, by_weather.coordinates.transform(weather), by_weather.smoothing.n_neighbors)[0]
     familiar = (distances.mean(axis=1) < by_weather.familiar) & (by_default().extrapolation_distance(LATER) == 0).all(
         axis=1

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from skthermo.residuals.cones import Cones
+from skthermo.residuals.cones import project_on_cones
 
 
 def directions_of(random, n_dimensions, n_directions, kind):
@@ -30,7 +30,7 @@ def test_lengths_are_those_of_non_negative_least_squares(seed, n_dimensions, n_d
     several = np.stack([directions_of(random, n_dimensions, n_directions, kind) for _ in range(3)])
     rows, which = random.standard_normal((30, n_dimensions)), random.randint(3, size=30)
     along = np.einsum("ij,ijk->ik", rows, several[which])
-    amounts, lengths = Cones.of(several).project(along, which)
+    amounts, lengths = project_on_cones(several.swapaxes(1, 2) @ several, along, which)
     assert (amounts >= 0).all()
     for row, cone, amount, length in zip(rows, which, amounts, lengths, strict=True):
         left = nnls(several[cone], row)[1]
@@ -43,7 +43,7 @@ def test_lengths_are_those_of_non_negative_least_squares(seed, n_dimensions, n_d
 def test_a_row_does_not_depend_on_the_others():
     random = np.random.RandomState(0)
     white, rows = random.standard_normal((6, 4)), random.standard_normal((50, 6))
-    cones, all_alike = Cones.of(white), np.zeros(50, dtype=np.intp)
-    together = cones.project(rows @ white, all_alike)[1]
-    alone = [cones.project(row[np.newaxis] @ white, all_alike[:1])[1][0] for row in rows]
+    products, all_alike = (white.T @ white)[np.newaxis], np.zeros(50, dtype=np.intp)
+    together = project_on_cones(products, rows @ white, all_alike)[1]
+    alone = [project_on_cones(products, row[np.newaxis] @ white, all_alike[:1])[1][0] for row in rows]
     assert together == pytest.approx(alone, abs=1e-12)
