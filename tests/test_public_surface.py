@@ -45,7 +45,7 @@ LARGER = {  # what has more, and why
     "studies.detection_task": "the settings of a study, for grid searches",
     "studies.identify_damage": "each prior and each doubt about a measurement is a setting",
     "surrogate.DataInformedFEM": "the whole chain: its stages, what it simulates and predicts",
-    "surrogate.FitReport": "every number by which a chain is judged",
+    "surrogate.FitReport": "every number that says how good a chain is",
 }
 
 

@@ -179,8 +179,9 @@ class LocalModes:
         -----
         With b = -(dK - lambda_j dM) phi_j, the derivative of phi_j is a sum of M-orthogonal parts:
         (phi_k' b) / (lambda_k - lambda_j) along every other computed mode k, -1/2 phi_j' dM phi_j along phi_j itself,
-        and a remainder, the solution of (K - lambda_j M) x = b beside these modes, found by iteration. Where
-        eigenvalues repeat, the parts along each other's modes are left out.
+        and a remainder, the solution of (K - lambda_j M) x = b beside these modes, found by iteration, without a
+        factorisation of its own for each mode as in [Nel76]_. Where eigenvalues repeat, the parts along each other's
+        modes are left out.
         """
         columns = integer_row(columns, "columns").astype(np.intp)
         if ((columns < 0) | (columns >= len(self._eigenvalues))).any():
