@@ -35,9 +35,9 @@ options = parser.parse_args()
 
 full = make_kw51("all")
 found = {}
-for method in ("exact", "central"):
+for method, step in {"exact": None, "central": 0.01}.items():
     began = time.perf_counter()
-    found[method] = sensitivity(full, method=method).T
+    found[method] = sensitivity(full, step=step).T
     print(f"{method}: {time.perf_counter() - began:.3f} s")
 print(f"largest difference: {(found['exact'] - found['central']).abs().max().max():.1g}")
 

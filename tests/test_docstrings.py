@@ -60,10 +60,8 @@ LONGEST_SIGNATURE = 700  # characters that help() prints
 
 
 def is_documented_elsewhere(name):
-    """Methods whose parameters the protocol of elements documents, or the class that has the protocol of a chain."""
+    """Methods whose parameters the protocol of elements documents."""
     owner, _, method = name.rpartition(".")
-    if owner.endswith(".FittedChain"):
-        return True
     return owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
 
 

@@ -4,8 +4,9 @@
 
 For each package: its files and their lines, packages within it included, and how many of its files are entered by
 ``DataInformedFEM.fit`` and ``simulate``, ``DetectabilityStudy.run`` and ``Monitor.update`` on the truss, as Python's
-profiler sees it; at the end, how many functions are. Reads the skthermo
-that is imported (``PYTHONPATH`` chooses another tree).
+profiler sees it; below, how many functions are. At the end, what a user meets: the public names of each package, and
+the most parameters, fields and methods that one of them has, beside the limits of ``tests/test_public_surface.py``.
+Reads the skthermo that is imported (``PYTHONPATH`` chooses another tree).
 """
 
 import argparse
@@ -23,6 +24,9 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.test_public_surface import LIMITS, by_package, surface
 
 PACKAGE = Path(skthermo.__file__).parent
 
@@ -83,6 +87,9 @@ def main():
         print_row("  " * (len(package.parts) - 1) + package.name, inside, lines, by_action)
     print_row("all", files, lines, by_action)
     print(f"{'functions':39}" + "".join(f"{len(found):10}" for found in functions.values()))
+    found = by_package(surface())
+    limits = LIMITS.reindex(found.index).rename(columns="limit of {}".format)
+    print("", found.join(limits).to_string(), f"{'all':17}{found['names'].sum():8}", sep="\n")
     for action, found in by_action.items() if by_name else ():
         print(f"\n{action} enters", *(file.as_posix() for file in sorted(found)), sep="\n  ")
 

@@ -210,6 +210,33 @@ def central_differences(function: Callable[[Array], Array], theta: Array, values
     return np.moveaxis((above - below) / widths, 1, -1)
 
 
+NO_INFORMATION = 1e-12
+"""Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
+
+
+def cramer_rao(information: Array) -> Array:
+    """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix, which may be singular.
+
+    Parameters that are not determined have infinite variances and NaN covariances. With NaN in the information, all is
+    NaN.
+
+    >>> cramer_rao(np.array([[4.0, 0.0], [0.0, 0.0]]))
+    array([[0.25,  nan],
+           [ nan,  inf]])
+    """
+    if not np.isfinite(information).all():
+        return np.full_like(information, np.nan)
+    scale = np.sqrt(np.diagonal(information))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    known = values > NO_INFORMATION * max(values[-1], np.finfo(float).tiny)
+    covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    unknown = (vectors[:, ~known] ** 2).sum(axis=1) > np.sqrt(NO_INFORMATION)
+    covariance[unknown] = covariance[:, unknown] = np.nan
+    covariance[unknown, unknown] = np.inf
+    return covariance
+
+
 def is_real(value: Any) -> bool:
     """Whether a value is a real number; True, False and durations are none."""
     return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)

@@ -4,36 +4,25 @@ It uses NumPy and SciPy alone. Start with ``_protocol.py``, what a model offers,
 """
 
 from skthermo.fem._evaluate import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
-from skthermo.fem._protocol import (
-    BatchModel,
-    DamageableModel,
-    DifferentiableModel,
-    FEModel,
-    LocalModel,
-    ModalModel,
-)
+from skthermo.fem._imported import ImportedStructure
+from skthermo.fem._protocol import FEModel
+from skthermo.fem._structure import Structure
 from skthermo.fem.affine import AffineModel, FrequencySurface, ReducedModel
-from skthermo.fem.assembly import ImportedStructure, Structure
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
-from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components, shape_jacobian, share_reordered
+from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components
 
 __all__ = [
     "AffineModel",
     "Bar",
-    "BatchModel",
     "Beam",
     "CallableModel",
-    "DamageableModel",
-    "DifferentiableModel",
     "Element",
     "FEModel",
     "FrequencySurface",
     "ImportedStructure",
-    "LocalModel",
     "LocalModes",
     "Membrane",
-    "ModalModel",
     "PointMass",
     "ReducedModel",
     "Spring",
@@ -51,6 +40,4 @@ __all__ = [
     "read_triplets",
     "sample",
     "shape_components",
-    "shape_jacobian",
-    "share_reordered",
 ]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
+from contextlib import closing, nullcontext
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy  # which loads scipy.signal once it is used
@@ -29,46 +29,58 @@ from skthermo._tables.arrays import (
     check_noise,
     check_size,
     check_theta,
-    is_real,
     positive_integer,
     real_array,
 )
-from skthermo.fem._protocol import FEModel, ModalModel
+from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import ROWS_PER_CHUNK, warn_of_failures
+from skthermo.fem.modal import linearised_by_row
 
 if TYPE_CHECKING:
     from skthermo.fem._samples import Samples
 
 
-Solve: TypeAlias = Callable[[Any, Array], tuple[Array, ...]]
+SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
+"""Relative step of central differences at which rounding takes half of the digits of a frequency."""
 
-
-def checked_rows(model: FEModel, theta: ArrayLike, n_jobs: int | None) -> Array:
-    """Rows of theta, in which NaN is allowed, after checks of the model and the number of jobs."""
-    check_model(model)
-    check_jobs(n_jobs)
-    return check_theta(theta, model.parameter_names, allow_nan=True)
+USUAL_STEP = 0.001
+EXPECTED_STEP = (
+    f"a relative step from {SMALLEST_STEP:.1e}, below which rounding takes more than half of the digits, to 1, such as "
+    "0.001"
+)
 
 
 def solve_rows(
     model: FEModel,
-    solve: Solve,
-    rows: Array,
+    theta: ArrayLike,
+    method: str,
     shapes: Mapping[str, tuple[int, ...]],
     n_jobs: int | None,
+    *,
+    dofs: NDArray[np.intp] | None = None,
     progress: bool | None = False,
 ) -> list[Array]:
-    """What ``solve(model, chunk)`` gives for every row, NaN where theta has NaN; failures are one warning.
+    """What a method of a model gives for every row of theta, NaN where theta has NaN; failures are one warning.
 
-    ``shapes`` names the results and gives the shape of each for one row; frequencies are the first.
+    ``shapes`` names the results and gives the shape of each for one row; frequencies are the first. Shapes of modes are
+    those at ``dofs``.
     """
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
     results = [np.full((len(rows), *shape), np.nan) for shape in shapes.values()]
     known = np.flatnonzero(~np.isnan(rows).any(axis=1))
     if not known.size:
         return results
     size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
-    places = [known[i : i + size] for i in range(0, len(known), size)]
-    with closing(_solved(model, solve, [rows[place] for place in places], n_jobs)) as parts:
+    places = np.split(known, range(size, len(known), size))
+    thread_safe = getattr(model, "thread_safe", False)
+    job = Job(model.quiet() if thread_safe else model, method, dofs)  # type: ignore[attr-defined]
+    parts: Any
+    if thread_safe and effective_n_jobs(n_jobs) == 1:
+        parts = map_on_blas_threads(job, [rows[place] for place in places])
+    else:
+        parallel = as_they_come(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+        parts = parallel(delayed(on_one_thread)(job, rows[place]) for place in places)
+    with closing(parts) if hasattr(parts, "close") else nullcontext():
         shown = with_progress(parts, len(known), progress, count=lambda part: len(part[0]))
         for place, part in zip(places, shown, strict=True):
             for result, array, what in zip(results, part, shapes, strict=True):
@@ -83,33 +95,36 @@ def solve_rows(
     return results
 
 
-def _solved(
-    model: Any, solve: Solve, chunks: list[Array], n_jobs: int | None
-) -> Generator[tuple[Array, ...], None, None]:
-    """Results of each chunk, in order; closing the generator stops the work."""
-    thread_safe = getattr(model, "thread_safe", False)
-    task = partial(solve, model.quiet() if thread_safe else model)
-    if thread_safe and effective_n_jobs(n_jobs) == 1:
-        yield from map_on_blas_threads(task, chunks)
-    else:
-        parallel = as_they_come(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-        job = _Job(task)
-        yield from parallel(delayed(_on_one_thread)(job, chunk) for chunk in chunks)
+class Job:
+    """What is asked of a model for every chunk of rows; Dask sends it to a worker once, because it says it is large."""
 
+    def __init__(self, model: Any, method: str, dofs: NDArray[np.intp] | None):
+        self.model = model
+        self.method = method
+        self.dofs = dofs
 
-class _Job:
-    """What is done with every chunk; Dask sends it to a worker once, because it says that it is large."""
-
-    def __init__(self, task: Callable[[Array], tuple[Array, ...]]):
-        self.task = task
+    def __call__(self, theta: Array) -> tuple[Array, ...]:
+        if self.method == "frequencies":
+            return (self.model.frequencies(theta),)
+        if self.method == "modes":
+            frequencies, shapes = self.model.modes(theta)
+            return frequencies, np.asarray(shapes)[:, self.dofs]
+        if self.method == "linearised_modes" and hasattr(self.model, "linearised_modes"):
+            return self.model.linearised_modes(theta, self.dofs)
+        if self.method == "linearised_modes":
+            ranks = None if self.model.track else np.arange(self.model.n_modes)
+            return linearised_by_row(partial(self.model.local_modes, follow=True), theta, self.dofs, ranks)
+        if hasattr(self.model, "linearised"):
+            return self.model.linearised(theta)
+        return self.model.frequencies(theta), self.model.jacobian(theta)
 
     def __sizeof__(self) -> int:
         return 2**20
 
 
-def _on_one_thread(job: _Job, chunk: Array) -> tuple[Array, ...]:
+def on_one_thread(job: Job, chunk: Array) -> tuple[Array, ...]:
     with single_blas_thread():
-        return job.task(chunk)
+        return job(chunk)
 
 
 def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
@@ -151,12 +166,13 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     array([[ 7.48, 27.5 ],
            [  nan,   nan]])
     """
-    rows = checked_rows(model, theta, n_jobs)
-    return solve_rows(model, _frequencies, rows, {"frequencies": (model.n_modes,)}, n_jobs, progress)[0]
+    check_model(model)
+    check_jobs(n_jobs)
+    return solve_rows(model, theta, "frequencies", {"frequencies": (model.n_modes,)}, n_jobs, progress=progress)[0]
 
 
 def evaluate_modes(
-    model: ModalModel, theta: ArrayLike, dofs: ArrayLike, *, n_jobs: int | None = None
+    model: FEModel, theta: ArrayLike, dofs: ArrayLike, *, n_jobs: int | None = None
 ) -> tuple[Array, Array]:
     """Frequencies and mode shapes of many rows of parameters, at some degrees of freedom.
 
@@ -193,47 +209,39 @@ def evaluate_modes(
     >>> frequencies.shape, shapes.shape
     ((1, 6), (1, 2, 6))
     """
-    rows = checked_rows(model, theta, n_jobs)
+    check_model(model)
+    check_jobs(n_jobs)
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
     places = _positions(model, dofs)
     expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
-    frequencies, shapes = solve_rows(model, partial(_modes, dofs=places), rows, expected, n_jobs)
+    frequencies, shapes = solve_rows(model, theta, "modes", expected, n_jobs, dofs=places)
     return frequencies, shapes
 
 
-def _positions(model: ModalModel, dofs: ArrayLike) -> NDArray[np.intp]:
+def _positions(model: Any, dofs: ArrayLike) -> NDArray[np.intp]:
     """Positions of degrees of freedom of a model, given by position or by label."""
     nominal = np.ones((1, len(model.parameter_names)))
     n_dof = model.n_dof if hasattr(model, "n_dof") else np.shape(model.modes(nominal)[1])[1]
     return check_dofs(dofs, n_dof, getattr(model, "dofs", ()))
 
 
-def _frequencies(model: FEModel, theta: Array) -> tuple[Array]:
-    return (model.frequencies(theta),)
-
-
-def _modes(model: ModalModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
-    frequencies, shapes = model.modes(theta)
-    return frequencies, np.asarray(shapes)[:, dofs]
-
-
 def linearise(
-    model: FEModel, theta: ArrayLike, *, relative: bool = False, step: float = 0.001, n_jobs: int | None = None
+    model: FEModel, theta: ArrayLike, *, relative: bool = False, step: float | None = None, n_jobs: int | None = None
 ) -> tuple[Array, Array]:
     """Frequencies of many rows of parameters, and their derivatives.
 
     Parameters
     ----------
     model : FE model
-        Exact derivatives come from its method ``linearised`` or ``jacobian``, if it has one; else from central
-        differences.
+        Exact derivatives come from its method ``linearised`` or ``jacobian``, if it has one.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
     relative : bool, default=False
         Whether to return d ln f / d ln theta in place of d f / d theta.
-    step : float, default=0.001
-        Relative step of central differences.
+    step : float, optional
+        Relative step of central differences, at least 1.5e-8. By default derivatives are exact, or differences with a
+        step of 0.001 where the model gives none.
     n_jobs : int, optional
         Number of parallel jobs (joblib); each takes chunks of rows.
 
@@ -247,7 +255,11 @@ def linearise(
     Raises
     ------
     ValueError
-        If theta is refused as by `evaluate`, or the step is not between 0 and 1.
+        If theta is refused as by `evaluate`, or the step is not between 1.5e-8 and 1.
+
+    See Also
+    --------
+    skthermo.updating.sensitivity : The relative derivatives at one theta, as a frame.
 
     Examples
     --------
@@ -259,25 +271,27 @@ def linearise(
     >>> jacobian[:, 0, 0].round(6)
     array([0.5, 0.5])
     """
-    rows = checked_rows(model, theta, n_jobs)
-    _check_step(step)
-    if hasattr(model, "linearised") or hasattr(model, "jacobian"):
+    check_model(model)
+    check_jobs(n_jobs)
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    if step is None and (hasattr(model, "linearised") or hasattr(model, "jacobian")):
         expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, rows.shape[1])}
-        frequencies, jacobian = solve_rows(model, _linearised, rows, expected, n_jobs)
+        frequencies, jacobian = solve_rows(model, rows, "linearised", expected, n_jobs)
     else:
+        size = USUAL_STEP if step is None else check_size(step, "step", SMALLEST_STEP, 1, EXPECTED_STEP)
         frequencies = evaluate(model, rows, n_jobs=n_jobs)
-        jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, step)
+        jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, size)
     if check_flag(relative, "relative"):
         jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
     return frequencies, jacobian
 
 
 def linearise_modes(
-    model: ModalModel,
+    model: FEModel,
     theta: ArrayLike,
     dofs: ArrayLike,
     *,
-    step: float = 0.001,
+    step: float | None = None,
     n_jobs: int | None = None,
 ) -> tuple[Array, Array, Array, Array]:
     """Frequencies and mode shapes of many rows of parameters, and their derivatives.
@@ -285,15 +299,15 @@ def linearise_modes(
     Parameters
     ----------
     model : FE model
-        Exact derivatives come from its method ``linearised_modes``, if it has one; else those of the shapes are
-        central differences of its method ``modes``, and those of the frequencies as from `linearise`.
+        Exact derivatives come from its method ``linearised_modes`` or ``local_modes``, if it has one; else those of the
+        shapes are central differences of its method ``modes``, and those of the frequencies as from `linearise`.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction)
         Degrees of freedom, such as those of sensors, by position, the first being 0, or by label, as in the model's
         ``dofs``.
-    step : float, default=0.001
-        Relative step of central differences.
+    step : float, optional
+        Relative step of central differences, as of `linearise`.
     n_jobs : int, optional
         Number of parallel jobs (joblib); each takes chunks of rows.
 
@@ -312,7 +326,7 @@ def linearise_modes(
     ------
     ValueError
         If the model has neither method, ``dofs`` are not different degrees of freedom of the model, theta is refused
-        as by `evaluate`, or the step is not between 0 and 1.
+        as by `evaluate`, or the step is not between 1.5e-8 and 1.
 
     Examples
     --------
@@ -321,9 +335,10 @@ def linearise_modes(
     >>> [array.shape for array in linearise_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3, 8])]
     [(1, 6), (1, 6, 4), (1, 3, 6), (1, 3, 6, 4)]
     """
-    rows = checked_rows(model, theta, n_jobs)
-    _check_step(step)
-    if hasattr(model, "linearised_modes"):
+    check_model(model)
+    check_jobs(n_jobs)
+    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    if step is None and (hasattr(model, "linearised_modes") or hasattr(model, "local_modes")):
         places = _positions(model, dofs)
         n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], len(places)
         expected = {
@@ -332,8 +347,8 @@ def linearise_modes(
             "shapes": (n_dofs, n_modes),
             "derivatives of shapes": (n_dofs, n_modes, n_parameters),
         }
-        solve = partial(_linearised_modes, dofs=places)
-        return tuple(solve_rows(model, solve, rows, expected, n_jobs))  # type: ignore[return-value]
+        solved = solve_rows(model, rows, "linearised_modes", expected, n_jobs, dofs=places)
+        return tuple(solved)  # type: ignore[return-value]
     frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
     shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
 
@@ -342,22 +357,7 @@ def linearise_modes(
         reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
         return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
 
-    return frequencies, jacobian, shapes, central_differences(with_the_same_signs, rows, shapes, step)
-
-
-def _linearised(model: Any, theta: Array) -> tuple[Array, Array]:
-    if hasattr(model, "linearised"):
-        return model.linearised(theta)
-    return model.frequencies(theta), model.jacobian(theta)
-
-
-def _linearised_modes(model: Any, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
-    return model.linearised_modes(theta, dofs)
-
-
-def _check_step(step: float) -> None:
-    if not is_real(step) or not 0 < step < 1:
-        raise ValueError(f"step is {step!r}; expected a relative step between 0 and 1, such as 0.001")
+    return frequencies, jacobian, shapes, central_differences(with_the_same_signs, rows, shapes, step or USUAL_STEP)
 
 
 def add_noise(
@@ -475,7 +475,7 @@ def sample(
     theta *= highest - lowest
     theta += lowest
     if dofs is not None:
-        frequencies, shapes = evaluate_modes(cast(ModalModel, model), theta, dofs, n_jobs=n_jobs)
+        frequencies, shapes = evaluate_modes(model, theta, dofs, n_jobs=n_jobs)
         return Samples(theta=theta, frequencies=frequencies, shapes=shapes)
     return Samples(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
 

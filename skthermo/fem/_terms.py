@@ -1,7 +1,7 @@
-"""Rows of theta, and matrices that are affine in products of its parameters."""
+"""Rows of theta, and matrices that are affine in products of its parameters: how they are read, and summed."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
@@ -13,16 +13,14 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Matrix, as_dense
+from skthermo._tables.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import Elimination, elimination
 
+Key = tuple[str, ...]
+
 ROWS_PER_CHUNK = 256  # largest number of samples solved together
-
-
-def nominal_theta(n_parameters: int) -> Array:
-    """One row of ones: every parameter at its nominal value."""
-    return np.ones((1, n_parameters))
+LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably a percentage given instead of a fraction
 
 
 def warn_of_failures(theta: Array, solved: Array) -> None:
@@ -57,6 +55,77 @@ def failures_named(rows: Array, parameter_names: Sequence[str]) -> Iterator[None
         ) from error
 
 
+def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
+    """Names of parameters, all different."""
+    if not isinstance(parameter_names, Iterable) or isinstance(parameter_names, bytes | type):
+        raise ValueError(f"parameter_names is {parameter_names!r}; expected one or more different names")
+    names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
+    if not names or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        raise ValueError(f"parameter_names is {names}; expected one or more different names")
+    return names
+
+
+def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
+    """Checks that groups are known and that severities leave some stiffness."""
+    damage = as_mapping(damage)
+    if not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    for group, severity in damage.items():
+        if group not in groups:
+            raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
+        if not (is_real(severity) and LOWEST_SEVERITY <= float(severity) < 1):
+            raise ValueError(
+                f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
+                f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
+            )
+    return damage
+
+
+def read_terms(terms, what: str, n_dof: int | None = None) -> tuple[list[Key], list[Matrix]]:
+    """Keys and matrices: symmetric copies, dense or sparse as given."""
+    if isinstance(terms, Mapping):
+        pairs = list(terms.items())
+    elif isinstance(terms, Sequence) and all(
+        isinstance(term, tuple) and len(term) == 2 and isinstance(term[0], tuple | str) for term in terms
+    ):
+        pairs = list(terms)
+    else:
+        pairs = [((), terms)]
+    if not pairs:
+        raise ValueError(f"{what} has no terms; expected at least one matrix")
+    keys, matrices = [], []
+    for key, matrix in pairs:
+        names = (key,) if isinstance(key, str) else key
+        if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
+            raise ValueError(f"{what} has the key {key!r}; expected a tuple of parameter names")
+        keys.append(names)
+        matrices.append(read_matrix(matrix, f"{what} term {names}", n_dof))
+        n_dof = matrices[0].shape[0]
+    return keys, matrices
+
+
+def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
+    """An exactly symmetric copy of a matrix that is symmetric to 1e-8 of its largest entry, dense or sparse."""
+    array = scipy.sparse.csc_array(matrix) if scipy.sparse.issparse(matrix) else real_array(matrix, what)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{what} is complex; expected real numbers")
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.shape[0]:
+        raise ValueError(f"{what} has shape {array.shape}; expected a square matrix")
+    if n_dof is not None and array.shape[0] != n_dof:
+        raise ValueError(f"{what} has shape {array.shape}; expected ({n_dof}, {n_dof}) like the first term")
+    array = array.astype(float)
+    if not np.isfinite(array.data if scipy.sparse.issparse(array) else array).all():
+        raise ValueError(f"{what} holds values that are not finite")
+    skew = abs(array - array.T)
+    if skew.max() > 1e-8 * abs(array).max():
+        row, column = np.unravel_index(int(skew.argmax()), array.shape)
+        raise ValueError(
+            f"{what} is not symmetric: entries ({row}, {column}) and ({column}, {row}) are "
+            f"{array[row, column]} and {array[column, row]}"
+        )
+    return (array + array.T) / 2
+
+
 SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
 
 
@@ -68,37 +137,27 @@ class AffineTerms(ABC):
     """
 
     n_dof: int
-    max_rows = ROWS_PER_CHUNK
+    n_entries: int  # stored entries of one summed matrix
+    is_dense: bool
+    max_rows: int  # largest number of rows of theta whose matrices are held together
 
     def __init__(self, exponents: NDArray[np.int64], factors: Array | None = None):
         self.exponents = exponents
         self.factors = np.ones(len(exponents)) if factors is None else factors
-        self._used = [(t, p, exponents[t, p]) for t, p in np.argwhere(exponents)]
-        _freeze(self.exponents, self.factors)
+        self.exponents.flags.writeable = self.factors.flags.writeable = False
+        self.is_constant = not exponents.any()
+        self._used = list(zip(*np.nonzero(exponents), exponents[exponents != 0], strict=True))
 
-    @property
-    def is_constant(self) -> bool:
-        """Whether no parameter multiplies any term."""
-        return not self.exponents.any()
-
-    def products(self, theta: Array) -> Array:
-        """The product of each term's parameters, (n_samples, n_terms)."""
+    def coefficients(self, theta: Array) -> Array:
+        """The factor of each matrix, (n_samples, n_terms): its own times the product of its parameters."""
         products = np.ones((len(theta), len(self.exponents)))
         for term, parameter, exponent in self._used:
             products[:, term] *= theta[:, parameter] ** exponent
-        return products
-
-    def coefficients(self, theta: Array) -> Array:
-        """The factor of each matrix, (n_samples, n_terms)."""
-        return self.factors * self.products(theta)
+        return self.factors * products
 
     def coefficient_gradients(self, theta: Array) -> Array:
         """Derivative of ``coefficients``, (n_samples, n_terms, n_parameters)."""
         return self.coefficients(theta)[:, :, np.newaxis] * self.exponents / theta[:, np.newaxis]
-
-    def gradients(self, theta: Array, shapes: Array) -> Array:
-        """phi' (dA / d theta_p) phi, (n_samples, n_modes, n_parameters)."""
-        return self.quadratic_forms(shapes) @ self.coefficient_gradients(theta)
 
     def derivatives(self, theta: Array, vectors: Array) -> Array:
         """(dA / d theta_p) times each vector at one row of theta, (n, n_vectors, n_parameters)."""
@@ -129,26 +188,14 @@ class AffineTerms(ABC):
         """The summed matrix of every row times its vectors, (n_samples, n, n_vectors)."""
         return np.stack([matrix @ columns for matrix, columns in zip(self.each(theta), vectors, strict=True)])
 
-    @property
-    @abstractmethod
-    def n_entries(self) -> int:
-        """Number of stored entries of one summed matrix."""
-
     @abstractmethod
     def quadratic_forms(self, shapes: Array) -> Array:
         """phi' A_t phi of every shape and term, (n_samples, n_modes, n_terms)."""
 
-    def scaled(self, factors: Array) -> Self:
-        """The same matrices with their factors multiplied."""
-        return self._with(self.exponents, self.factors * factors)
-
-    def with_exponents(self, exponents: NDArray[np.int64]) -> Self:
-        """The same matrices, multiplied by other parameters."""
-        return self._with(exponents, self.factors)
-
-    def _with(self, exponents: NDArray[np.int64], factors: Array) -> Self:
+    def with_factors(self, factors: Array, exponents: NDArray[np.int64] | None = None) -> Self:
+        """The same matrices with these fixed multipliers, and other parameters if there are new exponents."""
         twin = copy(self)
-        AffineTerms.__init__(twin, exponents, factors)
+        AffineTerms.__init__(twin, self.exponents if exponents is None else exponents, factors)
         return twin
 
     @property
@@ -159,7 +206,7 @@ class AffineTerms(ABC):
     def with_terms(self, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
         """These terms and further ones; a row of zeros among the exponents makes a constant one."""
         terms = type(self).from_matrices([*self.each_matrix, *matrices], np.vstack([self.exponents, exponents]))
-        return terms.scaled(np.append(self.factors, np.ones(len(matrices))))
+        return terms.with_factors(np.append(self.factors, np.ones(len(matrices))))
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":
@@ -169,19 +216,17 @@ class AffineTerms(ABC):
 class DenseTerms(AffineTerms):
     """Terms for batches: ``matrices`` is (n_terms, n, n)."""
 
+    is_dense, max_rows = True, ROWS_PER_CHUNK
+
     def __init__(self, matrices: Array, exponents: NDArray[np.int64], factors: Array | None = None):
         super().__init__(exponents, factors)
         self.matrices = matrices
-        self.n_dof = matrices.shape[1]
-        _freeze(self.matrices)
+        self.matrices.flags.writeable = False
+        self.n_dof, self.n_entries = matrices.shape[1], matrices.shape[1] ** 2
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
         return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
-
-    @property
-    def n_entries(self) -> int:
-        return self.n_dof**2
 
     def assemble(self, theta: Array) -> Array:
         flat = self.matrices.reshape(len(self.matrices), -1)
@@ -196,8 +241,10 @@ class DenseTerms(AffineTerms):
         return products @ self.coefficient_gradients(theta)[:, np.newaxis]
 
     def quadratic_forms(self, shapes: Array) -> Array:
-        forms = [np.einsum("sim,sim->sm", shapes, matrix @ shapes) for matrix in self.matrices]
-        return np.stack(forms, axis=2)
+        forms = np.empty((len(shapes), shapes.shape[2], len(self.matrices)))
+        for term, matrix in enumerate(self.matrices):
+            forms[:, :, term] = np.einsum("sim,sim->sm", shapes, matrix @ shapes)
+        return forms
 
     @property
     def each_matrix(self) -> list[Matrix]:
@@ -215,7 +262,7 @@ class SparsityPattern:
     pointers: NDArray[np.int32]
 
     def __post_init__(self) -> None:
-        _freeze(self.rows, self.pointers)
+        self.rows.flags.writeable = self.pointers.flags.writeable = False
 
     @property
     def n_dof(self) -> int:
@@ -241,14 +288,15 @@ class SparseTerms(AffineTerms):
     with ``entries`` and has the same pattern whatever theta is.
     """
 
-    max_rows = SPARSE_ROWS_PER_CHUNK
+    is_dense, max_rows = False, SPARSE_ROWS_PER_CHUNK
 
     def __init__(self, entries: scipy.sparse.csc_array, pattern: SparsityPattern, exponents: NDArray[np.int64]):
         super().__init__(exponents)
         self.entries = entries
         self.pattern = pattern
-        self.n_dof = pattern.n_dof
-        _freeze(entries.data, entries.indices, entries.indptr)
+        self.n_dof, self.n_entries = pattern.n_dof, len(pattern.rows)
+        for array in (entries.data, entries.indices, entries.indptr):
+            array.flags.writeable = False
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
@@ -261,10 +309,6 @@ class SparseTerms(AffineTerms):
         entries = scipy.sparse.csc_array((values, (position, term)), shape=(len(union), len(parts)))
         pointers = np.searchsorted(union, np.arange(n_dof + 1) * n_dof)
         return cls(entries, SparsityPattern((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
-
-    @property
-    def n_entries(self) -> int:
-        return len(self.pattern.rows)
 
     def assemble(self, theta: Array) -> list[scipy.sparse.csc_array]:
         sums = self.entries @ self.coefficients(theta).T
@@ -288,17 +332,8 @@ class SparseTerms(AffineTerms):
         return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
 
     def projected(self, basis: Array) -> DenseTerms:
-        matrices = np.stack([_projected(matrix, basis) for matrix in self.each_matrix])
+        matrices = np.empty((len(self.exponents), basis.shape[1], basis.shape[1]))
+        for projected, matrix in zip(matrices, self.each_matrix, strict=True):
+            used = np.flatnonzero(np.diff(matrix.indptr))  # the degrees of freedom that it joins
+            projected[:] = basis[used].T @ (matrix[:, used] @ basis[used])[used]
         return DenseTerms(matrices, self.exponents, self.factors)
-
-
-def _projected(matrix: scipy.sparse.csc_array, basis: Array) -> Array:
-    """basis' A basis, from the degrees of freedom that A joins."""
-    used = np.flatnonzero(np.diff(matrix.indptr))
-    product: Array = basis[used].T @ (matrix[:, used] @ basis[used])[used]
-    return product
-
-
-def _freeze(*arrays: NDArray) -> None:
-    for array in arrays:
-        array.flags.writeable = False

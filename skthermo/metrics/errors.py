@@ -44,7 +44,7 @@ def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
     >>> mape([[2.0, 4.0], [2.0, 4.0]], [[2.02, 4.0], [1.98, float("nan")]])
     array([1., 0.])
     """
-    return _percentages(*_paired_frequencies(y_true, y_pred))
+    return _percentages(*_paired(y_true, y_pred))
 
 
 def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any] | None = None) -> pd.DataFrame:
@@ -81,7 +81,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     damaged  3.0      3.0
     Average  2.0      2.0
     """
-    measured, predicted = _paired_frequencies(y_true, y_pred)
+    measured, predicted = _paired(y_true, y_pred)
     labels = np.full(len(measured), "all") if scenarios is None else np.asarray(scenarios, dtype=object)
     if labels.shape != (len(measured),):
         raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
@@ -128,8 +128,8 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike, sample_weight: ArrayLike |
     >>> complete_r2([[4.0], [4.2], [4.4]], [[4.0], [4.2], [float("nan")]])
     1.0
     """
-    measured, predicted = _paired(y_true, y_pred)
-    complete, weights = _complete(measured, predicted), row_weights(sample_weight, y_true)
+    measured, predicted = _paired(y_true, y_pred, are_frequencies=False)
+    complete, weights = ~np.isnan(measured + predicted).any(axis=1), row_weights(sample_weight, y_true)
     if weights is not None:
         complete &= weights > 0
         weights = weights[complete]
@@ -173,8 +173,8 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     """
     if isinstance(estimator, type) or not hasattr(estimator, "predict"):
         raise ValueError(f"estimator is {estimator!r:.200}; expected a fitted estimator with a method predict")
-    measured, predicted = _paired_frequencies(y, estimator.predict(X))
-    complete = _complete(measured, predicted)
+    measured, predicted = _paired(y, estimator.predict(X))
+    complete = ~np.isnan(measured + predicted).any(axis=1)
     return {
         "neg_mape": -float(_percentages(measured[complete], predicted[complete]).mean()),
         "r2": complete_r2(measured, predicted),
@@ -182,15 +182,20 @@ def frequency_scorer(estimator: Any, X: ArrayLike, y: ArrayLike) -> dict[str, fl
     }
 
 
-def _paired(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both tables as arrays, the columns of two frames paired by name."""
-    if all(hasattr(table, "columns") for table in (y_true, y_pred)):
-        measured_names, predicted_names = (list(table.columns) for table in (y_true, y_pred))
-        if measured_names != predicted_names:
-            y_pred = y_pred[_same_names(measured_names, predicted_names)]
-    measured, predicted = (
-        as_columns(real_array(values, name)) for name, values in (("y_true", y_true), ("y_pred", y_pred))
-    )
+def _paired(
+    y_true: Any, y_pred: Any, *, are_frequencies: bool = True
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both tables as arrays, the columns of two frames paired by name.
+
+    Measured frequencies are positive, and no predicted one stands for a missing value.
+    """
+    if hasattr(y_true, "columns") and hasattr(y_pred, "columns"):
+        names, others = list(y_true.columns), list(y_pred.columns)
+        if names != others:
+            if len(set(names)) < len(names) or set(names) != set(others) or len(names) != len(others):
+                raise ValueError(f"y_true has the columns {names} and y_pred {others}; expected the same, each once")
+            y_pred = y_pred[names]
+    measured, predicted = as_columns(real_array(y_true, "y_true")), as_columns(real_array(y_pred, "y_pred"))
     if measured.ndim != 2 or measured.shape != predicted.shape:
         raise ValueError(
             f"y_true has shape {measured.shape} and y_pred {predicted.shape}; expected the same (n_samples, n_modes)"
@@ -198,26 +203,14 @@ def _paired(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.f
     check_same_rows(y_true, y_pred, ("y_true", "y_pred"))
     for name, values, table in (("y_true", measured, y_true), ("y_pred", predicted, y_pred)):
         _refuse(np.isinf(values), table, name, "a finite number, or NaN where a value is missing")
-    return measured, predicted
-
-
-def _paired_frequencies(y_true: Any, y_pred: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same for frequencies: measured ones are positive, and none stands for a missing value."""
-    measured, predicted = _paired(y_true, y_pred)
-    _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
-    _refuse(np.isin(predicted, MARKERS), y_pred, "y_pred", "a frequency, or NaN where it is missing")
+    if are_frequencies:
+        _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
+        _refuse(np.isin(predicted, MARKERS), y_pred, "y_pred", "a frequency, or NaN where it is missing")
     return measured, predicted
 
 
 def _percentages(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.float64]:
     return 100 * pd.DataFrame(np.abs((measured - predicted) / measured)).mean().to_numpy()
-
-
-def _same_names(measured: list[Any], predicted: list[Any]) -> list[Any]:
-    """The names of measured columns, which must be those of the predicted ones in another order."""
-    if len(set(measured)) < len(measured) or set(measured) != set(predicted) or len(measured) != len(predicted):
-        raise ValueError(f"y_true has the columns {measured} and y_pred {predicted}; expected the same, each once")
-    return measured
 
 
 def _refuse(wrong: NDArray[np.bool_], table: Any, name: str, expected: str) -> None:
@@ -226,7 +219,3 @@ def _refuse(wrong: NDArray[np.bool_], table: Any, name: str, expected: str) -> N
         value = as_columns(table)[row, column]
         columns = column_names(table if np.ndim(table) == 2 else wrong, "f")
         raise ValueError(f"row {row} of {columns[column]!r} in {name} is {value:g}; expected {expected}")
-
-
-def _complete(measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray(~np.isnan(measured + predicted).any(axis=1))

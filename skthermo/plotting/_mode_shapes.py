@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skthermo._tables.arrays import Array
-from skthermo.fem import ModalModel, Structure
+from skthermo.fem import FEModel, Structure
 from skthermo.plotting._display import LIGHT, ORANGE, Display
 from skthermo.plotting._structures import (
     Projection,
@@ -79,7 +79,7 @@ class ModeShapesDisplay(Display):
     def from_structure(
         cls,
         structure: Structure,
-        model: ModalModel | None = None,
+        model: FEModel | None = None,
         modes: Sequence[int] | None = None,
         *,
         groups: Sequence[str] | None = None,

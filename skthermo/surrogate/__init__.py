@@ -5,13 +5,13 @@ step.
 """
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
-from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
+from skthermo.surrogate.chain import DataInformedFEM, FitReport
+from skthermo.surrogate.chain import FittedChain as FittedChain  # what annotations of other packages name
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
 __all__ = [
     "DataInformedFEM",
     "FitReport",
-    "FittedChain",
     "InverseSurrogate",
     "PosteriorInverse",
     "TemperatureMapper",

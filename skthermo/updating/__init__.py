@@ -3,7 +3,7 @@
 It uses ``fem``. Start with ``_updater.py``.
 """
 
-from skthermo.updating._identifiability import cramer_rao, identifiability, select_parameters, sensitivity
+from skthermo.updating._identifiability import identifiability, select_parameters, sensitivity
 from skthermo.updating._updater import ModelUpdater
 
-__all__ = ["ModelUpdater", "cramer_rao", "identifiability", "select_parameters", "sensitivity"]
+__all__ = ["ModelUpdater", "identifiability", "select_parameters", "sensitivity"]

@@ -1,15 +1,16 @@
 """Tables and warnings about the result of an updating."""
 
 from collections.abc import Iterator, Sequence
-from typing import cast
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from skthermo._tables.arrays import Array, seem_rad_per_s
 from skthermo.exceptions import ModelWarning
-from skthermo.fem import FEModel, ModalModel, share_reordered
+from skthermo.fem import FEModel, mac
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 
 LOW_MAC = 0.5  # MAC below which a measured shape is not that of the mode it is paired with
@@ -143,11 +144,15 @@ def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[Mo
             )
 
 
-def _swapped(model: FEModel, theta: Array) -> NDArray[np.bool_]:
+def _swapped(model: Any, theta: Array) -> NDArray[np.bool_]:
     """Columns that hold another mode at theta than at the nominal parameters."""
     if getattr(model, "track", True):
         return np.zeros(model.n_modes, bool)
     if hasattr(model, "local_modes"):
         return np.asarray(model.local_modes(theta, follow=True).ranks != np.arange(model.n_modes))
-    has_shapes = hasattr(model, "modes")
-    return np.full(model.n_modes, has_shapes and share_reordered(cast(ModalModel, model), theta[np.newaxis]) > 0)
+    if not hasattr(model, "modes"):
+        return np.zeros(model.n_modes, bool)
+    nominal, now = (model.modes(row[np.newaxis])[1][0] for row in (np.ones_like(theta), theta))
+    similar = mac(nominal, now)
+    is_another = linear_sum_assignment(similar, maximize=True)[1] != np.arange(len(similar))
+    return is_another | (np.diagonal(similar) < LOW_MAC)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -17,40 +15,29 @@ from sklearn.utils import Bunch
 from skthermo._tables.arrays import (
     HUGE,
     Array,
-    central_differences,
     check_model,
     check_noise,
     check_theta,
+    cramer_rao,
     is_real,
     real_array,
 )
 from skthermo._tables.text import SPACE, counted, listed
-from skthermo.fem import FEModel, evaluate, shape_jacobian
+from skthermo.fem import FEModel, linearise, linearise_modes
 from skthermo.updating._residuals import tangent_derivatives
 
-SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
-"""Relative step of central differences at which rounding takes half of the digits of a frequency."""
 
-
-def sensitivity(
-    model: FEModel,
-    theta: ArrayLike | None = None,
-    *,
-    method: Literal["exact", "central"] = "exact",
-    step: float = 0.01,
-) -> pd.DataFrame:
+def sensitivity(model: FEModel, theta: ArrayLike | None = None, *, step: float | None = None) -> pd.DataFrame:
     """Normalised sensitivities of frequencies to parameters, equation (A.1) [KCM26]_.
 
     Parameters
     ----------
     model : FE model
-        With ``method="exact"`` it needs a ``jacobian``.
+        Derivatives are exact if it gives them, as `~skthermo.fem.AffineModel` does; else central differences.
     theta : array-like of shape (n_parameters,), optional
         Multipliers at which to differentiate; 1 by default.
-    method : {"exact", "central"}, default="exact"
-        Exact derivatives, or central differences, eq. (A.2), of any model.
-    step : float, default=0.01
-        Relative step of central differences, at least 1.5e-8.
+    step : float, optional
+        Relative step of central differences, eq. (A.2), of any model, as of `~skthermo.fem.linearise`.
 
     Returns
     -------
@@ -60,10 +47,11 @@ def sensitivity(
     Raises
     ------
     ValueError
-        If the model is none, has no ``jacobian``, has no frequencies at theta, or method, theta or step is not valid.
+        If the model is none, has no frequencies at theta, or theta or step is not valid.
 
     See Also
     --------
+    skthermo.fem.linearise : The same at many theta, as an array.
     select_parameters : Parameters that change some mode enough.
     identifiability : Parameters that measured modes can identify.
 
@@ -84,26 +72,12 @@ def sensitivity(
     Name: f1, dtype: float64
     """
     row = theta_or_nominal(model, theta)
-    frequencies = evaluate(model, row)
+    frequencies, slopes = linearise(model, row, relative=True, step=step)
     if not np.isfinite(frequencies).all():
         raise ValueError(
             f"the model has the frequencies {frequencies[0]} at theta = {row[0].tolist()}; expected numbers"
         )
-    if method == "exact":
-        if not hasattr(model, "jacobian"):
-            raise ValueError(f"{model!r} has no method 'jacobian'; expected one that has, or method='central'")
-        jacobian = model.jacobian(row)
-    elif method == "central":
-        if not is_real(step) or not SMALLEST_STEP <= step < 1:
-            raise ValueError(
-                f"step is {step!r}; expected a relative step from {SMALLEST_STEP:.1e}, below which rounding takes "
-                "more than half of the digits, to 1, such as 0.01"
-            )
-        jacobian = central_differences(partial(evaluate, model), row, frequencies, step)
-    else:
-        raise ValueError(f"method is {method!r}; expected 'exact' or 'central'")
-    names = [f"f{i + 1}" for i in range(model.n_modes)]
-    return pd.DataFrame(jacobian[0] * row / frequencies.T, names, list(model.parameter_names))
+    return pd.DataFrame(slopes[0], [f"f{i + 1}" for i in range(model.n_modes)], list(model.parameter_names))
 
 
 def select_parameters(S: pd.DataFrame, threshold: float = 0.1) -> list[str]:
@@ -155,9 +129,7 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
 
 COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be distinguished
 ACCURATE = 0.1  # largest relative standard deviation of the estimates of a recommended subset
-
-NO_INFORMATION = 1e-12
-"""Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
+SMALLEST_SHARE = 1e-6  # singular value, as a share of the largest, below which it counts as zero
 
 
 class Identifiability(Bunch):
@@ -221,7 +193,7 @@ def identifiability(
     Parameters
     ----------
     model : FE model
-        If it has no ``jacobian``, its derivatives are central differences.
+        If it gives no derivatives, they are central differences.
     theta : array-like of shape (n_parameters,), optional
         Multipliers at which to differentiate; 1 by default.
     noise : float or array-like of shape (n_modes,)
@@ -229,7 +201,7 @@ def identifiability(
         sqrt(n).
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
         Degrees of freedom, by position, the first being 0, or by label, where mode shapes are measured too. The model
-        needs a method ``local_modes``, as `~skthermo.fem.AffineModel` has.
+        needs a method ``modes`` or ``local_modes``, as `~skthermo.fem.AffineModel` has.
     shape_noise : float, optional
         Standard deviation of a shape's components as a share of their root mean square.
 
@@ -254,7 +226,7 @@ def identifiability(
     ------
     ValueError
         If noise is negative or zero for some modes only, just one of ``dofs`` and ``shape_noise`` is given, or the
-        model has no method ``local_modes`` where they are.
+        model has no method ``modes`` or ``local_modes`` where they are.
 
     See Also
     --------
@@ -285,7 +257,7 @@ def identifiability(
     """
     check_model(model)
     names = list(model.parameter_names)
-    S = sensitivity(model, theta, method="exact" if hasattr(model, "jacobian") else "central")
+    S = sensitivity(model, theta)
     deviations = check_noise(noise, model.n_modes)
     if deviations.any() and not deviations.all():
         raise ValueError(f"noise is {deviations}; expected it positive for all modes, or zero for all")
@@ -302,7 +274,7 @@ def identifiability(
     smallest = values[-1] if len(values) == len(names) else 0.0
     ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
     return Identifiability(
-        rank=int((values > np.sqrt(NO_INFORMATION) * values[0]).sum()),
+        rank=int((values > SMALLEST_SHARE * values[0]).sum()),
         n_modes=model.n_modes,
         n_dofs=0 if dofs is None else len(dofs),
         sensitivity=S,
@@ -314,61 +286,12 @@ def identifiability(
     )
 
 
-def cramer_rao(information: ArrayLike) -> Array:
-    """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix.
-
-    Parameters
-    ----------
-    information : array-like of shape (n_parameters, n_parameters)
-        Symmetric, perhaps singular.
-
-    Returns
-    -------
-    ndarray of shape (n_parameters, n_parameters)
-        Parameters that are not determined have infinite variances and NaN covariances. All NaN if the
-        information has NaN.
-
-    Raises
-    ------
-    ValueError
-        If the information is not a symmetric matrix of numbers, or has a negative diagonal.
-
-    Examples
-    --------
-    >>> from skthermo.updating import cramer_rao
-    >>> cramer_rao([[4.0, 0.0], [0.0, 0.0]])
-    array([[0.25,  nan],
-           [ nan,  inf]])
-    """
-    information = real_array(information, "information")
-    if np.isinf(information).any():
-        raise ValueError("information holds infinite values; expected finite ones")
-    if information.ndim != 2 or information.shape[0] != information.shape[1] or not information.size:
-        raise ValueError(f"information has shape {information.shape}; expected (n_parameters, n_parameters)")
-    if not np.isfinite(information).all():
-        return np.full_like(information, np.nan)
-    diagonal = np.diagonal(information)
-    if (diagonal < 0).any() or not np.allclose(information, information.T, rtol=1e-6, atol=1e-6 * diagonal.max()):
-        raise ValueError(
-            f"information is {information.tolist()!s:.200}; expected a symmetric matrix, none of its diagonal negative"
-        )
-    scale = np.sqrt(diagonal)
-    scale = np.where(scale > 0, scale, 1.0)
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    known = values > NO_INFORMATION * max(values[-1], np.finfo(float).tiny)
-    covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
-    unknown = (vectors[:, ~known] ** 2).sum(axis=1) > np.sqrt(NO_INFORMATION)
-    covariance[unknown] = covariance[:, unknown] = np.nan
-    covariance[unknown, unknown] = np.inf
-    return covariance
-
-
 def _shape_rows(model: FEModel, theta: ArrayLike | None, dofs: ArrayLike, shape_noise: float | None) -> Array:
     """Derivatives of unit shapes with respect to ln theta, divided by their noise."""
     if not is_real(shape_noise) or not 0 < shape_noise < HUGE:
         raise ValueError(f"shape_noise is {shape_noise!r}; expected a positive number, such as 0.01 for 1 %")
     row = theta_or_nominal(model, theta)
-    shapes, d_shapes = shape_jacobian(model, row, dofs)
+    shapes, d_shapes = (array[0] for array in linearise_modes(model, row, dofs)[2:])
     slopes = tangent_derivatives(shapes, d_shapes, shapes / np.linalg.norm(shapes, axis=0)) * row[0]
     return slopes.reshape(-1, row.shape[1]) * np.sqrt(len(shapes)) / shape_noise
 

@@ -23,6 +23,7 @@ from skthermo._tables.arrays import (
     check_model,
     check_prior,
     check_size,
+    cramer_rao,
     is_auto,
     positive_integer,
     real_array,
@@ -49,7 +50,6 @@ from skthermo.updating._diagnostics import (
     unfinished,
 )
 from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
-from skthermo.updating._identifiability import cramer_rao
 from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise, read_measured
 
 EVALUATIONS_PER_START = 10  # of the model, which a search is expected to take

@@ -593,12 +593,6 @@ use(
     ),
     reference=(SHAPES, table(SHAPES, nan=False, rows=True, fixed=True)),
 )
-use("fem.shape_jacobian", usual="model dofs", theta=(ROW, table(ROW, nan=False, positive=True, rows=False)))
-use(
-    "fem.share_reordered",
-    usual="model",
-    theta=(THETA, table(THETA, nan=False, positive=True, rows=False, but=("no rows",))),
-)
 np.savez(FOLDER / "model.npz", E=STIFF, M=EYE)
 use(
     "fem.load_affine",
@@ -968,7 +962,6 @@ use(
     shapes=(SHAPES, table(SHAPES, rows=True, but=("complex numbers",))),
     frequency_std=(0.1, by_name(0.1, MODES)),
 )
-use("updating.cramer_rao", information=(STIFF, matrix(STIFF)))
 use(
     "updating.identifiability",
     lambda **a: updating.identifiability(**a).deviations,
@@ -986,7 +979,6 @@ use(
     "updating.sensitivity",
     usual="model",
     theta=(ROW, table(ROW, nan=False, positive=True, rows=False)),
-    method=("central", choice()),
     step=(0.01, number(0, -1, 1.0)),
 )
 
@@ -1560,9 +1552,6 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ),
     ("fem.Structure", "neither matrix", lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}), "stiffness"),
     ("fem.CallableModel", "text", lambda: fem.CallableModel(lambda t: "no", ["k"], 1).frequencies([[1]]), "expected"),
-    ("fem.shape_jacobian", "a program", lambda: fem.shape_jacobian(ONE_MODE, [1.0]), "'local_modes'"),
-    ("fem.share_reordered", "a program", lambda: fem.modal.share_reordered(ONE_MODE, [[1.0]]), "'modes'"),
-    ("fem.share_reordered", "no rows", lambda: fem.modal.share_reordered(TRUSS, np.ones((0, 4))), "theta"),
     ("fem.match_modes", "too many modes", lambda: fem.match_modes(TRUSS, np.ones((1, 50))), "50"),
     ("fem.match_modes", "no dofs", lambda: fem.match_modes(TRUSS, NOMINAL, shapes=np.ones((2, 6))), "dofs"),
     ("LagFeatures", "a table of lags", lambda: LagFeatures([[1, 2]]).fit(HOURLY), "lags"),
@@ -1662,11 +1651,9 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("metrics.mape", "-999 measured", lambda: metrics.mape(changed(F, 7, 1, -999.0), F), "row 7"),
     ("error_table", "a scenario Average", lambda: metrics.error_table(F, F, scenarios=["Average"] * 120), "Average"),
     ("error_table", "no scenario", lambda: metrics.error_table([1, 2], [1, 2], scenarios=["a", None]), "row 1"),
-    ("updating.sensitivity", "no Jacobian", lambda: updating.sensitivity(ONE_MODE), "'jacobian'"),
     ("updating.select_parameters", "text", lambda: updating.select_parameters(pd.DataFrame({"top": ["a"]})), "S"),
     ("identifiability", "some noise", lambda: updating.identifiability(TRUSS, noise=[0] + [1e-3] * 5), "noise"),
     ("identifiability", "dofs alone", lambda: updating.identifiability(TRUSS, noise=0.01, dofs=[0]), "shape_noise"),
-    ("updating.cramer_rao", "negative information", lambda: updating.cramer_rao([[-1.0]]), "negative"),
     ("ModelUpdater", "bounds without 1", lambda: updated(bounds=[[1.1, 1.3]] * 4), "contain 1"),
     ("ModelUpdater", "F of NaN", lambda: updated(NOMINAL * NAN), "NaN"),
     ("ModelUpdater", "three axes", lambda: updated(NOMINAL[np.newaxis]), "dim"),
@@ -1795,13 +1782,8 @@ BY_NAME = {  # values with names, and a call that reads them by name
 
 NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
-    "fem.BatchModel": "a protocol",
-    "fem.DamageableModel": "a protocol",
-    "fem.DifferentiableModel": "a protocol",
     "fem.Element": "a protocol",
     "fem.FEModel": "a protocol",
-    "fem.LocalModel": "a protocol",
-    "fem.ModalModel": "a protocol",
     "fem.LocalModes": "made by a model's local_modes",
     "surrogate.FitReport": "made by a chain's fit",
     "preprocessing.RecordFindings": "made by check_records",
@@ -1851,7 +1833,6 @@ LEGAL |= {
     "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
     "severities": {("empty", "studies.sweep"): "the healthy structure alone"},
-    "information": {("NaN inside", "updating.cramer_rao"): "NaN stays NaN"},
     "modes": {("empty", "studies.compare_extensions"): "no further modes are asked for"},
     "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
     "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},

@@ -35,3 +35,11 @@ def portal(n_elements=8, **options):
 
 
 FRAME = portal()
+
+
+def local_shapes(model, row, dofs=None):
+    """Mode shapes at one row of theta, and their derivatives by the modes that `local_modes` gives."""
+    modes = model.local_modes(row, follow=True)
+    columns = modes.ranks if model.track else np.arange(model.n_modes)
+    places = np.arange(model.n_dof) if dofs is None else dofs
+    return modes.shapes(places)[:, columns], modes.derivatives(columns, places)[1]

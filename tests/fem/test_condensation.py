@@ -9,7 +9,7 @@ from scipy.stats import ortho_group
 
 from skthermo.fem._terms import DenseTerms
 from skthermo.fem.modal import CondensationSolver, batch_solver, dense_solver
-from skthermo.fem.modal._dense import Ritz, certificate
+from skthermo.fem.modal._condensation import Ritz, certificate
 from tests.fem.frames import FRAME, portal
 
 N, N_MODES, TOL = 60, 5, 2e-7

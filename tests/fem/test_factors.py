@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, sample
 from skthermo.fem._factors import SOLVERS, VARIABLE, elimination, factorise
+from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, portal
 from tests.fem.test_sparse import THETA, chain, dense_frequencies
 
@@ -96,9 +97,11 @@ def test_a_solver_that_is_missing_is_named(monkeypatch):
 
 def frequencies_near(model, theta, guesses, tol=1e-10):
     """Frequencies and shapes from guesses, the same for all rows."""
-    eigenvalues, shapes = model._core.solver.modes_near(
-        theta, np.broadcast_to(guesses, (len(theta), *guesses.shape)), model.n_modes, tol=tol
+    core = model._core
+    guided = ShiftInvertSolver(
+        core.stiffness, core.mass, lambda rows, _: np.broadcast_to(guesses, (len(rows), *guesses.shape)), tol
     )
+    eigenvalues, shapes = guided.modes(theta, model.n_modes)
     return np.sqrt(eigenvalues) / (2 * np.pi), shapes
 
 

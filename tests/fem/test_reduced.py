@@ -146,6 +146,6 @@ def test_small_dense_models_and_varying_mass_reduce_too():
 
 
 def test_an_error_that_no_basis_reaches_is_said(monkeypatch):
-    monkeypatch.setattr("skthermo.fem.affine._reduced.MAX_ROUNDS", 3)
+    monkeypatch.setattr("skthermo.fem.affine._basis.MAX_ROUNDS", 3)
     with pytest.raises(RuntimeError, match=r"after 3 rounds .* do not give frequencies to 1e-13"):
         make_truss().reduced(0.2, tol=1e-13)

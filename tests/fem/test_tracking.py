@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo.fem import AffineModel, Beam, Structure, mac, share_reordered
+from skthermo.fem import AffineModel, Beam, Structure, mac
 from skthermo.fem.modal import may_be_missed, pair_modes, repeated_modes
 
 
@@ -128,14 +128,6 @@ def test_a_pair_that_swaps_with_another_mode_is_followed_as_a_pair():
     repeated = np.array([[True, False, False], [False, True, True], [False, True, True]])
     macs = np.array([[[0.02, 0.95, 0.03], [0.48, 0.02, 0.5], [0.5, 0.03, 0.47]]])
     np.testing.assert_array_equal(pair_modes(macs, repeated), [[1, 0, 2]])
-
-
-def test_share_of_reordered_samples():
-    assert share_reordered(crossing(), np.array([[1.0, 1, 1, 1], [9, 1, 1, 1]])) == 0.5
-
-
-def test_an_intruder_counts_as_reordered():
-    assert share_reordered(crossing(), np.array([[1.0, 1, 1, 1], [1, 1, 1, 0.1]])) == 0.5
 
 
 def test_modes_are_followed_where_mass_changes():

@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skthermo._tables.arrays import cramer_rao
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
-from skthermo.updating import cramer_rao, identifiability, select_parameters, sensitivity
+from skthermo.updating import identifiability, select_parameters, sensitivity
 from tests.fem.frames import FRAME
 from tests.fem.test_local_modes import building_frame
 
@@ -17,7 +18,7 @@ THETA = [0.9, 1.1, 1.05, 0.95]
 @pytest.mark.parametrize("theta", [None, THETA])
 def test_exact_sensitivities_equal_central_differences(model, theta):
     exact = sensitivity(model, theta)
-    central = sensitivity(model, theta, method="central", step=1e-4)
+    central = sensitivity(model, theta, step=1e-4)
     pd.testing.assert_frame_equal(exact, central, rtol=0, atol=1e-6)
     assert list(exact.columns) == list(model.parameter_names)
     assert list(exact.index) == [f"f{i}" for i in range(1, 7)]
@@ -31,7 +32,7 @@ def test_sensitivities_sum_to_a_half_where_parameters_hold_all_stiffness():
 def test_a_power_law_has_its_exponents_as_sensitivities():
     exponents = np.array([[0.5, -0.5], [0.2, 1.0], [0.0, 0.1]])
     model = CallableModel(lambda theta: np.exp(np.log(theta) @ exponents.T), ["k", "m"], 3, vectorized=True)
-    S = sensitivity(model, [0.7, 2.0], method="central", step=1e-4)
+    S = sensitivity(model, [0.7, 2.0], step=1e-4)
     np.testing.assert_allclose(S, exponents, atol=1e-7)
     assert select_parameters(S) == ["k", "m"]
     assert select_parameters(S, threshold=0.6) == ["m"]
@@ -46,7 +47,7 @@ def test_a_power_law_has_its_exponents_as_sensitivities():
 
 def test_a_model_without_frequencies_has_no_sensitivities():
     with pytest.warns(UserWarning, match="NaN"), pytest.raises(ValueError, match="expected numbers"):
-        sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1), method="central")
+        sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1))
 
 
 def series_of_springs():
@@ -138,5 +139,5 @@ def test_shapes_add_information():
     rows = shape_rows(model, dofs) / 1e-6
     np.testing.assert_allclose(finer.deviations, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))), rtol=1e-4)
     other = CallableModel(model.frequencies, model.parameter_names, 6, vectorized=True)
-    with pytest.raises(ValueError, match="has no method 'local_modes'; expected a model with one, such as AffineModel"):
+    with pytest.raises(ValueError, match="has no method 'modes'; expected"):
         identifiability(other, noise=0.001, dofs=dofs, shape_noise=0.01)

@@ -1,16 +1,6 @@
-"""Affine models: the full and the reduced model, and the terms and eigensolver that both use."""
+"""Affine models, full and on a basis of mode shapes, and polynomials of their frequencies."""
 
-from skthermo.fem.affine._affine import AffineModel
-from skthermo.fem.affine._base import check_different, check_severities, read_matrix, read_terms
-from skthermo.fem.affine._reduced import ReducedModel
+from skthermo.fem.affine._affine import AffineModel, ReducedModel
 from skthermo.fem.affine._surface import FrequencySurface
 
-__all__ = [
-    "AffineModel",
-    "FrequencySurface",
-    "ReducedModel",
-    "check_different",
-    "check_severities",
-    "read_matrix",
-    "read_terms",
-]
+__all__ = ["AffineModel", "FrequencySurface", "ReducedModel"]

@@ -1,8 +1,7 @@
 """FE models from other programs, through exported matrices or functions that return matrices or frequencies."""
 
 from skthermo.fem.external._callable import CallableModel
-from skthermo.fem.external._differences import difference_terms
+from skthermo.fem.external._differences import difference_terms, probe
 from skthermo.fem.external._exported import load_affine, read_triplets
-from skthermo.fem.external._probe import probe
 
 __all__ = ["CallableModel", "difference_terms", "load_affine", "probe", "read_triplets"]

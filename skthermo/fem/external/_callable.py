@@ -17,8 +17,14 @@ from numpy.typing import ArrayLike
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
 from skthermo.exceptions import ModelWarning
-from skthermo.fem._terms import ROWS_PER_CHUNK, by_name, failures_named, warn_of_failures
-from skthermo.fem.affine import check_different, check_severities
+from skthermo.fem._terms import (
+    ROWS_PER_CHUNK,
+    by_name,
+    check_different,
+    check_severities,
+    failures_named,
+    warn_of_failures,
+)
 
 SECONDS = 600  # a process waits so long while others write
 

@@ -1,48 +1,24 @@
 """Eigenproblems, tracking of modes by their shapes, and derivatives of modes."""
 
-from skthermo.fem._factors import factorise
-from skthermo.fem.modal._dense import (
-    CondensationSolver,
-    EigenSolver,
-    batch_solver,
-    dense_solver,
-    hertz,
-    shape_derivatives,
-)
-from skthermo.fem.modal._local_modes import LocalModes, shape_jacobian
-from skthermo.fem.modal._pairing import (
-    mac,
-    match_modes,
-    may_be_missed,
-    may_differ,
-    pair_modes,
-    repeated_modes,
-    shape_components,
-    share_reordered,
-)
-from skthermo.fem.modal._sparse import GuidedSolver, ShiftInvertSolver
-from skthermo.fem.modal._stability import check_supported, count_modes
+from skthermo.fem.modal._condensation import CondensationSolver, batch_solver
+from skthermo.fem.modal._core import AffineCore, dense_solver, may_be_missed, pair_modes, repeated_modes
+from skthermo.fem.modal._modes import LocalModes, linearised_by_row, mac, match_modes, shape_components
+from skthermo.fem.modal._sparse import ShiftInvertSolver, check_supported, count_modes
 
 __all__ = [
+    "AffineCore",
     "CondensationSolver",
-    "EigenSolver",
-    "GuidedSolver",
     "LocalModes",
     "ShiftInvertSolver",
     "batch_solver",
     "check_supported",
     "count_modes",
     "dense_solver",
-    "factorise",
-    "hertz",
+    "linearised_by_row",
     "mac",
     "match_modes",
     "may_be_missed",
-    "may_differ",
     "pair_modes",
     "repeated_modes",
     "shape_components",
-    "shape_derivatives",
-    "shape_jacobian",
-    "share_reordered",
 ]

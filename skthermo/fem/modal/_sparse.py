@@ -1,16 +1,15 @@
-"""Sparse eigenproblems K phi = lambda M phi, one theta after the other."""
+"""Sparse eigenproblems K phi = lambda M phi, one theta after the other, and checks for mechanisms and missing mass."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
-from skthermo.fem._factors import Factors
+from skthermo._tables.arrays import Array, Label, Matrix, as_dense
+from skthermo.fem._factors import Factors, factorise
 from skthermo.fem._terms import SparseTerms
-from skthermo.fem.modal._dense import EigenSolver
 
 MAX_STEPS = 6
 RANDOM_COLUMNS, RANDOM_STEPS = 2, 3
@@ -95,11 +94,23 @@ class ShiftInvertSolver:
 
     The start vector is random with a fixed seed: the same theta gives the same bits, and no mode of a symmetric
     structure is orthogonal to it.
+
+    A ``guide``, which gives shapes near a number of modes at many theta, (n_samples, n_dof, n_shapes), makes it faster:
+    from good shapes, eigenvalues are found to a relative error ``tol``. Rows that it does not help are solved as
+    without it.
     """
 
-    def __init__(self, stiffness: SparseTerms, mass: SparseTerms):
+    def __init__(
+        self,
+        stiffness: SparseTerms,
+        mass: SparseTerms,
+        guide: Callable[[Array, int], Array] | None = None,
+        tol: float = 0.0,
+    ):
         self._stiffness = stiffness
         self._mass = mass
+        self._guide = guide
+        self._tol = tol
         self._start = seeded_start(stiffness.n_dof)
         self._factorise = stiffness.pattern.elimination.factorise
 
@@ -109,27 +120,18 @@ class ShiftInvertSolver:
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
         return self._each(theta, n_modes, with_shapes=True)
 
-    def modes_near(self, theta: Array, guesses: Array, n_modes: int, *, tol: float) -> tuple[Array, Array]:
-        """The same as ``modes``, to a relative error ``tol`` of the eigenvalues, faster from good guesses of shapes.
-
-        Guesses (n_samples, n_dof, n_guesses) are for at least as many modes; rows that they do not help are solved as
-        by ``modes``.
-        """
-        return self._each(theta, n_modes, with_shapes=True, guesses=guesses, tol=tol)
-
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
-        return ShiftInvertSolver(self._stiffness.scaled(factors), self._mass)
+        return ShiftInvertSolver(self._stiffness.with_factors(self._stiffness.factors * factors), self._mass)
 
-    def _each(
-        self, theta: Array, n_modes: int, *, with_shapes: bool, guesses: Array | None = None, tol: float = 0.0
-    ) -> tuple[Array, Array]:
+    def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
         eigenvalues = np.full((len(theta), n_modes), np.nan)
         shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
+        guesses = None if self._guide is None else self._guide(theta, n_modes + 2 * GUARD_VECTORS)
         pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
         for row, (stiffness, mass) in enumerate(pairs):
             factors, found = self._factorise(stiffness), None
-            if factors is not None and guesses is not None:
-                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=tol)
+            if factors is not None and guesses is not None and guesses.shape[2] >= n_modes:
+                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=self._tol)
             if found is None:
                 found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
             eigenvalues[row] = found[0]
@@ -142,32 +144,6 @@ class ShiftInvertSolver:
         factors = self._factorise(stiffness)
         eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
         return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
-
-
-class GuidedSolver:
-    """A sparse solver that starts from the shapes of the same structure on a basis, to a relative error ``tol``."""
-
-    def __init__(self, full: ShiftInvertSolver, reduced: EigenSolver, basis: Array, tol: float):
-        self._full = full
-        self._reduced = reduced
-        self._basis = basis
-        self._tol = tol
-
-    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        return self.modes(theta, n_modes)[0]
-
-    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        n_guesses = min(n_modes + 2 * GUARD_VECTORS, self._basis.shape[1])
-        if n_guesses < n_modes:
-            return self._full.modes(theta, n_modes)
-        guesses = self._basis @ self._reduced.modes(theta, n_guesses)[1]
-        return self._full.modes_near(theta, guesses, n_modes, tol=self._tol)
-
-    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        return self._full.local_modes(theta, n_modes)
-
-    def scaled(self, factors: Array) -> EigenSolver:
-        return self._full.scaled(factors)
 
 
 def lowest_modes(
@@ -216,3 +192,87 @@ def modes_of_few_masses(
 def seeded_start(n_dof: int) -> Array:
     """A random start vector, the same in every call."""
     return np.random.default_rng(0).standard_normal(n_dof)
+
+
+EPS = np.finfo(float).eps
+
+FEW_DOFS = 500  # degrees of freedom up to which a mass matrix is examined as a dense one
+SMALL_SHIFT = 1e-10  # multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite
+
+
+def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
+    """Refuse a stiffness that is not positive definite within rounding, and name where the motion is largest.
+
+    The energy x'Kx of a motion is a sum of entries that cancel where the motion is nearly rigid. Of a mechanism,
+    rounding of these entries is all that is left; the softest motion of a fine mesh has more.
+    """
+    diagonal = stiffness.diagonal()
+    if (diagonal <= 0).any():
+        _refuse(np.flatnonzero(diagonal <= 0), dofs)
+    scale = 1 / np.sqrt(diagonal)
+    if isinstance(stiffness, np.ndarray):
+        eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
+        lowest, vector, rounding = eigenvalues[0], vectors[:, 0], 50 * EPS * eigenvalues[-1]
+    else:
+        scaled = _scaled(stiffness, scale)
+        lowest, vector = _lowest(scaled)
+        rounding = 10 * EPS * (np.abs(vector) @ (abs(scaled) @ np.abs(vector)))
+    if lowest <= rounding:
+        motion = np.abs(scale * vector)
+        largest = np.argsort(-motion, kind="stable")
+        _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], dofs)
+
+
+def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> int:
+    """How many modes of finite frequency a mass matrix allows: an error if fewer than ``at_least``.
+
+    For a sparse matrix with many masses this is the number of degrees of freedom with mass.
+    """
+    diagonal = mass.diagonal()
+    if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= FEW_DOFS:
+        kept = np.flatnonzero(diagonal) if isinstance(mass, scipy.sparse.csc_array) else slice(None)
+        part = mass[kept][:, kept]
+        eigenvalues = np.linalg.eigvalsh(as_dense(part))
+        tolerance = 10 * len(eigenvalues) * EPS * abs(eigenvalues[-1])
+        outside = abs(mass).sum() > (1 + 1e-12) * abs(part).sum()  # beside a diagonal of zero
+        negative, count = outside or eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
+    else:
+        massive = diagonal > 0
+        scale = 1 / np.sqrt(np.where(massive, diagonal, 1.0))
+        shifted = _scaled(mass, scale) + SMALL_SHIFT * scipy.sparse.eye_array(len(diagonal), format="csc")
+        negative, count = factorise(shifted) is None, int(massive.sum())
+    if negative:
+        raise ValueError(f"the {what} has a negative eigenvalue; expected none below zero")
+    if count < at_least:
+        raise ValueError(
+            f"n_modes is {at_least}, but {len(diagonal)} degrees of freedom, {len(diagonal) - count} of them "
+            f"massless, have only {count} modes"
+        )
+    return count
+
+
+def _scaled(matrix: scipy.sparse.csc_array, scale: Array) -> scipy.sparse.csc_array:
+    """The matrix with its rows and columns multiplied by ``scale``."""
+    diagonal = scipy.sparse.diags_array(scale, format="csc")
+    return diagonal @ matrix @ diagonal
+
+
+def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
+    """Lowest eigenvalue and its eigenvector, by shift-invert with a shift below it."""
+    identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
+    shift = SMALL_SHIFT
+    while (factors := factorise(matrix + shift * identity)) is None:
+        shift *= 10
+    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factors.solve, dtype=float)
+    start = seeded_start(matrix.shape[0])
+    eigenvalue, vector = scipy.sparse.linalg.eigsh(matrix, 1, sigma=-shift, OPinv=inverse, v0=start)
+    return float(eigenvalue[0]), vector[:, 0]
+
+
+def _refuse(free: NDArray[np.intp], dofs: Sequence[Label]) -> None:
+    shown = [f"node {dofs[i][0]!r} along {dofs[i][1]}" if dofs else f"degree of freedom {i}" for i in free[:6]]
+    listed = ", ".join(shown) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
+    raise ValueError(
+        f"the structure is a mechanism: {listed} can move without resistance; "
+        "expected supports, springs or members that resist every motion (a positive definite stiffness)"
+    )

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._tables.arrays import Array, as_floats, robust_deviation, spread_evenly
+from skthermo._tables.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
 from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import capital
@@ -27,7 +27,6 @@ from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
 from skthermo.surrogate.chain._stages import Discrepancy, Estimates, ThermalModel, Weather
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior
-from skthermo.updating import cramer_rao
 
 
 class FittedChain(Protocol):

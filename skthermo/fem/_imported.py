@@ -11,8 +11,7 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._tables.arrays import Array, Label, Matrix
-from skthermo.fem.affine import AffineModel
-from skthermo.fem.assembly._structure import (
+from skthermo.fem._structure import (
     MASS,
     SAME,
     STIFFNESS,
@@ -23,6 +22,7 @@ from skthermo.fem.assembly._structure import (
     check_same,
     read_coordinates,
 )
+from skthermo.fem.affine import AffineModel
 from skthermo.fem.elements import ByProperties, PhysicalElement
 
 

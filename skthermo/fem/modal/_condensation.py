@@ -1,6 +1,4 @@
-"""Dense eigenproblems K phi = lambda M phi of many theta in one batch.
-
-Three solvers scale mode shapes to unit modal mass, and return NaN where the stiffness is not positive definite."""
+"""Dense eigenproblems of many theta by iterated condensation, from the nominal modes, with LAPACK for the rest."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
@@ -11,9 +9,6 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
 from skthermo.fem._terms import DenseTerms
-
-WIDEST_SPECTRUM = 1e6
-"""Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9 of its value."""
 
 
 class EigenSolver(Protocol):
@@ -30,123 +25,6 @@ class EigenSolver(Protocol):
 
     def scaled(self, factors: Array) -> "EigenSolver":
         """The solver of the same structure with its stiffness terms multiplied."""
-
-
-class StandardSolver:
-    """A y = lambda y with A = L^-1 K L^-T and phi = L^-T y, for a constant mass M = L L'.
-
-    The mass is factored once and every stiffness term transformed once.
-    """
-
-    def __init__(self, transformed: DenseTerms, basis: Array, stiffness: DenseTerms):
-        self._transformed = transformed
-        self._basis = basis
-        self._stiffness = stiffness
-
-    @classmethod
-    def from_mass(cls, stiffness: DenseTerms, mass: Array) -> "StandardSolver":
-        """The solver for a positive definite mass matrix."""
-        lower = np.linalg.cholesky(mass)
-        basis = scipy.linalg.solve_triangular(lower, np.eye(len(mass)), lower=True).T
-        return cls(stiffness.projected(basis), basis, stiffness)
-
-    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        return _nan_unless_positive(np.linalg.eigvalsh(self._transformed.assemble(theta)))[:, :n_modes]
-
-    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        eigenvalues, shapes = np.linalg.eigh(self._transformed.assemble(theta))
-        return _nan_unless_positive(eigenvalues)[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
-
-    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        eigenvalues, shapes = self.modes(theta, n_modes)
-        return eigenvalues[0], shapes[0], cholesky_solver(self._stiffness, theta)
-
-    def scaled(self, factors: Array) -> "StandardSolver":
-        return StandardSolver(self._transformed.scaled(factors), self._basis, self._stiffness.scaled(factors))
-
-
-class FlexibilitySolver:
-    """B y = y / lambda with B = L^-1 M L^-T and phi = L^-T y sqrt(lambda), for K = L L'.
-
-    The mass may vary with theta or be zero at some degrees of freedom. The lowest modes stay accurate where the
-    eigenvalues span many orders of magnitude.
-    """
-
-    def __init__(self, stiffness: DenseTerms, mass: DenseTerms):
-        self._stiffness = stiffness
-        self._mass = mass
-
-    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        flexibility, _, ones = self._flexibility(theta)
-        return ones / np.linalg.eigvalsh(flexibility)[:, ::-1][:, :n_modes]
-
-    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        flexibility, back, ones = self._flexibility(theta)
-        inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
-        eigenvalues = ones / inverse_eigenvalues[:, ::-1][:, :n_modes]
-        return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
-
-    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        eigenvalues, shapes = self.modes(theta, n_modes)
-        return eigenvalues[0], shapes[0], cholesky_solver(self._stiffness, theta)
-
-    def scaled(self, factors: Array) -> "FlexibilitySolver":
-        return FlexibilitySolver(self._stiffness.scaled(factors), self._mass)
-
-    def _flexibility(self, theta: Array) -> tuple[Array, Array, Array]:
-        """B, L^-T, and a column of ones with NaN where the stiffness has no L."""
-        lower, ones = _cholesky(self._stiffness.assemble(theta))
-        inverse: Array = np.asarray(np.linalg.inv(lower), dtype=float)
-        transposed = inverse.swapaxes(1, 2)
-        return inverse @ self._mass.assemble(theta) @ transposed, transposed, ones
-
-
-def dense_solver(
-    stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = WIDEST_SPECTRUM
-) -> EigenSolver:
-    """The standard form, which is the fastest, where it is accurate enough; else the flexibility form."""
-    if mass.is_constant:
-        matrix = mass.assemble(nominal)[0]
-        lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]]
-        if lowest > len(matrix) * np.finfo(float).eps * highest:
-            solver = StandardSolver.from_mass(stiffness, matrix)
-            eigenvalues = solver.eigenvalues(nominal, len(matrix))[0]
-            if eigenvalues[-1] < widest * eigenvalues[0]:
-                return solver
-    return FlexibilitySolver(stiffness, mass)
-
-
-def hertz(eigenvalues: Array) -> Array:
-    """Natural frequencies in Hz of the eigenvalues (2 pi f)^2."""
-    return np.sqrt(eigenvalues) / (2 * np.pi)
-
-
-def cholesky_solver(stiffness: DenseTerms, theta: Array) -> Callable[[Array], Array]:
-    """A function that solves K x = b at one theta; the matrix is factored when it is first called."""
-    factors: list = []
-
-    def solve(columns: Array) -> Array:
-        if not factors:
-            factors.append(scipy.linalg.cho_factor(stiffness.assemble(theta)[0]))
-        return scipy.linalg.cho_solve(factors[0], columns)
-
-    return solve
-
-
-def _nan_unless_positive(eigenvalues: NDArray[np.floating]) -> Array:
-    """Eigenvalues in ascending order; rows whose lowest is not positive become NaN."""
-    return np.where(eigenvalues[:, :1] > 0, eigenvalues, np.nan)
-
-
-def _cholesky(matrices: Array) -> tuple[Array, Array]:
-    """Lower factors and ones; the identity and NaN where a matrix is not positive definite."""
-    try:
-        return np.asarray(np.linalg.cholesky(matrices), dtype=float), np.ones((len(matrices), 1))
-    except np.linalg.LinAlgError:
-        if len(matrices) == 1:
-            return np.eye(matrices.shape[1])[np.newaxis], np.full((1, 1), np.nan)
-        factors, ones = zip(*(_cholesky(matrix[np.newaxis]) for matrix in matrices), strict=True)
-        return np.concatenate(factors), np.concatenate(ones)
 
 
 ROWS_TOGETHER = 32  # whose matrices stay in the processor's cache
@@ -256,18 +134,14 @@ class CondensationSolver:
         most = min(len(self._mu) // 3, np.count_nonzero(self._mu > LEAST_MASS * self._mu[0]))
         return int(apart[0]) if apart.size and apart[0] <= most else 0
 
-    def _lower_bounds(self, theta: Array) -> Array:
-        """c of each row such that K(theta) >= c K(1)."""
-        products = self._stiffness.products(theta)
-        lowest = products.min(axis=1)
-        return lowest + (products - lowest[:, np.newaxis]) @ self._floors
-
     def _iterate_together(
         self, theta: Array, m: int, tol: float, eigenvalues: Array, shapes: Array, certified: NDArray[np.bool_]
     ) -> None:
         """Fill in the rows that can be certified."""
         mu, n_modes = self._mu, eigenvalues.shape[1]
-        bounds = self._lower_bounds(theta)
+        products = self._stiffness.coefficients(theta) / self._stiffness.factors
+        lowest = products.min(axis=1)
+        bounds = lowest + (products - lowest[:, np.newaxis]) @ self._floors  # c such that K(theta) >= c K(1)
         rows = np.flatnonzero(bounds > 0)
         bounds, K = bounds[rows], self._stiffness.assemble(theta[rows])
         ritz = masters_alone(K, mu, m)
@@ -377,52 +251,3 @@ def _dot(a: Array, b: Array) -> Array:
 def _ratio(a: Array, b: Array) -> Array:
     """a / b, or 0 where the iteration has found the solution."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
-
-
-NUDGE = 1e-9  # share of the stiffness that is added where a repeated eigenvalue makes the equations singular
-
-
-def shape_derivatives(
-    stiffness: DenseTerms, mass: DenseTerms, theta: Array, eigenvalues: Array, shapes: Array
-) -> Array:
-    """Derivatives of mode shapes of unit modal mass, (n_samples, n, n_modes, n_parameters).
-
-    Solves the bordered equations
-
-    [K - lambda M, M phi; phi' M, 0] [d phi; -d lambda] = [-(dK - lambda dM) phi; -1/2 phi' dM phi]
-
-    for each mode of all rows together. They are regular where the eigenvalue is not repeated, also with massless
-    degrees of freedom. Rows with NaN eigenvalues, which have no solution, stay NaN.
-    """
-    solved = np.flatnonzero(np.isfinite(eigenvalues).all(axis=1))
-    derivatives = np.full((*shapes.shape, theta.shape[1]), np.nan)
-    theta, eigenvalues, shapes = theta[solved], eigenvalues[solved], shapes[solved]
-    K, M = stiffness.assemble(theta), mass.assemble(theta)
-    forces, d_masses = -stiffness.batch_derivatives(theta, shapes), np.zeros((len(theta), *derivatives.shape[2:]))
-    if not mass.is_constant:
-        inertia = mass.batch_derivatives(theta, shapes)
-        forces += eigenvalues[:, np.newaxis, :, np.newaxis] * inertia
-        d_masses = np.einsum("sim,simp->smp", shapes, inertia)
-    for mode in range(shapes.shape[2]):
-        phi, shift = shapes[:, :, mode], eigenvalues[:, mode, np.newaxis, np.newaxis]
-        right = np.concatenate([forces[:, :, mode], -0.5 * d_masses[:, np.newaxis, mode]], axis=1)
-        border = (M @ phi[:, :, np.newaxis])[:, :, 0]
-        derivatives[solved, :, mode] = _solve_bordered(K - shift * M, border, right, K)
-    return derivatives
-
-
-def _solve_bordered(matrices: Array, borders: Array, right: Array, scale: Array) -> Array:
-    """The first n unknowns of equations with a border of one row and column."""
-    n = matrices.shape[1]
-    largest = np.abs(scale).max(axis=(1, 2), initial=0.0)
-    factors = largest / np.abs(borders).max(axis=1)
-    bordered = np.zeros((len(matrices), n + 1, n + 1))
-    bordered[:, :n, :n] = matrices
-    bordered[:, :n, n] = bordered[:, n, :n] = borders * factors[:, np.newaxis]
-    right[:, n] *= factors[:, np.newaxis]
-    try:
-        found = np.linalg.solve(bordered, right)
-    except np.linalg.LinAlgError:
-        bordered[:, :n, :n] += NUDGE * largest[:, np.newaxis, np.newaxis] * np.eye(n)
-        found = np.linalg.solve(bordered, right)
-    return np.asarray(found, dtype=float)[:, :n]

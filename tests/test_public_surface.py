@@ -1,0 +1,101 @@
+"""How much a user meets: public names, and the parameters, fields and methods of each. A new door has to be argued for.
+
+``python tools/house.py`` prints the present numbers.
+"""
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+
+import pandas as pd
+import pytest
+from sklearn.utils import Bunch
+
+import skthermo
+
+LIMITS = pd.DataFrame.from_dict(
+    {  # of each package, and the most that one of its classes or functions has
+        "datasets": (14, 10, 4, 10),
+        "detection": (7, 5, 0, 12),
+        "fem": (27, 9, 16, 32),
+        "fleet": (4, 7, 0, 12),
+        "metrics": (7, 3, 0, 0),
+        "monitoring": (6, 14, 20, 34),
+        "plotting": (8, 0, 9, 5),
+        "preprocessing": (17, 7, 5, 6),
+        "reporting": (1, 11, 0, 0),
+        "studies": (15, 15, 19, 24),
+        "surrogate": (6, 11, 21, 16),
+        "updating": (4, 10, 0, 3),
+    },
+    orient="index",
+    columns=["names", "parameters", "fields", "methods"],
+)
+MOST = {"parameters": 11, "fields": 11, "methods": 12}
+LARGER = {  # what has more, and why
+    "fem.AffineModel": "all that a model may offer: what it is, its modes, what can be changed of it",
+    "fem.ReducedModel": "an AffineModel, and what was reduced",
+    "fem.Beam": "the properties of a section in space, each of which can be a parameter",
+    "monitoring.Monitor": "a detector in service: its settings, its records, its events, what an owner decides",
+    "monitoring.MonitorStatus": "all that a page or a program shows of a monitor",
+    "monitoring.ParameterHistory": "all that a page shows of parameters over years",
+    "studies.DetectabilityStudy": "what is simulated, what is uncertain, and every table of the result",
+    "studies.IdentifiedDamage": "explanations, their probabilities and the evidence for each",
+    "studies.detection_task": "the settings of a study, for grid searches",
+    "studies.identify_damage": "each prior and each doubt about a measurement is a setting",
+    "surrogate.DataInformedFEM": "the whole chain: its stages, what it simulates and predicts",
+    "surrogate.FitReport": "every number that says how good a chain is",
+}
+
+
+def surface():
+    """Parameters, fields and methods of all public classes and functions, in rows such as "fem.Bar"."""
+    rows = {}
+    for room in pkgutil.iter_modules(skthermo.__path__, "skthermo."):
+        module = importlib.import_module(room.name)
+        for name in getattr(module, "__all__", ()) if room.ispkg and "._" not in room.name else ():
+            thing = getattr(module, name)
+            key = f"{room.name.removeprefix('skthermo.')}.{name}"
+            rows[key] = (
+                sizes_of_class(thing) if inspect.isclass(thing) else (len(inspect.signature(thing).parameters), 0, 0)
+            )
+    return pd.DataFrame.from_dict(rows, orient="index", columns=list(MOST))
+
+
+def sizes_of_class(thing):
+    """Parameters, or fields of what holds data, and public methods and properties, without scikit-learn's own."""
+    ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
+    members = {name: member for base in ours for name, member in vars(base).items() if hasattr(type(member), "__get__")}
+    requests = {name for name in members if name.startswith("set_") and name.endswith("_request")}
+    methods = {name for name in members if name[0] != "_"} - requests
+    if dataclasses.is_dataclass(thing):
+        return 0, len(dataclasses.fields(thing)), len(methods)
+    if issubclass(thing, Bunch):
+        return 0, len({name for base in ours for name in inspect.get_annotations(base)}), len(methods)
+    n_parameters = 0 if getattr(thing, "_is_protocol", False) else len(inspect.signature(thing).parameters)
+    return n_parameters, 0, len(methods)
+
+
+def by_package(sizes):
+    """Number of names of each package, and the most parameters, fields and methods that one has."""
+    package = sizes.index.str.partition(".").get_level_values(0)
+    return pd.concat([sizes.groupby(package).size().rename("names"), sizes.groupby(package).max()], axis=1)
+
+
+@pytest.fixture(scope="module")
+def sizes():
+    return surface()
+
+
+def test_no_package_has_grown(sizes):
+    found = by_package(sizes)
+    assert found.index.symmetric_difference(LIMITS.index).empty
+    grown = found[(found > LIMITS.loc[found.index]).any(axis=1)]
+    assert grown.empty, f"more than their limits:\n{grown}"
+
+
+def test_what_is_large_has_a_reason(sizes):
+    large = sizes.index[(sizes > pd.Series(MOST)).any(axis=1)]
+    assert set(large) <= set(LARGER), f"more than {MOST}:\n{sizes.loc[large.difference(LARGER)]}"
+    assert set(LARGER) <= set(sizes.index)
