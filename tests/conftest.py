@@ -1,9 +1,12 @@
-"""A monitor that tests of several packages read and copy."""
+"""A monitor that tests of several packages read and copy; more examples of chance at night."""
 
 import pytest
+from hypothesis import settings
 
 from skthermo.monitoring import load_monitor
 from tests.monitoring.nightly import fitted_monitor, truss_records
+
+settings.register_profile("nightly", max_examples=200)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from skthermo.commands._looking import DAYS, look_at
 from skthermo.commands._record_files import CsvFormat, read_file
 from tests.commands.folders import run
+from tests.nights import by_day
 
 RANDOM = np.random.default_rng(0)
 RECORDS = pd.DataFrame(
@@ -31,7 +32,7 @@ RECORDS.iloc[5, 0] = np.nan
     units=st.booleans(),
     is_split=st.booleans(),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=by_day(15, at_night=40), deadline=None)
 def test_every_form_is_found(
     tmp_path_factory, separator, decimal, days, clock, encoding, missing, head, units, is_split
 ):
@@ -107,7 +108,7 @@ ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "A
 )
 @example(zone="Australia/Lord_Howe", start=datetime(2015, 3, 1), minutes=60)  # the clock goes back by half an hour
 @example(zone="Australia/Lord_Howe", start=datetime(2015, 3, 1), minutes=20)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=by_day(5, at_night=15), deadline=None)
 def test_local_clocks_are_followed_over_their_changes(tmp_path_factory, zone, start, minutes):
     year = pd.date_range(
         pd.Timestamp(start).floor("h"), periods=370 * 24 * 60 // minutes // 8, freq=f"{minutes}min", tz="UTC"

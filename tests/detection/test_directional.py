@@ -228,6 +228,7 @@ def test_copies_share_a_fitted_chain_and_decide_alike(fem):
     assert (pickle.loads(pickle.dumps(fitted)).predict(F) == fitted.predict(F)).all()
 
 
+@pytest.mark.one_case
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")  # the first windows
 @pytest.mark.parametrize("rule", ["mean", "m-of-n"])
 def test_windows_find_more_with_directions(rule):

@@ -14,13 +14,17 @@ from scipy.stats import binom, chi
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.detection._windowed_alarm import CountLaw, MeanLaw, Windows, robust_means
 from skthermo.metrics import time_to_detection
+from tests.nights import by_day
 
 RULES = ["mean", "m-of-n"]
 each_rule = pytest.mark.parametrize("rule", RULES)
 MIXED = np.array([[1.0, 0.3, 0.0], [0.0, 1.0, -0.4], [0.2, 0.0, 0.5]])
 
 
-def stream(n_rows=1500, seed=0, correlation=0.0, shift=0.0):
+N_ROWS = 800
+
+
+def stream(n_rows=N_ROWS, seed=0, correlation=0.0, shift=0.0):
     """Hourly records of three modes; ``correlation`` of neighbours in time, ``shift`` in standard deviations of f1."""
     noise = np.random.default_rng(seed).normal(size=(n_rows, 3))
     noise[1:] *= np.sqrt(1 - correlation**2)
@@ -68,7 +72,7 @@ def test_the_index_is_the_length_of_the_robust_mean_in_its_standard_deviations()
     alarm = WindowedAlarm(24).fit(X)
     white = alarm.law_.records.whiten(LATER.to_numpy())
     limits = 1.5 * np.sqrt(1 - alarm.law_.correlation)
-    for row in (100, 1400):
+    for row in (100, N_ROWS - 100):
         columns = white[row - 23 : row + 1].T
         mean = np.concatenate(
             [robust_means(column[np.newaxis], limit) for column, limit in zip(columns, limits, strict=True)]
@@ -115,7 +119,7 @@ def test_windows_count_as_one_as_long_as_alarms_last_and_within_half_a_window():
 
 @each_rule
 def test_a_mode_without_a_value_is_refused(rule):
-    with pytest.raises(ValueError, match="'f2' is NaN in all 1500 rows"):
+    with pytest.raises(ValueError, match="'f2' is NaN in all 800 rows"):
         WindowedAlarm(8, rule=rule).fit(X.assign(f2=np.nan))
 
 
@@ -139,7 +143,7 @@ def test_the_farther_the_records_the_higher_the_index_of_windows_with_gaps(rule)
     assert (np.diff(indices[:, evaluated], axis=0) > 0).all()
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=by_day(4, at_night=8), deadline=None)
 @given(st.integers(1, 12), st.data())
 def test_alarms_are_where_m_of_n_records_are_above_the_threshold(n, data):
     m, contamination = data.draw(st.integers(1, n)), data.draw(st.sampled_from([0.02, 0.1, 0.3]))
@@ -200,7 +204,7 @@ def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_e
     evaluated = holed.notna().any(axis=1).rolling(6, min_periods=1).sum() >= 3
     np.testing.assert_array_equal(alarm.damage_index(holed).notna(), evaluated)
     assert (~evaluated).sum() == 2 + (215 - 203) + (232 - 219)
-    message = f"{(~evaluated).sum()} of 1500 rows .*fewer than 3 records.*not-evaluated"
+    message = f"{(~evaluated).sum()} of 800 rows .*fewer than 3 records.*not-evaluated"
     with pytest.warns(UserWarning, match=message):
         alarms = alarm.predict(holed)
     np.testing.assert_array_equal(alarms == 0, ~evaluated)
@@ -210,7 +214,8 @@ def test_windows_with_less_than_half_as_many_values_as_in_the_baseline_are_not_e
 def test_gaps_of_the_baseline_are_no_reason_not_to_evaluate(rule):
     """Every third record has a value, in the baseline as later."""
     baseline, later = (records.copy() for records in (X, LATER))
-    baseline[np.arange(1500) % 3 > 0] = later[np.arange(1500) % 3 > 0] = np.nan
+    is_gap = np.arange(N_ROWS) % 3 > 0
+    baseline[is_gap] = later[is_gap] = np.nan
     alarm = WindowedAlarm(24, rule=rule).fit(baseline)
     assert alarm.fewest_ == 4
     assert (alarm.predict(later)[12:] != 0).all()

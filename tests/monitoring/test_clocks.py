@@ -18,7 +18,7 @@ from skthermo.monitoring import Monitor
 
 ZONES = sorted(zoneinfo.available_timezones())
 MODES = [f"f{i + 1}" for i in range(6)]
-AT_MIDNIGHT = ("Africa/Cairo",)
+AT_MIDNIGHT = "Africa/Cairo"  # where clocks are changed
 PER_DAY, N_BASELINE = 4, 4 * 365
 
 
@@ -45,27 +45,35 @@ def campaign():
     return two.temperatures.join(two.frequencies)
 
 
-def in_zone(zone):
-    """The campaign with stamps every six hours from 2025 on."""
-    stamps = pd.date_range("2025-01-01", periods=len(campaign()), freq="6h", tz="UTC").tz_convert(zone)
+def in_zone(zone, start):
+    """The campaign with stamps every six hours."""
+    stamps = pd.date_range(start, periods=len(campaign()), freq="6h", tz="UTC").tz_convert(zone)
     return campaign().set_axis(stamps)
 
 
 @pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-excursion|not-evaluated)")
-@pytest.mark.parametrize(
-    "zone",
-    [pytest.param(zone, marks=() if zone in AT_MIDNIGHT else pytest.mark.nightly) for zone in ZONES[::7]]
-    + [pytest.param(zone) for zone in AT_MIDNIGHT if zone not in ZONES[::7]],
-)
+@pytest.mark.parametrize(("begin", "change"), [("2025-04-10", "2026-04-23"), ("2025-10-15", "2026-10-29")])
+def test_records_about_a_change_of_clocks_give_the_same_in_one_batch_as_in_many(begin, change):
+    records = in_zone(AT_MIDNIGHT, begin)[: N_BASELINE + 35 * PER_DAY]
+    assert len({stamp.utcoffset() for stamp in records.index[N_BASELINE:]}) == 2
+    at = records.index.searchsorted(pd.Timestamp(change, tz="UTC"))
+    assert_same_in_batches(records, [at - 7, at + 2, at + 29])
+
+
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-excursion|not-evaluated)")
+@pytest.mark.parametrize("zone", sorted({AT_MIDNIGHT, *ZONES[::7]}))
 def test_a_year_of_records_gives_the_same_in_one_batch_as_in_many(zone):
-    records = in_zone(zone)
+    assert_same_in_batches(in_zone(zone, "2025-01-01"), [N_BASELINE + day for day in (251, 602, 1001)])
+
+
+def assert_same_in_batches(records, cuts):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         saved = pickle.dumps(Monitor(targets=MODES, random_state=0).fit(records[:N_BASELINE]))
     whole, parts = pickle.loads(saved), pickle.loads(saved)
     expected = whole.update(records[N_BASELINE:])
-    cuts = [N_BASELINE, N_BASELINE + 251, N_BASELINE + 602, N_BASELINE + 1001, len(records)]
-    said = [parts.update(records[a:b]) for a, b in itertools.pairwise(cuts)]
+    said = [parts.update(records[a:b]) for a, b in itertools.pairwise([N_BASELINE, *cuts, len(records)])]
     np.testing.assert_array_equal(pd.concat(said)["index"], expected["index"])
     assert whole.days_["n_records"].sum() == len(records) - N_BASELINE
     assert (whole.days_.index == parts.days_.index).all()

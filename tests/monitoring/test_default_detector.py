@@ -41,13 +41,25 @@ def fem():
     return DataInformedFEM(make_truss(), random_state=0).fit(records().drop(columns=MODES), records()[MODES])
 
 
-@pytest.mark.parametrize("window", [None, 7])
-def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window):
+LOSSES = {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}
+
+
+@pytest.mark.parametrize(
+    ("window", "groups"),
+    [
+        (None, ["top", "bottom "]),
+        (7, ["diagonal"]),
+        pytest.param(None, [*LOSSES], marks=pytest.mark.nightly),
+        pytest.param(7, [*LOSSES], marks=pytest.mark.nightly),
+    ],
+)
+def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window, groups):
     last = DirectionalDetector(fem)
     last = last if window is None else WindowedAlarm(window, detector=last)
     compensator = TemperatureCompensator(TemperatureMapper(), targets=MODES)
     fresh = fitted(detector=make_pipeline(compensator, last), fem=fem)
-    for group, loss in {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}.items():
+    for group in groups:
+        loss = LOSSES[group]
         changed = records({group.strip(): loss}, 1, "2026-01-01")[:30]
         whole, by_day = clone_fitted(fresh), clone_fitted(fresh)
         answers = whole.update(changed)

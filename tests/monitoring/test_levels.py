@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from skthermo.monitoring import load_monitor
 from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 from tests.monitoring.test_status import replayed
+from tests.nights import by_day
 
 LEVELS = {"healthy": 0, "not evaluated": 0, "watch": 1, "alarm": 2}
 ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
@@ -31,8 +32,8 @@ def two_levels(records):
 
 @pytest.fixture(scope="module")
 def whole(two_levels, records):
-    """The monitor with two levels and its answers, after the truss was damaged for four months."""
-    return served(two_levels, records[FIRST : DAMAGED + 120])
+    """The monitor with two levels and its answers, after the truss was damaged for two months."""
+    return served(two_levels, records[FIRST : DAMAGED + 60])
 
 
 def served(monitor, new):
@@ -42,8 +43,8 @@ def served(monitor, new):
         return monitor, monitor.update(new)
 
 
-def lowered(records, share, n_days=31):
-    """Healthy records of the first month in service, with all responses lower by a share."""
+def lowered(records, share, n_days=20):
+    """Healthy records of the first weeks in service, with all responses lower by a share."""
     new = records[FIRST : FIRST + n_days].copy()
     new[[name for name in new if name.startswith("f")]] *= 1 - share
     return new
@@ -53,7 +54,7 @@ def test_the_lower_level_changes_no_alarm(truss_monitor, two_levels, whole, reco
     assert two_levels.threshold_ == truss_monitor.threshold_
     assert truss_monitor.watch_threshold_ is None
     assert max(two_levels.clear_threshold_, two_levels.watch_threshold_) < two_levels.threshold_
-    (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST : DAMAGED + 120]), whole
+    (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST : DAMAGED + 60]), whole
     assert (with_watch["state"] == "alarm").equals(answers["state"] == "alarm")
     pd.testing.assert_series_equal(with_watch["index"], answers["index"])
     events = two.events_[two.events_["kind"] != "watch"].reset_index(drop=True)
@@ -77,7 +78,7 @@ def test_an_alarm_is_also_a_watch(whole):
 
 
 @settings(
-    max_examples=3, deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=by_day(2, at_night=3), deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
 )
 @given(shares=st.lists(st.floats(0, 0.05), min_size=2, max_size=3, unique=True))
 def test_more_change_never_lowers_the_level(two_levels, records, shares):
@@ -88,10 +89,8 @@ def test_more_change_never_lowers_the_level(two_levels, records, shares):
 
 
 def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(two_levels, records):
-    share = next(
-        s for s in np.arange(0.002, 0.02, 0.001) if served(two_levels, lowered(records, s))[0].state() == "watch"
-    )
-    monitor, _ = served(two_levels, lowered(records, share))
+    some = (served(two_levels, lowered(records, share))[0] for share in np.arange(0.002, 0.02, 0.001))
+    monitor = next(one for one in some if one.state() == "watch")
     assert monitor.status(monitor.last_).state == "watch"
     assert monitor.status(monitor.last_ + pd.Timedelta("30D")).state == "not evaluated"
     assert "watch: opens above" in monitor.summary()

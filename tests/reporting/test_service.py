@@ -1,5 +1,6 @@
 """The page on a monitor: it never calls healthy what nobody has evaluated, and says what the monitor says."""
 
+import copy
 import re
 
 import numpy as np
@@ -63,7 +64,7 @@ def real():
     records, later = (year.temperatures.join(year.frequencies) for year in (healthy, damaged))
     compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
     monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
-    fitted_only = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
+    fitted_only = copy.deepcopy(monitor)
     new = records[730:800].copy()
     new.iloc[30:34] = np.nan
     with pytest.warns(UserWarning, match="4 "):
