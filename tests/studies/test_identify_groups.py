@@ -49,16 +49,16 @@ def test_mirrored_groups_are_named(symmetric):
     F = simulated(fem, T, {"left": 0.1})
     with pytest.warns(UserWarning, match="left and right.*indistinguishable-groups"):
         found = identify_damage(fem, T, F, ["left", "middle", "right"], random_state=0)
-    assert found.indistinguishable == [("left", "right")]
-    assert found.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
-    assert found.p_value < 0.01
+    assert found.separability.indistinguishable == [("left", "right")]
+    assert found.separability.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
+    assert found.probabilities.p_value < 0.01
     probable = found.explanations["probability"]
     assert probable["left"] == pytest.approx(probable["right"], rel=0.2)
     assert found.table.loc["middle", "probability"] < 0.2
     joined = {"sides": ["left", "right"], "middle": ["middle"]}
     together = identify_damage(fem, T, F, joined, random_state=0)
     assert together.most_probable == ("sides",)
-    assert together.indistinguishable == []
+    assert together.separability.indistinguishable == []
     assert 0.04 < together.severities["sides"] < 0.06
     assert [together.damage[side] for side in ("left", "right")] == pytest.approx(
         [together.severities["sides"]] * 2, abs=1e-3
@@ -74,7 +74,7 @@ def test_shapes_tell_mirrored_groups_apart(symmetric, side):
     found = identify_damage(
         fem, T, simulated(fem, T, damage), shapes=(healthy, damaged), dofs=SENSORS, shape_noise=0.01, random_state=0
     )
-    assert found.indistinguishable == []
+    assert found.separability.indistinguishable == []
     expected = {"left": 0.0, "middle": 0.0, "right": 0.0, **damage}
     assert found.severities.to_dict() == pytest.approx(expected, abs=6e-3)
     assert found.most_probable == (side,)
@@ -89,7 +89,7 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
     F = simulated(fem, WEATHER)
     with pytest.warns(UserWarning, match="vertical.*unobservable-groups"):
         found = identify_damage(fem, WEATHER, F, random_state=0)
-    assert found.unobservable == ["vertical"]
+    assert found.separability.unobservable == ["vertical"]
     assert found.table.index.tolist() == [*GROUPS, "vertical"]
     # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     numbers = found.prior.numbers
@@ -107,10 +107,10 @@ def test_shifts_that_no_group_makes_are_something_else(fem):
     for change in (1.05, [1, 1, 1, 1.03, 1, 1]):
         found = identify_damage(fem, WEATHER, simulated(fem, WEATHER) * change, GROUPS, random_state=0)
         assert found.most_probable == ("something else",)
-        assert found.probability_other > 0.9
-        assert found.probability_of_damage > 0.99
+        assert found.probabilities.other > 0.9
+        assert found.probabilities.damage > 0.99
         assert found.damage == {}
-        assert found.p_value < 0.01
+        assert found.probabilities.p_value < 0.01
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
@@ -123,8 +123,8 @@ def test_damage_beside_something_else_is_still_found(fem):
     assert found.estimates.loc[("top + something else", "top"), "severity"] == pytest.approx(0.4, abs=0.05)
     without = DamagePrior(something_else=0)
     forced = identify_damage(fem, WEATHER, F, GROUPS, prior=without, random_state=0)
-    assert forced.probability_other == 0
-    assert forced.misfit_p_value < found.misfit_p_value
+    assert forced.probabilities.other == 0
+    assert forced.probabilities.misfit_p_value < found.probabilities.misfit_p_value
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
@@ -243,7 +243,7 @@ def test_an_even_loss_is_one_of_all_groups(fem):
     F = simulated(fem, WEATHER, dict.fromkeys((*GROUPS, "vertical"), 0.012))
     found = identify_damage(fem, WEATHER, F, noise=0.002, random_state=0)
     assert found.most_probable == ("all groups",)
-    assert found.probability_even > 0.9
+    assert found.probabilities.even > 0.9
     assert found.table["probability"].min() > 0.9
     assert found.severities.to_dict() == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)
     assert found.damage == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)

@@ -31,9 +31,9 @@ def test_mirror_images_are_named_and_share_the_probability():
     records = add_noise(model.damaged({"pier_2": 0.2}).frequencies(theta), 0.004, random_state=1)
     with pytest.warns(UserWarning, match="pier_1 and pier_2.*indistinguishable-groups"):
         found = identify_damage(fem, T, records, random_state=0)
-    assert found.indistinguishable == [("pier_1", "pier_2")]
-    assert found.p_value < 0.01
-    assert found.probability_of_damage > 0.99
+    assert found.separability.indistinguishable == [("pier_1", "pier_2")]
+    assert found.probabilities.p_value < 0.01
+    assert found.probabilities.damage > 0.99
     alone = found.explanations["probability"]
     assert 0.3 < alone["pier_2"] / alone["pier_1"] < 3
     assert (found.table.loc[["pier_1", "pier_2"], "standard_error"] > 0.05).all()

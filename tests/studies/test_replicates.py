@@ -14,10 +14,15 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
-from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
+from skthermo.studies.detectability._replicates import (
+    PARTS,
+    ReplicateRates,
+    Replicates,
+    Spread,
+    other_years,
+    resampled_days,
+)
 from skthermo.studies.detectability._simulation import Measurement
-from skthermo.studies.replicates import PARTS, Replicates
-from skthermo.studies.replicates._replicates import other_years, resampled_days
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -246,7 +251,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
     def fails(*args, **options):
         raise ValueError("no derivative")
 
-    monkeypatch.setattr("skthermo.studies.replicates._replicates.ModelUpdater.fit", fails)
+    monkeypatch.setattr("skthermo.studies.detectability._replicates.ModelUpdater.fit", fails)
     with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
         Replicates.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
     with pytest.warns(UserWarning, match="bands-without-models"):

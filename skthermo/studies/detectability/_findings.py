@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, check_flag, check_probability
+from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._candidates import Arrangement, Candidate
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
-from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
+from skthermo.studies.detectability._replicates import ReplicateRates, sentences
 from skthermo.studies.detectability._simulation import SIMULATED, EvaluatedRecords, Evaluation, ask_each
 from skthermo.studies.detectability._waits import soonest, waits_table
-from skthermo.studies.scenarios import BaseScenario
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 

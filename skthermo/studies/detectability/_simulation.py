@@ -21,9 +21,9 @@ from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
 from skthermo._validation import _num_samples
+from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._intervals import Rate, rate_of
-from skthermo.studies.scenarios import BaseScenario
 from skthermo.surrogate import FittedChain
 
 SIMULATED, REFERENCE = "simulated", "reference"

@@ -22,9 +22,10 @@ from skthermo._tables.arrays import as_random_state, check_jobs, check_probabili
 from skthermo._validation import Stages, held, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
+from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._candidates import Candidate
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._replicate_rates import ReplicateRates
+from skthermo.studies.detectability._replicates import ReplicateRates, Replicates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Evaluation,
@@ -33,8 +34,6 @@ from skthermo.studies.detectability._simulation import (
     ask_each,
     clean_frequencies,
 )
-from skthermo.studies.replicates import Replicates
-from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
 
 LEAST_REPEATS, MOST_REPEATS = 3, 20

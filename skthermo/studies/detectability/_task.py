@@ -29,11 +29,11 @@ from skthermo._tables.frames import Table, column_names, has_stamps, row_times, 
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
+from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._candidates import SeenColumns, has_targets
 from skthermo.studies.detectability._intervals import Rate, rate_of
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
 from skthermo.studies.detectability._study import check_detector
-from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
 
 FIRST_ROWS = "not-predicted", "no-earlier-records"  # kinds of warnings that the first rows of each state would give

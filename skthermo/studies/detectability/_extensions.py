@@ -27,14 +27,14 @@ from skthermo._tables.arrays import (
 from skthermo._tables.frames import Table, check_same_rows, column_names
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
-from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
-from skthermo.studies.scenarios import Scenario
+from skthermo.studies._scenarios import Scenario
+from skthermo.studies.detectability._candidates import Arrangement
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement
+from skthermo.studies.detectability._study import DetectabilityStudy
 from skthermo.surrogate import FittedChain
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
 """What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
-
-LARGEST_SEED = np.iinfo(np.int32).max
 
 
 @dataclass(frozen=True)
