@@ -416,7 +416,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("noise in the variance between replicates", " - within / values.shape[1]", ""),
         ("a band of the mean of all replicates", "variance * (1 + 1 / number)", "variance / number"),
     ],
-    ("studies/detectability/_candidates.py", "studies/test_several_detectors.py"): [
+    ("studies/detectability/_simulation.py", "studies/test_several_detectors.py"): [
         ("temperatures for detectors without targets", "compensates | (known >= n_sensors)", "known >= 0"),
     ],
     ("studies/detectability/_ranking.py", "studies/test_ranking.py"): [
@@ -446,7 +446,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
-    ("studies/detectability/_intervals.py", "studies/test_pod_curve.py"): [
+    ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [

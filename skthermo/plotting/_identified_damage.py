@@ -38,7 +38,8 @@ class IdentifiedDamageDisplay(Display):
         With the frames ``summary_table`` (explanations in rows, the most probable first; probability), ``table``
         (causes in rows; probability, severity, ci_low, ci_high, and perhaps highest_if_damaged) and ``shifts`` (modes
         in rows; measured, explained, standard_error; relative), and perhaps the names ``separability.unobservable`` of
-        causes that the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
+        causes that the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its
+        own.
 
     Attributes
     ----------

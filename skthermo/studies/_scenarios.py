@@ -100,7 +100,7 @@ def checked_models(fem: FittedChain, models: Any) -> list[FEModel]:
 
 def check_groups(groups: Sequence[str], known: Any) -> None:
     """Raise an error for damage groups that the model does not have."""
-    unknown = [group for group in groups if group not in known]
+    unknown = sorted(set(groups).difference(known))
     if unknown:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
 

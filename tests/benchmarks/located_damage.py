@@ -165,7 +165,8 @@ def main():
                     fem = truth.chain(seed)
                     whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
                     healthy[which].append(whole.probability_of_damage)
-                    places = {g: where for g, where in whole.places.items() if g not in whole.found.separability.unobservable}
+                    unseen = whole.found.separability.unobservable
+                    places = {g: where for g, where in whole.places.items() if g not in unseen}
                     found[which].append(evaluated(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)

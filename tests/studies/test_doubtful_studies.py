@@ -6,7 +6,7 @@ import pytest
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
-from skthermo.studies.detectability._simulation import band_of
+from skthermo.studies.detectability._rates import band_of
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures

@@ -12,7 +12,8 @@ from scipy.stats import norm
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import ProgressiveDamage, Scenario
-from skthermo.studies.detectability._simulation import EvaluatedRecords, damaged_rows, onsets_of
+from skthermo.studies.detectability._rates import EvaluatedRecords
+from skthermo.studies.detectability._simulation import damaged_rows, onsets_of
 from skthermo.studies.detectability._waits import Waits
 from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper

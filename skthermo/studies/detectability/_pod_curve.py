@@ -17,7 +17,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, check_flag, check_probability, real_array
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._intervals import clopper_pearson
+from skthermo.studies.detectability._rates import clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
 MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity

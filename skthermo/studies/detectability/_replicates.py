@@ -26,11 +26,11 @@ from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._scenarios import BaseScenario, checked_models
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, pod_curve
+from skthermo.studies.detectability._rates import EvaluatedRecords
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     SIMULATED,
     YEARS,
-    EvaluatedRecords,
     Evaluation,
     Key,
     Simulation,
@@ -95,7 +95,9 @@ class Replicates:
                     f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, 'auto' or 'all'"
                 )
         elif "model" in asked:
-            models = _models_of(fem, number, int(seeds[-1]), is_needed=not _is_all(uncertainty))
+            models = _models_of(
+                fem, number, int(seeds[-1]), is_needed=not (isinstance(uncertainty, str) and uncertainty == ALL)
+            )
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
@@ -148,19 +150,13 @@ def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> lis
 
 def checked_parts(uncertainty: str | Sequence[str], with_models: bool = False) -> list[str]:
     """What varies, or an error; "auto" is all but models, and models too where they are given."""
-    if _is_all(uncertainty) or (isinstance(uncertainty, str) and uncertainty == AUTO and with_models):
-        return list(PARTS)
-    if isinstance(uncertainty, str) and uncertainty == AUTO:
-        return list(PARTS[:-1])
+    if isinstance(uncertainty, str) and uncertainty in (ALL, AUTO):
+        return list(PARTS if with_models or uncertainty == ALL else PARTS[:-1])
     is_one = isinstance(uncertainty, str | Mapping) or not isinstance(uncertainty, Iterable)
     asked = [uncertainty] if is_one else list(uncertainty)
     if not asked or not all(isinstance(part, str) and part in PARTS for part in asked):
         raise ValueError(f"uncertainty is {uncertainty!r:.200}; expected 'auto', 'all', or some of {list(PARTS)}")
     return asked
-
-
-def _is_all(uncertainty: str | Sequence[str]) -> bool:
-    return isinstance(uncertainty, str) and uncertainty == ALL
 
 
 def drawn_models(fem: FittedChain, number: int, seed: int) -> list[FEModel]:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array, is_real
 from skthermo._tables.frames import Table, has_stamps, row_times, time_of
 from skthermo._tables.text import counted, duration_text
-from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
-from skthermo.studies.detectability._simulation import EvaluatedRecords, onsets_of
+from skthermo.studies.detectability._rates import EvaluatedRecords, clopper_pearson, rate_of
+from skthermo.studies.detectability._simulation import onsets_of
 
 MOST_STEPS = 200_000  # into which the time of the records is divided
 TIMES = ["median", "reliable", "reliable highest"]
@@ -110,7 +110,7 @@ class Waits:
         late = np.minimum(self.steps, 2.0 * number) - number - 0.5
         rate = rate_of(late, confidence, whole_repeats=self.whole_repeats)
         if FEW <= rate.n_alarms <= rate.n_records - FEW:
-            return rate.rate, rate.lowest, rate.highest
+            return rate.rate, rate.ci_low, rate.ci_high
         n_apart = min(rate.n_effective, len(self.steps) * self.clock.n_steps / number)  # times without a common record
         return rate.rate, *clopper_pearson(rate.rate * n_apart, n_apart, confidence)
 
