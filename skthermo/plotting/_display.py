@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import fields
 from numbers import Real
 from types import ModuleType
@@ -87,11 +87,6 @@ def label_of(name: Hashable) -> str:
     return f"${found[1]}_{{{found[2]}}}$" if found else shortened(text)
 
 
-def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
-    return plain(f"{quantity} ({unit})" if unit else quantity)
-
-
 def marker_style(number: int, n_points: int) -> dict[str, object]:
     """Options of plot for unconnected points: colour, and a marker that tells them apart in greyscale too."""
     size = 5.0 if n_points <= 100 else 3.5 if n_points <= 1000 else 2.0
@@ -138,19 +133,6 @@ def panels(
     if len(given) != len(names):
         raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
     return given
-
-
-def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
-    """Names of the panels: those that are given, or those of the columns."""
-    if titles is not None and len(titles) != len(columns):
-        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
-    return [label_of(name) for name in (columns if titles is None else titles)]
-
-
-def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
-    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
-    n_rows = -(-n_panels // n_columns)
-    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
 
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
@@ -202,15 +184,6 @@ def date_axis(ax: Axes, index: pd.Index) -> None:
         ax.set_xlabel("date")
     else:
         ax.set_xlabel(plain(index.name or "record"))
-
-
-def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
-    """Vertical lines in all panels, with their labels above the first."""
-    for text, place in (marks or {}).items():
-        for ax in axes:
-            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
-        above = axes[0].get_xaxis_transform()
-        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
 
 
 def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
@@ -323,6 +296,13 @@ class Display:
         """One axes for each name: those that are given, or those of a new figure with panels of this size."""
         self.axes_ = panels(ax, names, size, **options)
         return self.axes_
+
+    @staticmethod
+    def _check_has(given: object, names: Sequence[str], what: str, expected: str) -> None:
+        """Raise an error for what lacks attributes that are drawn."""
+        missing = [name for name in names if not hasattr(given, name)]
+        if missing:
+            raise ValueError(f"{what} is a {type(given).__name__} without {missing}; expected {expected}")
 
     @property
     def ax_(self) -> Axes:

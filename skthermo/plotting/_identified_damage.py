@@ -99,11 +99,7 @@ class IdentifiedDamageDisplay(Display):
         ValueError
             If a frame is missing.
         """
-        missing = [name for name in ("summary_table", "table", "shifts") if not hasattr(identified, name)]
-        if missing:
-            raise ValueError(
-                f"identified is a {type(identified).__name__} without {missing}; expected an IdentifiedDamage"
-            )
+        cls._check_has(identified, ("summary_table", "table", "shifts"), "identified", "an IdentifiedDamage")
         return cls(identified).plot(**options)
 
     def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.exceptions import NotFittedError
 
 from skthermo._tables.arrays import as_columns, real_array
-from skthermo._tables.frames import check_same_rows
 
 if TYPE_CHECKING:
     from skthermo.studies import DetectabilityStudy
@@ -29,16 +28,6 @@ def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
     if isinstance(values, pd.DataFrame):
         return pd.DataFrame(columns, values.index, values.columns)
     return pd.DataFrame(columns, columns=[f"{prefix}{i + 1}" for i in range(columns.shape[1])])
-
-
-def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
-    """Raise an error if two tables differ in shape or index."""
-    check_same_rows(first, other, names)
-    if np.shape(as_columns(first)) != np.shape(as_columns(other)):
-        raise ValueError(
-            f"{names[0]} has {as_columns(first).shape[1]} columns and {names[1]} {as_columns(other).shape[1]}; "
-            "expected the same"
-        )
 
 
 def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:

@@ -139,8 +139,8 @@ class StudyFindings:
         Returns
         -------
         PODCurve
-            Records count as their effective numbers, so that serial correlation is in its bounds. Its `PODCurve.band`
-            and ``a90_band`` hold all that ``uncertainty`` names.
+            Records count as their effective numbers, so that serial correlation is in its bounds. Its
+            ``prediction_interval`` and ``a90_prediction_interval`` hold all that ``uncertainty`` names.
 
         Raises
         ------

@@ -129,7 +129,7 @@ class EvaluatedRecords:
                 "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
                 "after the onset"
             )
-        pi_low, pi_high = band_of(decisions, confidence)
+        pi_low, pi_high = prediction_interval(decisions, confidence)
         return {
             "detector": self.detector,
             "scenario": scenario.name,
@@ -152,7 +152,7 @@ class EvaluatedRecords:
         }
 
 
-def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
+def prediction_interval(decisions: Array, confidence: float) -> tuple[float, float]:
     """Range that holds the rate of one more repeat with this probability, or that of all repeats if they are too few.
 
     Of n rates, the k-th smallest exceeds that of one more repeat with probability k / (n + 1). One rate has no range.

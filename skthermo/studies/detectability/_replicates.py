@@ -312,15 +312,16 @@ class ReplicateRates:
         rates = self._rates(self.logits(key), key)
         return rates if self.with_noise else rates.mean(axis=1, keepdims=True)
 
-    def band(self, key: Key, confidence: float) -> tuple[float, float]:
+    def prediction_interval(self, key: Key, confidence: float) -> tuple[float, float]:
         """Rates between which that of a measured campaign should lie with this probability.
 
         Student's law on the scale of the logit: of few replicates, quantiles are hardly known.
         """
-        spread, number = Spread.of(self.logits(key)), len(self.rates[key])
-        variance = spread.between + self.with_noise * spread.within
+        logits, number = self.logits(key), len(self.rates[key])
+        between, within = variances_of(logits)
+        variance = between + self.with_noise * within
         margin = t.ppf((1 + confidence) / 2, number - 1) * np.sqrt(variance * (1 + 1 / number))
-        lowest, highest = self._rates(spread.mean + np.array([-margin, margin]), key)
+        lowest, highest = self._rates(logits.mean(axis=1).mean() + np.array([-margin, margin]), key)
         return float(lowest), float(highest)
 
     def _logits(self, rates: Array, key: Key) -> Array:
@@ -338,7 +339,7 @@ class ReplicateRates:
         for row in results.index[results["source"] == SIMULATED]:
             key = results.at[row, "detector"], results.at[row, "scenario"]
             if key in self.rates:
-                results.loc[row, ["pi_low", "pi_high"]] = self.band(key, confidence)
+                results.loc[row, ["pi_low", "pi_high"]] = self.prediction_interval(key, confidence)
         return results
 
     def smallest(self, family: FamilyRates, level: float, method: str, confidence: float) -> tuple[float, float]:
@@ -376,36 +377,22 @@ class ReplicateRates:
         """Standard deviation of the rate due to each part, and its share of the variance, by detector and scenario."""
         rows = {}
         for key in self.rates:
-            deviations = self.by_part(key)
+            steps = self.rates[key]
+            changes = np.concatenate([steps[:, :1], np.diff(steps, axis=1)], axis=1)
+            deviations = {"noise": np.sqrt(variances_of(steps[:, -1])[1])} if self.with_noise else {}
+            for number, part in enumerate(self.parts):
+                deviations[part] = np.sqrt(variances_of(changes[:, number])[0])
             total = sum(deviation**2 for deviation in deviations.values())
             shares = {f"{part} share": one**2 / total if total > 0 else np.nan for part, one in deviations.items()}
             rows[key] = {**deviations, "together": np.sqrt(total), **shares}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["detector", "scenario"])
 
-    def by_part(self, key: Key) -> dict[str, float]:
-        """Standard deviation of the rate due to each part."""
-        steps = self.rates[key]
-        changes = np.concatenate([steps[:, :1], np.diff(steps, axis=1)], axis=1)
-        deviations = {"noise": np.sqrt(Spread.of(steps[:, -1]).within)} if self.with_noise else {}
-        for number, part in enumerate(self.parts):
-            deviations[part] = np.sqrt(Spread.of(changes[:, number]).between)
-        return deviations
 
-
-@dataclass(frozen=True)
-class Spread:
-    """Mean of values, (n_replicates, n_draws), and their variances between replicates and within them."""
-
-    mean: float
-    between: float
-    within: float
-
-    @classmethod
-    def of(cls, values: Array) -> Spread:
-        """Analysis of variance of values, (n_replicates, n_draws)."""
-        means, within = values.mean(axis=1), float(values.var(axis=1, ddof=1).mean())
-        between = max(float(means.var(ddof=1)) - within / values.shape[1], 0.0)
-        return cls(float(means.mean()), between, within)
+def variances_of(values: Array) -> tuple[float, float]:
+    """Variances of values, (n_replicates, n_draws), between replicates and within them: an analysis of variance."""
+    within = float(values.var(axis=1, ddof=1).mean())
+    between = float(values.mean(axis=1).var(ddof=1)) - within / values.shape[1]
+    return max(between, 0.0), within
 
 
 def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: int) -> Any:

@@ -101,8 +101,6 @@ class LocatedDamage(Sentences):
         90 %.
     found : IdentifiedDamage
         What was found for whole groups.
-    structure : Structure
-        Whose members these are.
     probability_of_damage : float
         Probability that a member is damaged.
     probability_other : float
@@ -138,7 +136,6 @@ class LocatedDamage(Sentences):
     groups: pd.DataFrame
     levels: pd.DataFrame
     found: IdentifiedDamage
-    structure: Structure = field(repr=False)
     probability_of_damage: float
     probability_other: float
     alike: list[str]
@@ -272,7 +269,6 @@ def located_damage(
         groups=groups,
         levels=levels,
         found=found,
-        structure=next(iter(places.values())).structure,
         probability_of_damage=sum(one.probability for one in explained if one.members) / total,
         probability_other=sum(one.probability for one in explained if one.has_else) / total,
         alike=alike,
