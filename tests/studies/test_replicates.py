@@ -166,9 +166,8 @@ def test_variances_of_the_parts_add_up():
     noise = deviations["noise"] * random.standard_normal((2, n_replicates, n_draws))
     steps = 0.5 + np.stack([weather + noise[0], weather + baseline + noise[1]], axis=1)
     replicates, key = rates_of(steps)
-    found = replicates.by_part(key)
-    np.testing.assert_allclose([found[part] for part in deviations], list(deviations.values()), rtol=0.08)
     table = replicates.table().loc[key]
+    np.testing.assert_allclose(table[list(deviations)], list(deviations.values()), rtol=0.08)
     assert table["together"] == pytest.approx(np.sqrt(14) / 100, rel=0.05)
     assert table[[f"{part} share" for part in deviations]].sum() == pytest.approx(1)
     lowest, highest = replicates.prediction_interval(key, 0.9)
