@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skthermo._tables.arrays import Array
-from skthermo.plotting._display import COLOURS, GREY, LINES, MARKERS, Display, shortened
-from skthermo.plotting._tables import check_study
+from skthermo.plotting._display import (
+    COLOURS,
+    GREY,
+    LINES,
+    MARKERS,
+    Display,
+    check_study,
+    shortened,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

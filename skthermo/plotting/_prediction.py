@@ -21,17 +21,19 @@ from skthermo.plotting._display import (
     GREY,
     ORANGE,
     Display,
+    as_table,
     date_axis,
     figure_legend,
     hold_outliers,
+    in_time,
     label_of,
     line_style,
     marker_style,
     on_axis,
     plain,
     shortened,
+    with_breaks,
 )
-from skthermo.plotting._tables import as_table, in_time, with_breaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

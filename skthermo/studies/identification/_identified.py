@@ -364,7 +364,7 @@ class Separability:
         return "\n".join(self.sentences()) or "These modes show and distinguish all causes."
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Probabilities:
     """Probabilities over all explanations, and of shifts by chance.
 
@@ -389,6 +389,9 @@ class Probabilities:
     even: float
     p_value: float
     misfit_p_value: float
+
+    def __repr__(self) -> str:
+        return f"Probabilities({', '.join(f'{name}={value:.2g}' for name, value in vars(self).items())})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -418,10 +421,10 @@ class IdentifiedDamage(Sentences):
         One row a mode: mean relative shift ``measured`` and ``explained`` by the causes, the mean over explanations,
         ``standard_error`` of the measured one, ``n_records``, and ``n_independent``, as many independent records as
         would determine it as well.
-    members : mapping of str to list of str
-        The model's groups behind each cause; none for a cause that is no group.
     draws : DataFrame
         Severities of the model's groups, drawn from all explanations by their probability; one draw a row.
+    members : mapping of str to list of str
+        The model's groups behind each cause; none for a cause that is no group.
     probabilities : part
         That anything changed, ``damage``; that something else than the named causes shifted the frequencies, ``other``;
         that all groups lost the same share of their stiffness, ``even``; ``p_value``, that a healthy structure shows as

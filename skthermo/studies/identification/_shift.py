@@ -140,7 +140,7 @@ POSSIBLE_RATIOS = 0.2, 3.0  # of measured to predicted frequencies; damage of 95
 FAR_FROM_OTHERS = "far from the other records"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ComparedRecords:
     """Records that were compared with the healthy structure, and what they are worth.
 
@@ -216,6 +216,9 @@ class ComparedRecords:
                     "Probabilities and standard errors are rough. Take records over a longer time",
                     "few-independent-records",
                 )
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences())
 
     def _latest(self) -> str:
         return (
