@@ -58,12 +58,8 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),
-    "studies.scenarios": set(),
-    "studies.replicates": set(),
-    "studies.detectability": {"studies.scenarios", "studies.replicates"},
-    "studies.extension": {"studies.detectability", "studies.scenarios", "studies.replicates"},
-    "studies.identification": {"studies.scenarios", "studies.replicates"},
-    "studies.location": {"studies.identification", "studies.scenarios"},
+    "studies.detectability": set(),
+    "studies.identification": set(),
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))

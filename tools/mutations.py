@@ -382,7 +382,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/drift/_explanations.py", "monitoring/drift"): [
         ("evidence without determinants", "@ trends.mean - logarithm) / 2", "@ trends.mean) / 2"),
     ],
-    ("studies/location/_located.py", "studies/test_locate_parts.py"): [
+    ("studies/identification/_located.py", "studies/test_locate_parts.py"): [
         ("sets that hold a part of the damage only", "held[max(rank[member]", "held[min(rank[member]"),
     ],
     ("fem/modal/_core.py", "fem/test_divide.py"): [
@@ -413,14 +413,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/identification/_shapes.py", "studies/test_identify_shapes.py"): [
         ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
     ],
-    ("studies/detectability/_replicate_rates.py", "studies/test_replicates.py"): [
+    ("studies/detectability/_replicates.py", "studies/test_replicates.py"): [
+        ("weather of any season", "SEASON = 15", "SEASON = 90"),
         ("noise in the variance between replicates", " - within / values.shape[1]", ""),
         ("a band of the mean of all replicates", "variance * (1 + 1 / number)", "variance / number"),
     ],
-    ("studies/replicates/_replicates.py", "studies/test_replicates.py"): [
-        ("weather of any season", "SEASON = 15", "SEASON = 90"),
-    ],
-    ("studies/detectability/_candidates.py", "studies/test_several_detectors.py"): [
+    ("studies/detectability/_simulation.py", "studies/test_several_detectors.py"): [
         ("temperatures for detectors without targets", "compensates | (known >= n_sensors)", "known >= 0"),
     ],
     ("studies/detectability/_ranking.py", "studies/test_ranking.py"): [
@@ -450,7 +448,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],
-    ("studies/detectability/_intervals.py", "studies/test_pod_curve.py"): [
+    ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [

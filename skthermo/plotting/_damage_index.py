@@ -19,16 +19,17 @@ from skthermo.plotting._display import (
     DAMAGE_INDEX,
     GREY,
     Display,
+    as_table,
     date_axis,
     figure_legend,
     hold_outliers,
+    in_time,
     mark_not_evaluated,
     marker_style,
     on_axis,
     plain,
     shortened,
 )
-from skthermo.plotting._tables import as_table, in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,12 +18,12 @@ from skthermo.plotting._display import (
     LETTER,
     ORANGE,
     Display,
+    check_study,
     figure_legend,
     label_of,
     plain,
     shortened,
 )
-from skthermo.plotting._tables import check_study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

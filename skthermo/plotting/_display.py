@@ -1,9 +1,9 @@
-"""What displays share: their base, style, axes and limits of what is drawn."""
+"""What displays share: their base, style, axes and limits of what is drawn, which are frames of columns over time."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import fields
 from numbers import Real
 from types import ModuleType
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.exceptions import NotFittedError
 
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, as_columns, real_array
 from skthermo._tables.text import printable
 from skthermo._validation import import_optional
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+
+    from skthermo.studies import DetectabilityStudy
 
 # Okabe and Ito's palette for colour-blind readers. What is measured is blue, what is predicted or simulated orange.
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
@@ -35,6 +39,7 @@ HANDLE, LETTER = 0.5, 0.085
 """Inches that the symbol and a letter of a legend take."""
 FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
 FEWEST = 10  # points of a line from which on it may have outliers
+LONG_GAP = 10  # usual steps of time from which on a line breaks between two records
 MARGIN = 0.05  # empty share of the axis next to its edges
 BEYOND = "beyond"
 """Name (gid) of the marks at the edges."""
@@ -87,11 +92,6 @@ def label_of(name: Hashable) -> str:
     return f"${found[1]}_{{{found[2]}}}$" if found else shortened(text)
 
 
-def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
-    return plain(f"{quantity} ({unit})" if unit else quantity)
-
-
 def marker_style(number: int, n_points: int) -> dict[str, object]:
     """Options of plot for unconnected points: colour, and a marker that tells them apart in greyscale too."""
     size = 5.0 if n_points <= 100 else 3.5 if n_points <= 1000 else 2.0
@@ -138,19 +138,6 @@ def panels(
     if len(given) != len(names):
         raise ValueError(f"ax holds {len(given)} axes; expected {len(names)}, for {list(names)}")
     return given
-
-
-def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
-    """Names of the panels: those that are given, or those of the columns."""
-    if titles is not None and len(titles) != len(columns):
-        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
-    return [label_of(name) for name in (columns if titles is None else titles)]
-
-
-def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
-    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
-    n_rows = -(-n_panels // n_columns)
-    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
 
 
 def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> None:
@@ -202,15 +189,6 @@ def date_axis(ax: Axes, index: pd.Index) -> None:
         ax.set_xlabel("date")
     else:
         ax.set_xlabel(plain(index.name or "record"))
-
-
-def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
-    """Vertical lines in all panels, with their labels above the first."""
-    for text, place in (marks or {}).items():
-        for ax in axes:
-            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
-        above = axes[0].get_xaxis_transform()
-        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
 
 
 def on_axis(place: object, index: pd.Index) -> float | np.datetime64:
@@ -306,6 +284,49 @@ def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
     ax.text(x, y, plain(text), transform=ax.transAxes, fontsize="small", color=GREY, bbox=box, **style)
 
 
+def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
+    """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0."""
+    if isinstance(values, pd.Series):
+        values = values.to_frame(f"{prefix}1" if values.name is None else values.name)
+    real_array(values, what)
+    columns = as_columns(values)
+    if columns.ndim != 2 or not columns.size:
+        raise ValueError(f"{what} has shape {np.shape(values)}; expected one or more records (rows) and columns")
+    if isinstance(values, pd.DataFrame):
+        return pd.DataFrame(columns, values.index, values.columns)
+    return pd.DataFrame(columns, columns=[f"{prefix}{i + 1}" for i in range(columns.shape[1])])
+
+
+def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:
+    """Place of each record on the horizontal axis, (n_records,), and the values, in order of time where it is known."""
+    values, index = table.to_numpy(), table.index
+    if isinstance(index, pd.PeriodIndex):
+        index = index.to_timestamp()
+    if isinstance(index, pd.DatetimeIndex):
+        order = np.argsort(index.to_numpy(), kind="stable")
+        return index.tz_localize(None).to_numpy()[order], values[order]
+    is_numeric = pd.api.types.is_numeric_dtype(index)
+    return (index.to_numpy() if is_numeric else np.arange(len(index))), values
+
+
+def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """The same with NaN in long gaps of time, so that a line breaks there."""
+    if not np.issubdtype(x.dtype, np.datetime64) or len(x) < 3:
+        return x, values
+    steps = np.diff(x)
+    usual = np.median(steps)
+    before = np.flatnonzero(steps > LONG_GAP * usual)
+    return np.insert(x, before + 1, x[before] + usual), np.insert(values, before + 1, np.nan, axis=0)
+
+
+def check_study(study: DetectabilityStudy) -> None:
+    """Raise an error for what is no study, or one without results."""
+    if not hasattr(study, "scenarios"):
+        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
+    if not hasattr(study, "results_"):
+        raise NotFittedError("the study has no results yet; expected a call of run before")
+
+
 class Display:
     """A display as scikit-learn has them: made and drawn in one call, with its axes and its figure as attributes."""
 
@@ -323,6 +344,13 @@ class Display:
         """One axes for each name: those that are given, or those of a new figure with panels of this size."""
         self.axes_ = panels(ax, names, size, **options)
         return self.axes_
+
+    @staticmethod
+    def _check_has(given: object, names: Sequence[str], what: str, expected: str) -> None:
+        """Raise an error for what lacks attributes that are drawn."""
+        missing = [name for name in names if not hasattr(given, name)]
+        if missing:
+            raise ValueError(f"{what} is a {type(given).__name__} without {missing}; expected {expected}")
 
     @property
     def ax_(self) -> Axes:

@@ -37,8 +37,9 @@ class IdentifiedDamageDisplay(Display):
     identified : IdentifiedDamage
         With the frames ``summary_table`` (explanations in rows, the most probable first; probability), ``table``
         (causes in rows; probability, severity, ci_low, ci_high, and perhaps highest_if_damaged) and ``shifts`` (modes
-        in rows; measured, explained, standard_error; relative), and perhaps the names ``unobservable`` of causes that
-        the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
+        in rows; measured, explained, standard_error; relative), and perhaps the names ``separability.unobservable`` of
+        causes that the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its
+        own.
 
     Attributes
     ----------
@@ -98,11 +99,7 @@ class IdentifiedDamageDisplay(Display):
         ValueError
             If a frame is missing.
         """
-        missing = [name for name in ("summary_table", "table", "shifts") if not hasattr(identified, name)]
-        if missing:
-            raise ValueError(
-                f"identified is a {type(identified).__name__} without {missing}; expected an IdentifiedDamage"
-            )
+        cls._check_has(identified, ("summary_table", "table", "shifts"), "identified", "an IdentifiedDamage")
         return cls(identified).plot(**options)
 
     def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:
@@ -152,7 +149,10 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_severities(self, ax: Axes) -> ErrorbarContainer:
         """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
-        table, unobservable = self.identified.table, set(getattr(self.identified, "unobservable", ()))
+        table, unobservable = (
+            self.identified.table,
+            set(getattr(getattr(self.identified, "separability", None), "unobservable", ())),
+        )
         places, is_known = np.arange(len(table)), ~table.index.isin(unobservable)
         severity, lowest, highest = 100 * table[["severity", "ci_low", "ci_high"]].to_numpy(dtype=float).T
         probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()

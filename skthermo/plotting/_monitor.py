@@ -21,13 +21,14 @@ from skthermo.plotting._display import (
     Display,
     date_axis,
     hold_outliers,
+    in_time,
     line_style,
     mark_not_evaluated,
     marker_style,
     panel_legend,
     shortened,
+    with_breaks,
 )
-from skthermo.plotting._tables import in_time, with_breaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

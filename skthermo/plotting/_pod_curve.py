@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from skthermo._tables.arrays import Array
-from skthermo.plotting._display import COLOURS, GREY, LINES, MARKERS, Display, shortened
-from skthermo.plotting._tables import check_study
+from skthermo.plotting._display import (
+    COLOURS,
+    GREY,
+    LINES,
+    MARKERS,
+    Display,
+    check_study,
+    shortened,
+)
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -47,8 +54,8 @@ class PODCurveDisplay(Display):
     band_ : PolyCollection
         Its bounds.
     replicates_ : PolyCollection or None
-        The band in which the curve of a measured campaign should lie, ``curve.band(severity)``, where the study has
-        replicates: paler, with dashed edges.
+        The band in which the curve of a measured campaign should lie, ``curve.prediction_interval(severity)``, where
+        the study has replicates: paler, with dashed edges.
     errorbar_ : ErrorbarContainer
         Observed shares with Wilson's intervals of 95 %, which hold for independent records.
     marks_ : dict of str to artist
@@ -144,9 +151,7 @@ class PODCurveDisplay(Display):
         ValueError
             If the curve lacks an attribute or method.
         """
-        missing = [name for name in NEEDED if not hasattr(curve, name)]
-        if missing:
-            raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
+        cls._check_has(curve, NEEDED, "curve", "a PODCurve")
         return cls._drawn(curve, **options)
 
     def plot(self, ax: Axes | None = None, *, marks: bool = True) -> PODCurveDisplay:
@@ -187,7 +192,7 @@ class PODCurveDisplay(Display):
     def _draw_campaigns(self, drawn: Array, colour: str) -> PolyCollection | None:
         if not getattr(self.curve, "replicates", ()):
             return None
-        low, high = (100 * np.asarray(values) for values in self.curve.band(drawn))
+        low, high = (100 * np.asarray(values) for values in self.curve.prediction_interval(drawn))
         style = {"facecolor": colour, "edgecolor": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8}
         return self.ax_.fill_between(
             100 * drawn, low, high, label="prediction interval of one campaign", zorder=0, **style

@@ -12,27 +12,28 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array
+from skthermo._tables.arrays import Array, as_columns
 from skthermo._tables.frames import check_same_rows
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
     DENSE,
+    GREY,
     ORANGE,
     Display,
+    as_table,
     date_axis,
-    draw_marks,
     figure_legend,
     hold_outliers,
+    in_time,
     label_of,
     line_style,
     marker_style,
-    panel_names,
+    on_axis,
+    plain,
     shortened,
-    size_in_time,
-    with_unit,
+    with_breaks,
 )
-from skthermo.plotting._tables import as_table, check_like, in_time, with_breaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -363,3 +364,40 @@ def one_temperature(temperature: ArrayLike, measured: ArrayLike) -> pd.Series:
         raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
     is_named = getattr(temperature, "name", None) is not None or isinstance(temperature, pd.DataFrame)
     return table.iloc[:, 0].rename(table.columns[0] if is_named else None)
+
+
+def with_unit(quantity: str, unit: str) -> str:
+    """Label of an axis."""
+    return plain(f"{quantity} ({unit})" if unit else quantity)
+
+
+def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
+    """Names of the panels: those that are given, or those of the columns."""
+    if titles is not None and len(titles) != len(columns):
+        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
+    return [label_of(name) for name in (columns if titles is None else titles)]
+
+
+def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
+    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
+    n_rows = -(-n_panels // n_columns)
+    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
+
+
+def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
+    """Vertical lines in all panels, with their labels above the first."""
+    for text, place in (marks or {}).items():
+        for ax in axes:
+            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
+        above = axes[0].get_xaxis_transform()
+        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
+
+
+def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
+    """Raise an error if two tables differ in shape or index."""
+    check_same_rows(first, other, names)
+    if np.shape(as_columns(first)) != np.shape(as_columns(other)):
+        raise ValueError(
+            f"{names[0]} has {as_columns(first).shape[1]} columns and {names[1]} {as_columns(other).shape[1]}; "
+            "expected the same"
+        )

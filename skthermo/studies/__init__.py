@@ -4,11 +4,22 @@ It uses ``surrogate`` and ``detection``. Start with ``detectability/_study.py``,
 ``identification/_identify.py``.
 """
 
-from skthermo.studies.detectability import DetectabilityStudy, DetectionTask, PODCurve, detection_task, pod_curve
-from skthermo.studies.extension import compare_extensions
-from skthermo.studies.identification import DamagePrior, IdentifiedDamage, identify_damage
-from skthermo.studies.location import LocatedDamage, locate_damage
-from skthermo.studies.scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
+from skthermo.studies._scenarios import ProgressiveDamage, Scenario, UncertainDamage, sweep
+from skthermo.studies.detectability import (
+    DetectabilityStudy,
+    DetectionTask,
+    PODCurve,
+    compare_extensions,
+    detection_task,
+    pod_curve,
+)
+from skthermo.studies.identification import (
+    DamagePrior,
+    IdentifiedDamage,
+    LocatedDamage,
+    identify_damage,
+    locate_damage,
+)
 
 __all__ = [
     "DamagePrior",
@@ -20,10 +31,10 @@ __all__ = [
     "ProgressiveDamage",
     "Scenario",
     "UncertainDamage",
+    "compare_extensions",
     "detection_task",
     "identify_damage",
     "locate_damage",
     "pod_curve",
     "sweep",
-    "compare_extensions",
 ]

@@ -61,9 +61,9 @@ def truths(groups, seed, n_healthy):
 def deviations(found):
     """Cramer-Rao deviations of each group: alone, and beside the one other group that is most like it."""
     alone = found.table["error_alone"]
-    alike = found.similarity.abs().to_numpy(copy=True)
+    alike = found.separability.similarity.abs().to_numpy(copy=True)
     np.fill_diagonal(alike, 0.0)
-    largest = pd.Series(np.nanmax(alike, axis=1, initial=0.0), found.similarity.index).clip(upper=1 - 1e-9)
+    largest = pd.Series(np.nanmax(alike, axis=1, initial=0.0), found.separability.similarity.index).clip(upper=1 - 1e-9)
     return alone, alone / np.sqrt(1 - largest**2).reindex(alone.index).fillna(1.0)
 
 
@@ -96,8 +96,8 @@ def answered(found, truth, groups):
         "true one": true_one,
         "truth": ", ".join(f"{g} {100 * truth[g]:g}" for g in truth.index if truth[g] > 0) or "healthy",
         "said": " + ".join(sorted(said)) or "no damage",
-        "p": found.p_value,
-        "p of misfit": found.misfit_p_value,
+        "p": found.probabilities.p_value,
+        "p of misfit": found.probabilities.misfit_p_value,
     }
     of_groups = pd.DataFrame(
         {

@@ -84,7 +84,7 @@ def evaluated(fem, case, seed, n_days):
         )
         amounts = pd.Series(truth).reindex(found.table.index, fill_value=0.0)
         row[f"error, %{name}"] = 100 * np.abs(found.severities - amounts)[DECK].mean()
-    return row, found.precision
+    return row, found.separability.precision
 
 
 def main():

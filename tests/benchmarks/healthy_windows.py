@@ -42,7 +42,7 @@ def healthy(campaign, memory):
             found = identify_damage(
                 campaign.fem, T[rows], F[rows], [campaign.structure.groups[0]], prior=ONE_CAUSE, random_state=0
             )
-            yield {"length": length, "p": found.p_value}
+            yield {"length": length, "p": found.probabilities.p_value}
 
 
 def damaged(campaign, memory):
@@ -54,7 +54,7 @@ def damaged(campaign, memory):
             DAMAGED_DAYS, {group: severity}, memory, 600_000 + 10 * campaign.seed + number
         )
         found = identify_damage(campaign.fem, T, F, list(groups), random_state=0)
-        yield {"severity": severity, "identified": found.most_probable == (group,), "p": found.p_value}
+        yield {"severity": severity, "identified": found.most_probable == (group,), "p": found.probabilities.p_value}
 
 
 def shares(table, by):

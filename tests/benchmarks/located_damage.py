@@ -120,7 +120,7 @@ def evaluated(truth, fem, places, seed, n_cases):
                 "of": len(located.table),
                 "first": located.groups["probability"].idxmax() == group,
                 "plain first": plain.idxmax() == group,
-                "plain else": located.found.probability_other > LEVEL / 2,
+                "plain else": located.found.probabilities.other > LEVEL / 2,
                 "plain size": len(places[group].members),
                 "seconds": time.perf_counter() - start,
             }
@@ -165,7 +165,8 @@ def main():
                     fem = truth.chain(seed)
                     whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
                     healthy[which].append(whole.probability_of_damage)
-                    places = {g: where for g, where in whole.places.items() if g not in whole.found.unobservable}
+                    unseen = whole.found.separability.unobservable
+                    places = {g: where for g, where in whole.places.items() if g not in unseen}
                     found[which].append(evaluated(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)

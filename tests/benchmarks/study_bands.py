@@ -203,11 +203,11 @@ def predicted(fem, T, F, real, measured, models, options):
         draws = found.rates[key][:, -1]  # two in each replicate
         of_noise = found.own[key].mean() + np.sqrt(2) * (draws - draws.mean(axis=1, keepdims=True))
         bands["noise"][key] = np.quantile(of_noise, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], method="weibull")
-        bands["weather"][key] = of_first(options.replicates, 1).band(key, CONFIDENCE)
-        bands["weather, baseline"][key] = of_first(options.replicates, 2).band(key, CONFIDENCE)
-        bands["default"][key] = of_first(DEFAULT_REPLICATES, 2).band(key, CONFIDENCE)
+        bands["weather"][key] = of_first(options.replicates, 1).prediction_interval(key, CONFIDENCE)
+        bands["weather, baseline"][key] = of_first(options.replicates, 2).prediction_interval(key, CONFIDENCE)
+        bands["default"][key] = of_first(DEFAULT_REPLICATES, 2).prediction_interval(key, CONFIDENCE)
     if models:
-        bands["all"] = {key: found.band(key, CONFIDENCE) for key in keys}
+        bands["all"] = {key: found.prediction_interval(key, CONFIDENCE) for key in keys}
     return study, bands
 
 

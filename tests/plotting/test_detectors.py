@@ -10,6 +10,7 @@ from sklearn.exceptions import NotFittedError
 from skthermo.plotting import DetectorsDisplay, PODCurveDisplay
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, pod_curve
 from skthermo.studies.detectability._findings import StudyFindings
+from skthermo.studies.detectability._simulation import Evaluation
 
 FOUND = "piers 18 %"
 
@@ -218,7 +219,7 @@ def test_labelled_scores_are_of_evaluated_records_from_the_onset_on():
     given = made_study()
     study = DetectabilityStudy(None, None, [])
     study.findings_ = StudyFindings(
-        given.results_, given.scenarios_, indices=given.indices_, decisions=given.decisions_
+        given.results_, given.scenarios_, evaluation=Evaluation(given.decisions_, indices=given.indices_)
     )
     for name in ("raw", "whitened"):
         study.decisions_[name, "deck", "simulated"][0, :4] = np.nan

@@ -138,7 +138,7 @@ def given(n_groups=3, **changed):
         "shifts": pd.DataFrame(
             {"measured": [-0.01, -0.05], "explained": [-0.012, -0.04], "standard_error": [0.002, 0.003]}, ["f1", "f2"]
         ),
-        "unobservable": groups[-1:],
+        "separability": SimpleNamespace(unobservable=groups[-1:]),
     }
     return SimpleNamespace(**frames | changed)
 
@@ -174,7 +174,7 @@ def test_severities_have_bands_and_probabilities_and_what_is_not_seen_has_none()
 @pytest.mark.parametrize("n_groups", [1, 14])
 def test_nothing_that_is_written_overlaps_in_a_figure_of_its_own(n_groups):
     long = "Rebar of the upper floors in the eastern wing"
-    found = given(n_groups, unobservable=[])
+    found = given(n_groups, separability=SimpleNamespace(unobservable=[]))
     found.table = found.table.rename(index={"deck": long})
     found.summary_table = found.summary_table.rename(
         index={"piers 20 %": f"{long} 12 %, main stays of the western pylon 4 %"}

@@ -184,7 +184,10 @@ def test_groups_that_are_not_seen_have_no_amount():
     page = identified_in(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])
     assert "piers" in page.heads
     assert page.cells.count("unobservable") == 1
-    page = identified_in(EXPLANATIONS, rest=0.0)
+    total = sum(probability for probability, _ in EXPLANATIONS.values())
+    page = identified_in(
+        {name: (probability / total, amounts) for name, (probability, amounts) in EXPLANATIONS.items()}
+    )
     assert "The measured modes show and distinguish all groups." in page.text
 
 
@@ -216,12 +219,12 @@ def test_lags_are_no_sensors():
 
 
 @pytest.mark.usefixtures("blank_drawings")
-def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
+def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path, monkeypatch):
     fem, T, _ = fitted_chain(index=False)
     scenarios = [Scenario("one", {HOSTILE: 0.2})]
     truth = fem.simulate(T, damage={HOSTILE: 0.2}, noise=0.005, random_state=5)
     study = run_study(fem, T, scenarios, reference={"one": truth})
-    study.thresholds_[study.detector_name()] = None  # as of detectors without one
+    monkeypatch.setattr("skthermo.studies.detectability._simulation.Candidate.threshold", None)  # as of some detectors
     page = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
     assert "how often alarms are false is not known" in page.text
     assert "one severity was tested" in page.text
@@ -278,7 +281,7 @@ def test_records_that_cannot_be_evaluated_are_counted_and_not_called_healthy(cha
     assert "The alarm system evaluated every simulated record." in section_of(page_of(study), "answer").text
     partly = copy.copy(study)
     indices = {key: index.where(np.arange(len(index)) >= 30) for key, index in study.indices_.items()}
-    partly.findings_ = replace(study.findings_, indices=indices)
+    partly.findings_ = replace(study.findings_, evaluation=replace(study.findings_.evaluation, indices=indices))
     text = section_of(page_of(partly), "answer").text
     n_states = len(study.results_)
     assert f"could not evaluate {30 * n_states:,} of {120 * n_states:,}\xa0records of the first simulation" in text

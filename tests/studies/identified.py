@@ -5,7 +5,8 @@ import pandas as pd
 
 from skthermo.studies import DamagePrior
 from skthermo.studies.identification import IdentifiedDamage
-from skthermo.studies.identification._observe import ComparedRecords
+from skthermo.studies.identification._identified import Probabilities, Separability
+from skthermo.studies.identification._shift import ComparedRecords
 
 BAND = 1.645  # standard deviations on either side that hold 90 %
 
@@ -81,24 +82,25 @@ def identified(explanations, *, groups=None, kinds=None, alike=(), shifts=None, 
             },
             index=["f1", "f2", "f3", "f4"],
         ).assign(n_records=60, n_independent=30.0),
-        "rest": max(1 - probabilities.sum(), 0.0),
-        "most_probable": (),
-        "probability_of_damage": 1 - explanations.get("no damage", (0.0,))[0],
-        "probability_other": sum(p for name, (p, _) in explanations.items() if name.endswith("something else")),
-        "probability_even": 0.0,
-        "similarity": similarity,
-        "indistinguishable": [tuple(members) for members in alike],
-        "unobservable": [],
-        "members": {cause: [cause] for cause in causes if kinds.get(cause, "damage") == "damage"},
         "draws": pd.DataFrame(draws),
-        "precision": table[["error_alone"]].set_axis(["alone"], axis=1).assign(together=0.05),
-        "p_value": 0.0003,
-        "misfit_p_value": 0.6,
+        "members": {cause: [cause] for cause in causes if kinds.get(cause, "damage") == "damage"},
+        "probabilities": {
+            "damage": 1 - explanations.get("no damage", (0.0,))[0],
+            "other": sum(p for name, (p, _) in explanations.items() if name.endswith("something else")),
+            "even": 0.0,
+            "p_value": 0.0003,
+            "misfit_p_value": 0.6,
+        },
+        "separability": {
+            "similarity": similarity,
+            "indistinguishable": [tuple(members) for members in alike],
+            "unobservable": [],
+            "precision": table[["error_alone"]].set_axis(["alone"], axis=1).assign(together=0.05),
+        },
         "records": ComparedRecords(60, {}, 60.0, 365, 365.0, {}),
         "prior": DamagePrior(),
-    } | changed
-    found = IdentifiedDamage(**given)
-    best = found.explanations.index[0]
-    causes = tuple(cause for name, cause in rows if name == best)
-    causes += ("something else",) if best.endswith("something else") else ()
-    return IdentifiedDamage(**given | {"most_probable": causes})
+    }
+    for part in ("probabilities", "separability"):
+        given[part] |= {name: changed.pop(name) for name in set(changed) & set(given[part])}
+    given |= changed | {"probabilities": Probabilities(**given["probabilities"])}
+    return IdentifiedDamage(**given | {"separability": Separability(**given["separability"])})

@@ -11,8 +11,8 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import Scenario, compare_extensions, pod_curve, sweep
-from skthermo.studies.detectability import Arrangement, Measurement
-from skthermo.studies.extension._compare_extensions import CampaignSimulator
+from skthermo.studies.detectability._extensions import Arrangement, CampaignSimulator
+from skthermo.studies.detectability._simulation import Measurement
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from tests.studies.studies import MODES, WEATHER, YEAR, study_of
 

@@ -167,8 +167,8 @@ def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
     assert abs(found.found(0.02) - expected) < 4 * np.sqrt(2 * expected / (40 * 120))
     score = task.scoring(noted(task, decisions), task.X[365:], task.y[365:])
     if own == 0.2:  # ten times the limit
-        assert found.false_alarms().lowest < 0.2 < found.false_alarms().highest
-        assert score == pytest.approx(found.found(0.02) * 0.02 / found.false_alarms().lowest)
+        assert found.false_alarms().ci_low < 0.2 < found.false_alarms().ci_high
+        assert score == pytest.approx(found.found(0.02) * 0.02 / found.false_alarms().ci_low)
     else:
         assert score == found.found(0.02)
 

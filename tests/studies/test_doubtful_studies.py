@@ -6,7 +6,7 @@ import pytest
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
-from skthermo.studies.detectability._simulation import band_of
+from skthermo.studies.detectability._rates import prediction_interval
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -25,7 +25,7 @@ def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expecte
     for _ in range(2000):
         rates = random.uniform(0, 1, n_repeats + 1)
         decisions = np.where(np.arange(200) < 200 * rates[:, np.newaxis], -1.0, 1.0)
-        lowest, highest = band_of(decisions[:-1], 0.95)
+        lowest, highest = prediction_interval(decisions[:-1], 0.95)
         inside.append(lowest <= (decisions[-1] < 0).mean() <= highest)
     assert np.mean(inside) == pytest.approx(expected, abs=0.04)
 

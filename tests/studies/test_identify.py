@@ -64,9 +64,9 @@ def test_damage_without_noise_is_found_exactly(fem, damage):
     assert most_probable(found) == pytest.approx(expected, abs=2e-3)
     assert found.damage == pytest.approx(damage, abs=2e-3)
     assert found.probability > 0.9
-    assert found.probability_of_damage == pytest.approx(1)
+    assert found.probabilities.damage == pytest.approx(1)
     assert found.table["probability"].gt(0.9).to_dict() == {group: group in damage for group in GROUPS}
-    assert found.p_value < 1e-6
+    assert found.probabilities.p_value < 1e-6
     np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=2e-4)
 
 
@@ -85,7 +85,7 @@ def test_a_healthy_structure_has_no_damage(fem):
     assert found.explanations.index[0] == "no damage"
     assert found.probability > 0.9
     assert (found.severities < 1e-3).all()
-    assert found.p_value > 0.5
+    assert found.probabilities.p_value > 0.5
     assert found.damage == {}
 
 
@@ -169,7 +169,7 @@ def test_one_record_says_less_than_many(fem):
     wide = identify_damage(fem, WEATHER[:1], record, GROUPS, prior=EXACT, random_state=0)
     many = identify_damage(fem, WEATHER, simulated(fem, {"diagonal": 0.4}), GROUPS, prior=EXACT, random_state=0)
     assert wide.most_probable == many.most_probable == ("diagonal",)
-    assert wide.standard_errors["diagonal"] > 3 * many.standard_errors["diagonal"]
+    assert wide.table.loc["diagonal", "standard_error"] > 3 * many.table.loc["diagonal", "standard_error"]
     assert wide.probability < many.probability
 
 
@@ -244,7 +244,7 @@ def test_draws_make_a_scenario(fem):
     found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2, "bottom": 0.2}), GROUPS, random_state=0)
     scenario = found.scenario("as found")
     assert scenario.draws["top"].mean() == pytest.approx(found.severities["top"], abs=0.005)
-    assert scenario.draws["top"].std() == pytest.approx(found.standard_errors["top"], rel=0.2)
+    assert scenario.draws["top"].std() == pytest.approx(found.table.loc["top", "standard_error"], rel=0.2)
     study = DetectabilityStudy(fem, MahalanobisDetector(), [scenario], n_repeats=3, random_state=0, uncertainty="noise")
     results = study.run(WEATHER)
     assert results["scenario"].tolist() == ["as found"]

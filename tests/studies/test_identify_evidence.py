@@ -10,11 +10,19 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, multivariate_t
 
 from skthermo.studies import DamagePrior
-from skthermo.studies.identification._boxes import draws, log_probability
 from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._evidence import Observed, student_scales
-from skthermo.studies.identification._explanations import Scale, all_sets, explanations, refine, screen, total
-from skthermo.studies.identification._posterior import Posterior
+from skthermo.studies.identification._curves import Observed, student_scales
+from skthermo.studies.identification._evidence import (
+    Posterior,
+    Scale,
+    all_sets,
+    draws,
+    explanations,
+    log_probability,
+    refine,
+    screen,
+    total,
+)
 
 ONLY = DamagePrior(model_error=0, something_else=0)
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.fem import AffineModel, CallableModel
+from skthermo.fem import AffineModel, Beam, CallableModel, Spring, Structure, add_noise
 from skthermo.studies import DamagePrior, identify_damage
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
@@ -16,6 +16,7 @@ WEATHER = make_truss_campaign(random_state=1).temperatures[::10]
 GROUPS = ["bottom", "top", "diagonal"]
 N_MASSES = 9
 SENSORS = [0, 2, 4, 6, 8]
+SECTION = {"E": 33e9, "G": 14e9, "A": 5.0, "I_yy": 1.6, "I_zz": 20.0, "J": 3.0, "density": 2500.0}
 
 
 def springs(places):
@@ -49,16 +50,16 @@ def test_mirrored_groups_are_named(symmetric):
     F = simulated(fem, T, {"left": 0.1})
     with pytest.warns(UserWarning, match="left and right.*indistinguishable-groups"):
         found = identify_damage(fem, T, F, ["left", "middle", "right"], random_state=0)
-    assert found.indistinguishable == [("left", "right")]
-    assert found.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
-    assert found.p_value < 0.01
+    assert found.separability.indistinguishable == [("left", "right")]
+    assert found.separability.similarity.loc["left", "right"] == pytest.approx(1, abs=0.01)
+    assert found.probabilities.p_value < 0.01
     probable = found.explanations["probability"]
     assert probable["left"] == pytest.approx(probable["right"], rel=0.2)
     assert found.table.loc["middle", "probability"] < 0.2
     joined = {"sides": ["left", "right"], "middle": ["middle"]}
     together = identify_damage(fem, T, F, joined, random_state=0)
     assert together.most_probable == ("sides",)
-    assert together.indistinguishable == []
+    assert together.separability.indistinguishable == []
     assert 0.04 < together.severities["sides"] < 0.06
     assert [together.damage[side] for side in ("left", "right")] == pytest.approx(
         [together.severities["sides"]] * 2, abs=1e-3
@@ -74,7 +75,7 @@ def test_shapes_tell_mirrored_groups_apart(symmetric, side):
     found = identify_damage(
         fem, T, simulated(fem, T, damage), shapes=(healthy, damaged), dofs=SENSORS, shape_noise=0.01, random_state=0
     )
-    assert found.indistinguishable == []
+    assert found.separability.indistinguishable == []
     expected = {"left": 0.0, "middle": 0.0, "right": 0.0, **damage}
     assert found.severities.to_dict() == pytest.approx(expected, abs=6e-3)
     assert found.most_probable == (side,)
@@ -89,7 +90,7 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
     F = simulated(fem, WEATHER)
     with pytest.warns(UserWarning, match="vertical.*unobservable-groups"):
         found = identify_damage(fem, WEATHER, F, random_state=0)
-    assert found.unobservable == ["vertical"]
+    assert found.separability.unobservable == ["vertical"]
     assert found.table.index.tolist() == [*GROUPS, "vertical"]
     # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     numbers = found.prior.numbers
@@ -107,10 +108,10 @@ def test_shifts_that_no_group_makes_are_something_else(fem):
     for change in (1.05, [1, 1, 1, 1.03, 1, 1]):
         found = identify_damage(fem, WEATHER, simulated(fem, WEATHER) * change, GROUPS, random_state=0)
         assert found.most_probable == ("something else",)
-        assert found.probability_other > 0.9
-        assert found.probability_of_damage > 0.99
+        assert found.probabilities.other > 0.9
+        assert found.probabilities.damage > 0.99
         assert found.damage == {}
-        assert found.p_value < 0.01
+        assert found.probabilities.p_value < 0.01
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
@@ -123,8 +124,8 @@ def test_damage_beside_something_else_is_still_found(fem):
     assert found.estimates.loc[("top + something else", "top"), "severity"] == pytest.approx(0.4, abs=0.05)
     without = DamagePrior(something_else=0)
     forced = identify_damage(fem, WEATHER, F, GROUPS, prior=without, random_state=0)
-    assert forced.probability_other == 0
-    assert forced.misfit_p_value < found.misfit_p_value
+    assert forced.probabilities.other == 0
+    assert forced.probabilities.misfit_p_value < found.probabilities.misfit_p_value
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
@@ -243,7 +244,40 @@ def test_an_even_loss_is_one_of_all_groups(fem):
     F = simulated(fem, WEATHER, dict.fromkeys((*GROUPS, "vertical"), 0.012))
     found = identify_damage(fem, WEATHER, F, noise=0.002, random_state=0)
     assert found.most_probable == ("all groups",)
-    assert found.probability_even > 0.9
+    assert found.probabilities.even > 0.9
     assert found.table["probability"].min() > 0.9
     assert found.severities.to_dict() == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)
     assert found.damage == pytest.approx(dict.fromkeys((*GROUPS, "vertical"), 0.012), abs=2e-3)
+
+
+def symmetric_bridge():
+    """Three spans of 20, 30 and 20 m on springs."""
+    nodes = {i: (5.0 * i, 0.0, 0.0) for i in range(15)}
+    members = {i: Beam(i, i + 1, **SECTION) for i in range(14)}
+    members |= {"p1": Spring(4, "z", k=4e8), "p2": Spring(10, "z", k=4e8)}
+    members |= {"b0": Spring(0, "z", k=6e8), "b3": Spring(14, "z", k=6e8)}
+    groups = {"deck": range(14), "pier_1": ["p1"], "pier_2": ["p2"]}
+    supports = dict.fromkeys(nodes, "y rx rz") | {0: "x y rx rz"}
+    return Structure(nodes, members, supports, groups).assemble(["deck", "pier_1", "pier_2"], n_modes=4)
+
+
+@pytest.mark.nightly
+def test_mirror_images_are_named_and_share_the_probability():
+    """Of a symmetric bridge, whose chain has drifted out of symmetry."""
+    model = symmetric_bridge()
+    T = 10 + 10 * np.random.default_rng(0).uniform(-1, 1, (300, 1))
+    theta = np.exp((T - 10) * [-0.004, -0.003, -0.003])
+    fem = DataInformedFEM(model, inverse=PosteriorInverse(noise=0.004), random_state=0)
+    fem.fit(T, add_noise(model.frequencies(theta), 0.004, random_state=0))
+    records = add_noise(model.damaged({"pier_2": 0.2}).frequencies(theta), 0.004, random_state=1)
+    with pytest.warns(UserWarning, match="pier_1 and pier_2.*indistinguishable-groups"):
+        found = identify_damage(fem, T, records, random_state=0)
+    assert found.separability.indistinguishable == [("pier_1", "pier_2")]
+    assert found.probabilities.p_value < 0.01
+    assert found.probabilities.damage > 0.99
+    alone = found.explanations["probability"]
+    assert 0.3 < alone["pier_2"] / alone["pier_1"] < 3
+    assert (found.table.loc[["pier_1", "pier_2"], "standard_error"] > 0.05).all()
+    assert found.estimates.loc[("pier_2", "pier_2"), "severity"] == pytest.approx(0.2, abs=0.02)
+    assert (found.table["ci_low"] == 0).all()
+    assert found.table.loc["pier_2", "ci_high"] > 0.18

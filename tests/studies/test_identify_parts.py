@@ -8,8 +8,8 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.residuals.weather import WeatherFunctions
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._curves import Part, ShiftComparison
-from skthermo.studies.identification._posterior import Explanation, Posterior
-from skthermo.studies.identification._separability import cosines, errors_alone, indistinguishable_groups
+from skthermo.studies.identification._evidence import Explanation, Posterior
+from skthermo.studies.identification._identified import cosines, errors_alone, indistinguishable_groups
 from skthermo.studies.identification._shift import measured_shift, outlying, record_shifts
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))

@@ -10,7 +10,7 @@ from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._figures import identified_facts
 from skthermo.reporting._templates import environment_of
 from skthermo.studies.identification._identified import explanation_text
-from skthermo.studies.identification._observe import ComparedRecords
+from skthermo.studies.identification._shift import ComparedRecords
 from tests.studies.identified import identified
 
 plt = pytest.importorskip("matplotlib.pyplot")

@@ -10,8 +10,8 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import mac
 from skthermo.studies import identify_damage
 from skthermo.studies.identification._causes import Cause, read_causes
-from skthermo.studies.identification._separability import precision
-from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
+from skthermo.studies.identification._identified import precision
+from skthermo.studies.identification._shapes import ShapeEffects, shape_shift
 from tests.studies.test_identify_causes import OnlyDamaged, differences
 
 TRUSS, DOFS, MODES = make_truss(), [1, 3, 5, 10, 16, 22], [f"f{i}" for i in range(1, 7)]
@@ -91,14 +91,14 @@ def noisy(shapes, n_records, deviation=0.01, random=random):
 def test_change_and_variance_of_records(effects):
     """Means of many records: errors are of unit variance, and the noise is found."""
     healthy, changed = shapes_at(), shapes_at(AT)
-    exact = ShapeShift.of([effects], (healthy, -2j * changed), 0.02, MODES)
-    np.testing.assert_allclose(exact.change, effects(AT)[0], atol=1e-9)
-    np.testing.assert_allclose(exact.variances, 2 * 0.02**2)
-    found = ShapeShift.of([effects], (noisy(healthy, 40), noisy(changed, 10)), "fitted", MODES)
-    np.testing.assert_allclose(found.variances, 0.01**2 * (1 / 40 + 1 / 10), rtol=0.3)
+    exact = shape_shift([effects], (healthy, -2j * changed), 0.02, MODES)
+    np.testing.assert_allclose(exact.measured, effects(AT)[0], atol=1e-9)
+    np.testing.assert_allclose(np.diag(exact.covariance), 2 * 0.02**2)
+    found = shape_shift([effects], (noisy(healthy, 40), noisy(changed, 10)), "fitted", MODES)
+    np.testing.assert_allclose(np.diag(found.covariance), 0.01**2 * (1 / 40 + 1 / 10), rtol=0.3)
     errors = [
-        (shift.change - exact.change) / np.sqrt(shift.variances)
-        for shift in (ShapeShift.of([effects], (noisy(healthy, 4), noisy(changed, 2)), 0.001, MODES) for _ in range(60))
+        (shift.measured - exact.measured) / np.sqrt(np.diag(shift.covariance))
+        for shift in (shape_shift([effects], (noisy(healthy, 4), noisy(changed, 2)), 0.001, MODES) for _ in range(60))
     ]
     assert np.var(errors) == pytest.approx(1, abs=0.15)
 
@@ -107,10 +107,10 @@ def test_sensors_and_modes_that_were_not_measured(effects):
     healthy, changed = noisy(shapes_at(), 6, 1e-6), noisy(shapes_at(AT), 3, 1e-6)
     healthy[:, 0, 2], changed[0, :, 1], changed[:, 1:, 4] = np.nan, np.nan, np.nan
     healthy[:4, 3, 0] = np.nan
-    shift = ShapeShift.of([effects], (healthy, changed), 0.01, MODES)
+    shift = shape_shift([effects], (healthy, changed), 0.01, MODES)
     assert np.bincount(shift.effects.modes, minlength=6).tolist() == [4, 5, 4, 5, 0, 5]
-    np.testing.assert_allclose(shift.change, shift.effects(AT)[0], atol=1e-5)
-    per_mode = dict(zip(shift.effects.modes.tolist(), shift.variances.tolist(), strict=True))
+    np.testing.assert_allclose(shift.measured, shift.effects(AT)[0], atol=1e-5)
+    per_mode = dict(zip(shift.effects.modes.tolist(), np.diag(shift.covariance).tolist(), strict=True))
     assert per_mode[3] == pytest.approx(0.01**2 * (1 / 6 + 1 / 3))
     assert per_mode[1] == pytest.approx(0.01**2 * (1 / 6 + 1 / 2))
 
@@ -119,11 +119,11 @@ def test_shapes_of_another_mode_are_left_out_with_a_warning(effects):
     healthy, changed = shapes_at(), shapes_at(AT)
     healthy[:, 2] = healthy[:, 3]
     with pytest.warns(UserWarning, match="1 of 6 .*0.5.*f3.*foreign-shapes"):
-        shift = ShapeShift.of([effects], (healthy, changed), 0.01, MODES)
+        shift = shape_shift([effects], (healthy, changed), 0.01, MODES)
     assert 2 not in shift.effects.modes
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        ShapeShift.of([effects], (shapes_at(), changed), 0.01, MODES)
+        shape_shift([effects], (shapes_at(), changed), 0.01, MODES)
 
 
 @pytest.mark.parametrize(
@@ -140,13 +140,13 @@ def test_shapes_of_another_mode_are_left_out_with_a_warning(effects):
 )
 def test_errors_of_shapes(effects, shapes, noise, message):
     with pytest.raises(ValueError, match=message):
-        ShapeShift.of([effects], shapes, noise, MODES)
+        shape_shift([effects], shapes, noise, MODES)
 
 
 def test_effects_at_the_parameters_whose_shapes_are_measured(effects, fem):
     other = ShapeEffects.of(effects.structure, THETA * [1, 1, 1, 2.0], DOFS)
     for both in ([other, effects], [effects, other]):
-        shift = ShapeShift.of(both, (noisy(shapes_at(), 2), noisy(shapes_at(AT), 2)), 0.01, MODES)
+        shift = shape_shift(both, (noisy(shapes_at(), 2), noisy(shapes_at(AT), 2)), 0.01, MODES)
         np.testing.assert_array_equal(shift.effects.theta, THETA)
 
 
@@ -168,9 +168,10 @@ def test_shapes_find_what_frequencies_hardly_show(fem, later):
     bands = [table.loc["vertical", ["ci_low", "ci_high"]] for table in (found.table, without.table)]
     assert bands[0]["ci_low"] < 0.3 < bands[0]["ci_high"]
     assert np.diff(bands[0]) < 0.5 * np.diff(bands[1])
-    precision = found.precision
-    np.testing.assert_allclose(precision["together_without_shapes"], without.precision["together"], rtol=1e-9)
-    assert list(without.precision.columns) == ["alone", "together"]
+    precision = found.separability.precision
+    alone = without.separability.precision
+    np.testing.assert_allclose(precision["together_without_shapes"], alone["together"], rtol=1e-9)
+    assert list(alone.columns) == ["alone", "together"]
     for name in ("alone", "together"):
         assert (precision[name] < precision[f"{name}_without_shapes"]).all()
     assert precision.loc["vertical", "alone"] < 0.5 * precision.loc["vertical", "alone_without_shapes"]

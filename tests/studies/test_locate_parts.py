@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from skthermo.fem import Bar, Beam, Spring, Structure
-from skthermo.studies.identification import Curves
-from skthermo.studies.location._division import WHOLE, Division, lines_of
-from skthermo.studies.location._located import Places, fewest
+from skthermo.studies.identification._curves import Curves
+from skthermo.studies.identification._locate import WHOLE, Division, lines_of
+from skthermo.studies.identification._located import Places, fewest
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
 BEAM = STEEL | {"G": 81e9, "I_yy": 1e-4, "I_zz": 1e-4, "J": 1e-4}

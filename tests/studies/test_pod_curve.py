@@ -9,7 +9,7 @@ from scipy.special import expit, logit
 from scipy.stats import beta, norm
 
 from skthermo.studies import pod_curve
-from skthermo.studies.detectability._intervals import clopper_pearson, rate_of
+from skthermo.studies.detectability._rates import clopper_pearson, rate_of
 
 SEVERITIES = np.array([0.1, 0.15, 0.2, 0.25, 0.3])
 DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])
@@ -187,7 +187,7 @@ def test_bounds_hold_the_rate_as_often_as_they_say(n_repeats, correlation, rate)
     for _ in range(150):
         values, truth = decisions(random, rate, correlation, n_repeats, 365)
         found = rate_of(values)
-        held.append(found.lowest <= truth <= found.highest)
+        held.append(found.ci_low <= truth <= found.ci_high)
     assert np.mean(held) > 0.9  # 95 % asked, of 150: 2.8 standard errors
 
 
@@ -209,7 +209,7 @@ def test_independent_records_nearly_keep_their_number():
     found = rate_of(values)
     assert 0.9 * found.n_records < found.n_effective <= found.n_records
     deviation = np.sqrt(found.rate * (1 - found.rate) / found.n_records)
-    assert found.highest - found.lowest == pytest.approx(2 * 1.96 * deviation, rel=0.15)
+    assert found.ci_high - found.ci_low == pytest.approx(2 * 1.96 * deviation, rel=0.15)
 
 
 def test_bounds_are_quantiles_of_the_beta_distribution():
@@ -228,7 +228,7 @@ def test_rates_of_0_and_1_of_correlated_records_have_wide_bounds(sign):
     assert first.rate == second.rate == (sign < 0)
     assert first.n_effective > 0.9 * 7300
     assert second.n_effective == pytest.approx(7300 / 19, rel=0.3)  # (1 + 0.9) / (1 - 0.9)
-    assert second.highest - second.lowest > 10 * (first.highest - first.lowest)
+    assert second.ci_high - second.ci_low > 10 * (first.ci_high - first.ci_low)
 
 
 def test_records_without_a_decision_do_not_count():
@@ -238,7 +238,7 @@ def test_records_without_a_decision_do_not_count():
     found = rate_of(np.where(gaps, np.nan, values))
     assert found.n_records == np.count_nonzero(~gaps)
     assert found.rate == np.mean(values[~gaps] < 0)
-    assert found.lowest < found.rate < found.highest
+    assert found.ci_low < found.rate < found.ci_high
     nothing = rate_of(np.full((2, 10), np.nan))
     assert nothing.n_records == 0
     assert np.isnan(nothing.rate)
@@ -248,7 +248,7 @@ def test_repeats_that_are_all_alike_count_once():
     once, _ = decisions(np.random.RandomState(0), 0.3, 0.5, 1, 365)
     single, repeated = rate_of(once), rate_of(np.repeat(once, 20, axis=0))
     assert repeated.n_effective == pytest.approx(single.n_effective)
-    assert (repeated.lowest, repeated.highest) == pytest.approx((single.lowest, single.highest))
+    assert (repeated.ci_low, repeated.ci_high) == pytest.approx((single.ci_low, single.ci_high))
 
 
 def test_repeats_with_other_damage_count_as_one_record_each():
@@ -257,5 +257,5 @@ def test_repeats_with_other_damage_count_as_one_record_each():
     whole = rate_of(decisions, whole_repeats=True)
     assert whole.rate == 0.5
     assert 10 < whole.n_effective <= 20
-    assert whole.lowest < 0.3
-    assert whole.highest > 0.7
+    assert whole.ci_low < 0.3
+    assert whole.ci_high > 0.7

@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
 from skthermo.studies.detectability._ranking import rank
-from skthermo.studies.detectability._simulation import EvaluatedRecords
+from skthermo.studies.detectability._rates import EvaluatedRecords
 from tests.studies.studies import WEATHER, compensated, study_of
 
 SIMULATED = "simulated"

@@ -14,10 +14,15 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
-from skthermo.studies.detectability._replicate_rates import ReplicateRates, Spread
+from skthermo.studies.detectability._replicates import (
+    PARTS,
+    ReplicateRates,
+    Replicates,
+    other_years,
+    resampled_days,
+    variances_of,
+)
 from skthermo.studies.detectability._simulation import Measurement
-from skthermo.studies.replicates import PARTS, Replicates
-from skthermo.studies.replicates._replicates import other_years, resampled_days
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -161,12 +166,11 @@ def test_variances_of_the_parts_add_up():
     noise = deviations["noise"] * random.standard_normal((2, n_replicates, n_draws))
     steps = 0.5 + np.stack([weather + noise[0], weather + baseline + noise[1]], axis=1)
     replicates, key = rates_of(steps)
-    found = replicates.by_part(key)
-    np.testing.assert_allclose([found[part] for part in deviations], list(deviations.values()), rtol=0.08)
     table = replicates.table().loc[key]
+    np.testing.assert_allclose(table[list(deviations)], list(deviations.values()), rtol=0.08)
     assert table["together"] == pytest.approx(np.sqrt(14) / 100, rel=0.05)
     assert table[[f"{part} share" for part in deviations]].sum() == pytest.approx(1)
-    lowest, highest = replicates.band(key, 0.9)
+    lowest, highest = replicates.prediction_interval(key, 0.9)
     assert (highest - lowest) / 2 == pytest.approx(1.645 * np.sqrt(14) / 100, rel=0.05)
 
 
@@ -177,7 +181,7 @@ def test_a_band_holds_the_rate_of_one_more_campaign():
         centres = logit(0.8) + 0.3 * random.standard_normal((9, 1))
         rates = 1 / (1 + np.exp(-centres[:8] - 0.2 * random.standard_normal((8, 3))))
         replicates, key = rates_of(rates[:, np.newaxis], parts=("model",))
-        lowest, highest = replicates.band(key, 0.9)
+        lowest, highest = replicates.prediction_interval(key, 0.9)
         truth = 1 / (1 + np.exp(-centres[8, 0] - 0.2 * random.standard_normal()))
         held.append(lowest <= truth <= highest)
     assert 0.87 < np.mean(held) < 0.94
@@ -193,7 +197,7 @@ def test_a_band_holds_the_few_false_alarms_of_one_more_year(is_counted_anew, sha
         steps, key = np.stack([weather, random.poisson(other, (10, 2))], axis=1) / n_records, ("detector", "healthy")
         parts = ("weather", "baseline")
         replicates = ReplicateRates({key: steps}, {key: own / n_records}, {key: n_records}, parts, True, [])
-        lowest, highest = replicates.band(key, 0.9)
+        lowest, highest = replicates.prediction_interval(key, 0.9)
         held.append(lowest - 1e-9 <= random.poisson(expected) / n_records <= highest + 1e-9)
     assert shares[0] < np.mean(held) < shares[1]
 
@@ -204,7 +208,7 @@ def test_more_parts_do_not_narrow_a_band():
     widths = []
     for steps, with_noise in ((noise, False), (noise, True), (noise + other, True)):
         replicates, key = rates_of(0.5 + steps[:, np.newaxis], with_noise, parts=("baseline",))
-        lowest, highest = replicates.band(key, 0.9)
+        lowest, highest = replicates.prediction_interval(key, 0.9)
         widths.append(highest - lowest)
     assert widths[0] < widths[1] < widths[2]
 
@@ -214,13 +218,12 @@ def test_a_band_moves_with_weather_and_model_but_not_with_the_training_records(p
     scatter = 0.01 * np.random.RandomState(3).standard_normal((50, 1, 3))
     steps = np.concatenate([0.5 + scatter, 0.6 + scatter], axis=1)[:, : len(parts)]
     replicates, key = rates_of(steps, parts=parts, own=0.3)
-    assert np.mean(replicates.band(key, 0.9)) == pytest.approx(centre, abs=0.005)
+    assert np.mean(replicates.prediction_interval(key, 0.9)) == pytest.approx(centre, abs=0.005)
     assert np.mean(replicates.single(key)) == pytest.approx(centre, abs=0.005)
 
 
 def test_all_replicates_alike_have_no_spread():
-    found = Spread.of(np.full((5, 3), 0.25))
-    assert (found.mean, found.between, found.within) == (0.25, 0.0, 0.0)
+    assert variances_of(np.full((5, 3), 0.25)) == (0.0, 0.0)
 
 
 def test_bands_of_a_study(study):
@@ -231,10 +234,10 @@ def test_bands_of_a_study(study):
     smallest = study.minimum_detectable_damage(method="curve")
     assert (smallest["pi_low"] < smallest["pi_high"]).all()
     curve = study.pod_curve("bottom")
-    low, high = curve.band([0.1, 0.2])
+    low, high = curve.prediction_interval([0.1, 0.2])
     curves = np.array([one.predict([0.1, 0.2])[0] for one in curve.replicates])
     assert ((curves.min(axis=0) <= low) & (low < high) & (high <= curves.max(axis=0))).all()
-    assert curve.a90_band[0] < curve.a90_band[1]
+    assert curve.a90_prediction_interval[0] < curve.a90_prediction_interval[1]
     summary = study.summary()
     assert "95% prediction intervals include the uncertainty of noise, the weather, the training records and" in summary
     damaged = study.results_.set_index("scenario").drop("healthy")
@@ -246,7 +249,7 @@ def test_models_that_cannot_be_drawn(monkeypatch, fem):
     def fails(*args, **options):
         raise ValueError("no derivative")
 
-    monkeypatch.setattr("skthermo.studies.replicates._replicates.ModelUpdater.fit", fails)
+    monkeypatch.setattr("skthermo.studies.detectability._replicates.ModelUpdater.fit", fails)
     with pytest.raises(ValueError, match=r"cannot be drawn from the training records \(no derivative\)"):
         Replicates.of(fem, ("noise", "model"), WEATHER, None, 3, [1, 2])
     with pytest.warns(UserWarning, match="bands-without-models"):

@@ -275,7 +275,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     results = study.run(WEATHER, SIDE_BY_SIDE)
     pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
     for name, (_, columns) in sees.items():
-        assert list(study.arrangements_[name].columns) == columns
+        assert study.columns_[name] == columns
     few = study.run(WEATHER, YEAR.frequencies)
     assert few["error"].str.contains("baseline has none").sum() == 3  # those that compensate
     assert (few.loc[few["detector"] == "raw", "error"] == "").all()

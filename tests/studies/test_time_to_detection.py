@@ -12,7 +12,8 @@ from scipy.stats import norm
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import ProgressiveDamage, Scenario
-from skthermo.studies.detectability._simulation import EvaluatedRecords, damaged_rows, onsets_of
+from skthermo.studies.detectability._rates import EvaluatedRecords
+from skthermo.studies.detectability._simulation import damaged_rows, onsets_of
 from skthermo.studies.detectability._waits import Waits
 from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper
@@ -104,9 +105,9 @@ def test_stamps_that_are_absent_delay_as_an_outage_does():
     decisions, kept = decisions_with(0.2, shape=(20, 390)), np.arange(390) % 40 < 30
     absent = Waits.of(evaluated(decisions[:, kept], stamps[kept]))
     empty = Waits.of(evaluated(np.where(kept, decisions, np.nan), stamps))
-    assert absent.clock.length == pd.Timedelta("1h")
+    assert absent.length == pd.Timedelta("1h")
     np.testing.assert_array_equal(absent.steps, empty.steps)
-    assert absent.clock.count(pd.Timedelta("1D")) == 24
+    assert absent.count(pd.Timedelta("1D")) == 24
 
 
 def test_clocks_that_are_not_exact_and_records_out_of_order_change_nothing():
@@ -115,7 +116,7 @@ def test_clocks_that_are_not_exact_and_records_out_of_order_change_nothing():
     late = stamps + pd.to_timedelta(np.random.default_rng(1).uniform(0, 600, 100), "s")
     expected, found = Waits.of(evaluated(decisions)), Waits.of(evaluated(decisions[:, shuffled], late[shuffled]))
     np.testing.assert_array_equal(found.steps, expected.steps)
-    assert [found.clock.count(pd.Timedelta(days=days)) for days in (1, 7, 30)] == [1, 7, 30]
+    assert [found.count(pd.Timedelta(days=days)) for days in (1, 7, 30)] == [1, 7, 30]
 
 
 def test_a_table_has_a_row_for_each_detector_and_scenario(study):

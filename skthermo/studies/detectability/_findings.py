@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, check_flag, check_probability
-from skthermo.studies.detectability._candidates import Arrangement, Candidate
+from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank
-from skthermo.studies.detectability._replicate_rates import ReplicateRates, sentences
-from skthermo.studies.detectability._simulation import SIMULATED, EvaluatedRecords, Evaluation, ask_each
+from skthermo.studies.detectability._rates import EvaluatedRecords
+from skthermo.studies.detectability._replicates import ReplicateRates, sentences
+from skthermo.studies.detectability._simulation import SIMULATED, Candidate, Evaluation, ask_each
 from skthermo.studies.detectability._waits import soonest, waits_table
-from skthermo.studies.scenarios import BaseScenario
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -30,16 +30,10 @@ class StudyFindings:
     table: pd.DataFrame
     scenarios: Sequence[BaseScenario] = ()
     confidence: float = 0.95
-    detectors: Mapping[str, Any] = field(default_factory=dict)
-    thresholds: Mapping[str, float | None] = field(default_factory=dict)
-    arrangements: Mapping[str, Arrangement] = field(default_factory=dict)
-    indices: Mapping[tuple[str, str, str], pd.Series] = field(default_factory=dict)
-    decisions: Mapping[tuple[str, str, str], Array] = field(default_factory=dict)
-    transitions: Mapping[tuple[str, str, str], Array] = field(default_factory=dict)
-    calibration: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    candidates: Mapping[str, Candidate] = field(default_factory=dict)
+    evaluation: Evaluation = field(default_factory=Evaluation)
     errors: Mapping[str, str] = field(default_factory=dict)
     replicates: ReplicateRates | None = None
-    uncertainty: pd.DataFrame | None = None
     warnings: Sequence[str] = ()
 
     @classmethod
@@ -61,32 +55,44 @@ class StudyFindings:
         errors = {name: f"{type(error).__name__}: {error}" for name, error in failed.items()}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": errors.get(name)}])]
         table = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0]))
-        evaluated = {(one.detector, one.scenario.name, one.source): one for name in rows for one in records[name]}
         return cls(
             table=table if replicates is None else replicates.banded(table, confidence),
             scenarios=scenarios,
             confidence=confidence,
-            detectors={name: candidates[name].detector for name in rows},
-            thresholds={name: candidates[name].threshold for name in rows},
-            arrangements={name: candidates[name].arrangement for name in rows},
-            indices={key: one.damage_index for key, one in evaluated.items()},
-            decisions={key: one.decisions for key, one in evaluated.items()},
-            transitions={key: found for key, found in evaluation.transitions.items() if key[0] in rows},
-            calibration={key: found for key, found in evaluation.calibration.items() if key[0] in rows},
+            candidates={name: candidates[name] for name in rows},
+            evaluation=evaluation.only(rows),
             errors=errors,
             replicates=replicates,
-            uncertainty=None if replicates is None else replicates.table(),
             warnings=warnings,
         )
 
+    @property
+    def detectors(self) -> dict[str, Any]:
+        """The fitted detectors."""
+        return {name: one.detector for name, one in self.candidates.items()}
+
+    @property
+    def thresholds(self) -> dict[str, float | None]:
+        """Damage index above which there is an alarm, where a detector has one."""
+        return {name: one.threshold for name, one in self.candidates.items()}
+
+    @property
+    def columns(self) -> dict[str, list[Hashable]]:
+        """Names of the columns that each detector sees."""
+        return {name: one.columns for name, one in self.candidates.items()}
+
+    @property
+    def uncertainty(self) -> pd.DataFrame | None:
+        """Standard deviation of each rate due to each part of what is uncertain, and its share of the variance."""
+        return None if self.replicates is None else self.replicates.table()
+
     def only(self, detector: str) -> StudyFindings:
         """The findings as if a detector were the only one."""
-        by_key = ("indices", "decisions", "transitions", "calibration")
         return replace(
             self,
             table=self.table[self.table["detector"] == detector].reset_index(drop=True),
-            **{what: {detector: getattr(self, what)[detector]} for what in ("detectors", "thresholds", "arrangements")},
-            **{what: {key: one for key, one in getattr(self, what).items() if key[0] == detector} for what in by_key},
+            candidates={detector: self.candidates[detector]},
+            evaluation=self.evaluation.only([detector]),
         )
 
     def detector_name(self, detector: str | None = None) -> str:
@@ -133,8 +139,8 @@ class StudyFindings:
         Returns
         -------
         PODCurve
-            Records count as their effective numbers, so that serial correlation is in its bounds. Its `PODCurve.band`
-            and ``a90_band`` hold all that ``uncertainty`` names.
+            Records count as their effective numbers, so that serial correlation is in its bounds. Its
+            ``prediction_interval`` and ``a90_prediction_interval`` hold all that ``uncertainty`` names.
 
         Raises
         ------
@@ -274,7 +280,7 @@ class StudyFindings:
         self._check_source(source)
         chosen = None if detector is None else self.detector_name(detector)
         records = {key: one for key, one in self._records(source).items() if chosen in (None, key[0])}
-        table = waits_table(records, self.transitions, within, level, asked)
+        table = waits_table(records, self.evaluation.transitions, within, level, asked)
         return soonest(table, within) if check_flag(smallest, "smallest") else table
 
     def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
@@ -394,7 +400,7 @@ class StudyFindings:
                     f"source {source!r} has the scenarios {rows['scenario'].unique().tolist()}, none of them {kind}; "
                     "expected healthy and damaged ones"
                 )
-        calibration = {name: decisions for (name, of), decisions in self.calibration.items() if of == source}
+        calibration = {name: decisions for (name, of), decisions in self.evaluation.calibration.items() if of == source}
         if by == "pod_at_equal_pfa" and not calibration:
             raise ValueError(f"source {source!r} has no healthy records to move thresholds by; expected by='pod'")
         records = list(self._records(source).values())
@@ -520,12 +526,9 @@ class StudyFindings:
 
     def _records(self, source: str) -> dict[tuple[str, str, str], EvaluatedRecords]:
         """What the detectors evaluated of one source."""
-        scenarios = {one.name: one for one in self.scenarios}
-        return {
-            key: EvaluatedRecords(key[0], scenarios[key[1]], source, self.indices[key], decisions)
-            for key, decisions in self.decisions.items()
-            if key[2] == source
-        }
+        names = dict.fromkeys(name for name, *_ in self.evaluation.decisions)
+        records = (one for name in names for one in self.evaluation.records(name, self.scenarios))
+        return {(one.detector, one.scenario.name, source): one for one in records if one.source == source}
 
     def _family(self, family: str, source: str, detector: str | None) -> FamilyRates:
         name = self.detector_name(detector)

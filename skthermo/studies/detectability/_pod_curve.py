@@ -17,7 +17,7 @@ from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, check_flag, check_probability, real_array
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._intervals import clopper_pearson
+from skthermo.studies.detectability._rates import clopper_pearson
 
 MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
 MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
@@ -46,7 +46,8 @@ class PODCurve:
         Magnitudes of the highest tested severity with a POD below 0.9 (0 if there is none) and of the next one (NaN if
         there is none).
     replicates : tuple of PODCurve, default=()
-        Curves of measured campaigns as a study expects them where more than the noise is uncertain; see `band`.
+        Curves of measured campaigns as a study expects them where more than the noise is uncertain; see
+        `prediction_interval`.
 
     Examples
     --------
@@ -130,7 +131,7 @@ class PODCurve:
         margin = norm.ppf((1 + self.confidence) / 2) * deviation
         return expit(centre), expit(centre - margin), expit(centre + margin)
 
-    def band(self, severity: ArrayLike) -> tuple[Any, Any]:
+    def prediction_interval(self, severity: ArrayLike) -> tuple[Any, Any]:
         """Band in which the curve of a measured campaign should lie, with all that was uncertain in the study.
 
         Parameters
@@ -153,7 +154,7 @@ class PODCurve:
         return lowest, highest
 
     @property
-    def a90_band(self) -> tuple[float, float]:
+    def a90_prediction_interval(self) -> tuple[float, float]:
         """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without replicates."""
         if not self.replicates:
             return float("nan"), float("nan")

@@ -10,7 +10,7 @@ from scipy.stats import t
 
 from skthermo._tables.arrays import Array
 from skthermo.studies.detectability._pod_curve import families_of
-from skthermo.studies.detectability._simulation import EvaluatedRecords
+from skthermo.studies.detectability._rates import EvaluatedRecords
 
 LEVEL = 0.9  # probability of detection that counts as reliable
 

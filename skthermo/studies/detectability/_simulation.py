@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import pandas as pd
-from joblib import delayed
+from joblib import Memory, delayed
 from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
+from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.answers import answers_kept
+from skthermo._estimators.answers import answer_once, answers_kept
+from skthermo._estimators.memory import remembered
 from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
-from skthermo._tables.frames import Table, column_names, frame_like, row_times, time_of
-from skthermo._validation import _num_samples
-from skthermo.studies.detectability._candidates import Candidate
-from skthermo.studies.detectability._intervals import Rate, rate_of
-from skthermo.studies.scenarios import BaseScenario
+from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._validation import _num_samples, last_step, seed_parts
+from skthermo.detection import DamageDetector
+from skthermo.studies._scenarios import BaseScenario
+from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
 from skthermo.surrogate import FittedChain
 
 SIMULATED, REFERENCE = "simulated", "reference"
@@ -32,60 +36,185 @@ Answer = TypeVar("Answer")
 Key: TypeAlias = tuple[str, ...]
 Repeat: TypeAlias = tuple[int, Sequence[int]]  # number and seeds
 
+LARGEST_SEED = np.iinfo(np.int32).max
+MOST_ROWS = 20_000  # of records that are evaluated together
+YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
+
+
+@dataclass(frozen=True)
+class SeenColumns:
+    """Columns of a detector's baseline: their positions among temperatures and modes of the chain side by side."""
+
+    names: Sequence[Hashable]
+    n_sensors: int
+    positions: Any
+    is_frame: bool
+
+    def table(self, T: Table, F: Array) -> Table:
+        """Temperatures and frequencies of all modes as the detector sees them."""
+        return self._seen(np.hstack([as_floats(T), F]), T)
+
+    def reference(self, records: Table, T: Table, name: str) -> Table:
+        """Measured records of a scenario as the detector sees them, with temperatures T where they lack their own."""
+        known = self.positions_of(records, f"the reference of scenario {name!r}")
+        values = np.full((len(records), len(self.names)), np.nan)
+        values[:, known] = as_columns(records)
+        lacking = np.setdiff1d(self.positions, known)
+        if (lacking >= self.n_sensors).any():
+            raise ValueError(
+                f"the reference of scenario {name!r} lacks the modes {[self.names[i] for i in lacking]}; expected "
+                f"those that the detector sees"
+            )
+        if lacking.size:
+            check_same_rows(T, records, ("temperatures", f"the reference of scenario {name!r}"))
+            values[:, : self.n_sensors] = as_floats(T)
+        return self._seen(values, records if isinstance(records, pd.DataFrame) or len(values) != len(T) else T)
+
+    def _seen(self, values: Array, rows: Table) -> Table:
+        """The detector's columns of all of the chain's, on the index of some rows."""
+        if not self.is_frame:
+            return values[:, self.positions]
+        index = rows.index if isinstance(rows, pd.DataFrame) else None
+        return pd.DataFrame(values[:, self.positions], index=index, columns=[self.names[i] for i in self.positions])
+
+    def positions_of(self, records: Table, what: str) -> Any:
+        """Which of the chain's columns a table holds."""
+        n_columns, n_all = np.shape(records)[1] if np.ndim(records) == 2 else 0, len(self.names)
+        sensors, modes = list(self.names[: self.n_sensors]), list(self.names[self.n_sensors :])
+        if isinstance(records, pd.DataFrame):
+            unknown = [name for name in records.columns if name not in self.names]
+            if unknown or not set(records.columns) & set(modes):
+                raise ValueError(
+                    f"{what} has the columns {list(records.columns)}; expected modes {modes}, alone or beside "
+                    f"temperatures {sensors}, as in the fit of the chain"
+                )
+            return np.array([list(self.names).index(name) for name in records.columns])
+        if n_columns not in (n_all, n_all - self.n_sensors):
+            raise ValueError(
+                f"{what} has shape {np.shape(records)}; expected {n_all - self.n_sensors} columns of frequencies, or "
+                f"{self.n_sensors} of temperatures and {n_all - self.n_sensors} of frequencies side by side"
+            )
+        return np.arange(n_all - n_columns, n_all)
+
+
+def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Table]:
+    """The detector's view, and the records that it learns from: by default those that the chain has learned from.
+
+    Only a detector with a part that has ``targets`` sees temperatures.
+    """
+    T, F = fem.training_records_
+    names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
+    everything = SeenColumns(names, n_sensors, np.arange(len(names)), False)
+    if baseline is None:
+        positions = everything.positions if compensates else everything.positions[n_sensors:]
+        view = SeenColumns(names, n_sensors, positions, isinstance(T, pd.DataFrame) or isinstance(F, pd.DataFrame))
+        return view, view.table(T if isinstance(T, pd.DataFrame) else frame_like(F, as_floats(T)), as_floats(F))
+    known = everything.positions_of(baseline, "the baseline")
+    if compensates and not (known < n_sensors).any():
+        raise ValueError("the detector compensates for temperature, and the baseline has none; expected both")
+    seen = np.flatnonzero(compensates | (known >= n_sensors))
+    view = SeenColumns(names, n_sensors, known[seen], isinstance(baseline, pd.DataFrame))
+    return view, baseline.iloc[:, seen] if view.is_frame else as_columns(baseline)[:, seen]
+
+
+def has_targets(detector: BaseEstimator) -> bool:
+    """Whether a part of a detector takes some of its columns for targets, as `TemperatureCompensator` does."""
+    return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
+
 
 @dataclass(frozen=True, eq=False)
-class EvaluatedRecords:
-    """What a detector makes of the records of one scenario and source: their damage index in the first repeat, with
-    their index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
+class Candidate:
+    """A detector that has learned the healthy structure, and which columns it sees.
 
-    detector: str
-    scenario: BaseScenario
-    source: str
-    damage_index: pd.Series
-    decisions: Array
+    Its ``head``, the steps before its ``last`` one, may be those of other detectors too; what is no pipeline has none.
+    A decision depends on ``memory`` records, up to the evaluated one: those of the longest window.
+    """
 
-    def from_onset(self) -> tuple[Array, Array]:
-        """Decisions from the onset of the damage on, in order of time, and the times since then."""
-        times, onset = row_times(self.damage_index), self.scenario.onset
-        start = times.min() if onset is None else time_of(self.damage_index, onset, "onset")
-        order = np.argsort(times, kind="stable")
-        order = order[times[order] >= start]
-        return self.decisions[:, order], times[order] - start
+    detector: BaseEstimator
+    view: SeenColumns
+    n_baseline: int
+    head: tuple[BaseEstimator, ...]
+    last: BaseEstimator
+    memory: int
 
-    def rate(self, confidence: float) -> Rate:
-        """Rate of alarms from the onset of the damage on, with its bounds."""
-        return rate_of(self.from_onset()[0], confidence, whole_repeats=self.scenario.n_draws > 1)
+    @classmethod
+    def learned(
+        cls,
+        fem: FittedChain,
+        baseline: Table | None,
+        random_state: np.random.RandomState | None,
+        memory: str | Memory | None,
+        detector: BaseEstimator,
+    ) -> Candidate:
+        """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own.
 
-    def summary(self, confidence: float) -> dict[str, Any]:
-        """Rates, bounds and time to detection, from the onset of the damage on."""
-        scenario, (decisions, waits), rate = self.scenario, self.from_onset(), self.rate(confidence)
-        if not rate.n_records:
-            raise ValueError(
-                f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
-                "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
-                "after the onset"
-            )
-        pi_low, pi_high = band_of(decisions, confidence)
-        return {
-            "detector": self.detector,
-            "scenario": scenario.name,
-            "family": scenario.family,
-            "severity": scenario.severity,
-            "source": self.source,
-            "measure": "PFA" if scenario.is_healthy else "POD",
-            "rate": rate.rate,
-            "ci_low": rate.lowest,
-            "ci_high": rate.highest,
-            "pi_low": pi_low,
-            "pi_high": pi_high,
-            "n_alarms": rate.n_alarms,
-            "n_records": rate.n_records,
-            "n_not_evaluated": decisions.size - rate.n_records,
-            "n_effective": rate.n_effective,
-            "n_repeats": len(decisions),
-            "time_to_detection": _mean_wait(decisions < 0, waits, self.damage_index),
-            "error": "",
-        }
+        A memory keeps what is fitted, and the steps before the last one are shared by all pipelines that begin alike.
+        """
+        view, healthy = read_baseline(fem, detector, baseline)
+        fitted, head, seen = clone(detector), (), healthy
+        seed_parts(fitted, deepcopy(random_state))
+        is_pipeline = isinstance(fitted, Pipeline) and len(fitted) > 1
+        if is_pipeline:
+            before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
+            begins = before.steps[:-1], healthy
+
+            def learn() -> tuple[Pipeline, Table]:
+                return remembered(memory, "head", lambda: (before, before.fit_transform(healthy)), lambda: begins)
+
+            before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
+            head = tuple(step for _, step in before.steps[:-1])
+        last = fitted[-1] if is_pipeline else fitted
+        last = remembered(memory, "detector", lambda: last.fit(seen), lambda: (last, seen))
+        if is_pipeline:
+            fitted.steps = [*before.steps[:-1], (fitted.steps[-1][0], last)]
+        detector = fitted if is_pipeline else last
+        return cls(detector, view, _num_samples(healthy), head, last, _longest_window(detector))
+
+    @property
+    def threshold(self) -> float | None:
+        """Damage index above which there is an alarm, where the detector has one."""
+        offset = getattr(last_step(self.detector), "offset_", None)
+        return None if offset is None else -float(np.squeeze(offset))
+
+    @property
+    def columns(self) -> list[Hashable]:
+        """Names of the columns that the detector sees."""
+        return [self.view.names[i] for i in self.view.positions]
+
+    def decisions(self, entering: Sequence[Table], indices: Sequence[pd.Series] | None = None) -> list[Array]:
+        """Decision function of each of some tables, NaN where there is none; float32 is as much as alarms and intervals
+        need. They follow from known damage indices where the detector's decisions are those of `DamageDetector`."""
+        follow = getattr(type(self.last), "decision_function", None) is DamageDetector.decision_function
+        if indices is not None and follow:
+            return [np.asarray(-index.to_numpy() - self.last.offset_, dtype=np.float32) for index in indices]
+        return self._each(self.last.decision_function, entering, np.float32)
+
+    def damage_indices(self, entering: Sequence[Table], rows: Sequence[Table]) -> list[pd.Series]:
+        """Minus the detector's ``score_samples`` of each of some tables, on the index of their records."""
+        scores = self._each(self.last.score_samples, entering, float)
+        indices = [one.index if isinstance(one, pd.DataFrame) else None for one in rows]
+        return [pd.Series(-one, index, name="damage_index") for one, index in zip(scores, indices, strict=True)]
+
+    def _each(self, ask: Callable[[Table], Any], tables: Sequence[Table], dtype: Any) -> list[Array]:
+        """Answers for each table, asked at once where the last step evaluates each record by itself, as a
+        `DamageDetector` without ``lookback_`` does."""
+        is_rowwise = isinstance(self.last, DamageDetector) and self.memory == 1 and not hasattr(self.last, "lookback_")
+        if not is_rowwise or len(tables) < 2:
+            return [np.asarray(ask(table), dtype=dtype) for table in tables]
+        values = np.vstack([as_floats(table) for table in tables])
+        together = pd.DataFrame(values, columns=tables[0].columns) if hasattr(tables[0], "columns") else values
+        ends = np.cumsum([len(table) for table in tables])[:-1]
+        return np.split(np.asarray(ask(together), dtype=dtype), ends)
+
+
+def _longest_window(detector: BaseEstimator) -> int:
+    """Number of records, up to the evaluated one, on which a decision depends."""
+    parts, longest = [detector], 1
+    while parts:
+        part = parts.pop()
+        longest = max(longest, getattr(part, "width_", 1))
+        parts += [*dict(getattr(part, "steps", ())).values(), *getattr(part, "detectors_", ())]
+    return longest
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +227,9 @@ class Evaluation:
     repeat, and ``errors`` those of the detectors that failed, by name.
     """
 
-    decisions: Mapping[Key, Array]
-    transitions: Mapping[Key, Array]
-    errors: Mapping[str, Exception]
+    decisions: Mapping[Key, Array] = field(default_factory=dict)
+    transitions: Mapping[Key, Array] = field(default_factory=dict)
+    errors: Mapping[str, Exception] = field(default_factory=dict)
     calibration: Mapping[Key, Array] = field(default_factory=dict)
     indices: Mapping[Key, pd.Series] = field(default_factory=dict)
 
@@ -115,15 +244,24 @@ class Evaluation:
             errors |= one.errors
         return replace(self, errors=errors, **joined)
 
+    def only(self, names: Collection[str]) -> Evaluation:
+        """That of some detectors without errors, one after the other."""
+        parts = ("decisions", "transitions", "calibration", "indices")
+        found = {
+            part: {key: one for name in names for key, one in getattr(self, part).items() if key[0] == name}
+            for part in parts
+        }
+        return Evaluation(**found)
+
     def n_repeats_for(self, tol: float, confidence: float, scenarios: Sequence[BaseScenario]) -> int:
         """About how many repeats it takes until all bounds of simulated rates are so near to the rates."""
         rates = [
-            one.rate(confidence)
+            rate_of(one.from_onset()[0], confidence, whole_repeats=one.scenario.n_draws > 1)
             for name in {name for name, *_ in self.decisions} - set(self.errors)
             for one in self.records(name, scenarios)
             if one.source == SIMULATED
         ]
-        widths = [(rate.highest - rate.lowest) / 2 for rate in rates if rate.n_records]
+        widths = [(rate.ci_high - rate.ci_low) / 2 for rate in rates if rate.n_records]
         return int(np.ceil(self.n_repeats * (max(widths, default=0.0) / tol) ** 2))
 
     @property
@@ -160,32 +298,6 @@ def ask_each(
     return found, errors
 
 
-def band_of(decisions: Array, confidence: float) -> tuple[float, float]:
-    """Range that holds the rate of one more repeat with this probability, or that of all repeats if they are too few.
-
-    Of n rates, the k-th smallest exceeds that of one more repeat with probability k / (n + 1). One rate has no range.
-    """
-    evaluated = (~np.isnan(decisions)).sum(axis=1)
-    rates = (decisions < 0).sum(axis=1)[evaluated > 0] / evaluated[evaluated > 0]
-    if len(rates) < 2:
-        return float("nan"), float("nan")
-    lowest, highest = np.quantile(rates, [(1 - confidence) / 2, (1 + confidence) / 2], method="weibull")
-    return float(lowest), float(highest)
-
-
-def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
-    """Mean time to the first alarm over the repeats that have one, in records or as a Timedelta."""
-    detected = alarms[alarms.any(axis=1)].argmax(axis=1)
-    if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
-        return pd.Timedelta(int(waits[detected].mean()), "ns") if detected.size else pd.NaT
-    return float(detected.mean()) if detected.size else float("nan")
-
-
-LARGEST_SEED = np.iinfo(np.int32).max
-MOST_ROWS = 20_000  # of records that are evaluated together
-YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
-
-
 @dataclass(frozen=True, eq=False)
 class Records:
     """Records of a scenario from one source: simulated frequencies of all modes at the temperatures T, or others, which
@@ -214,23 +326,20 @@ class Records:
         return self._known[memory]
 
     def entering(self, candidate: Candidate) -> Table:
-        """What the last step of a detector sees, computed once for all whose steps before it are the same."""
-        if not candidate.head:
-            return self.seen_by(candidate)
-        if candidate.head not in self._known:
-            self._known[candidate.head] = candidate.entering(self.seen_by(candidate))
-        return self._known[candidate.head]
-
-    def seen_by(self, candidate: Candidate) -> Table:
-        """The columns that a detector sees, in one table for all that see the same."""
-        view = candidate.view
+        """What the last step of a detector sees, computed once for all that see the same columns and whose steps before
+        it are the same."""
+        view, known = candidate.view, self._known
         seen = (*view.positions, view.is_frame)
-        if seen not in self._known:
-            if self.source == SIMULATED:
-                self._known[seen] = view.table(self.T, self.values)
-            else:
-                self._known[seen] = view.reference(self.values, self.T, self.scenario.name)
-        return self._known[seen]
+        if seen not in known:
+            is_simulated = self.source == SIMULATED
+            known[seen] = (
+                view.table(self.T, self.values)
+                if is_simulated
+                else view.reference(self.values, self.T, self.scenario.name)
+            )
+        if candidate.head and candidate.head not in known:
+            known[candidate.head] = candidate.detector[:-1].transform(known[seen])
+        return known[candidate.head or seen]
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +417,7 @@ class Simulation:
         Jobs are as many repeats as are evaluated together, however many run side by side.
         """
         size = max(MOST_ROWS // (len(self.T) * (len(self.scenarios) + 1)), 1)
-        repeats = [(number, seeds[number]) for number in numbers]
+        repeats = list(zip(numbers, seeds[numbers.start : numbers.stop], strict=True))
         some = (repeats[first : first + size] for first in range(0, len(repeats), size))
         with without_warnings(), answers_kept():
             jobs = (delayed(self._some_repeats)(part) for part in some)
@@ -390,8 +499,12 @@ class Simulation:
                         transitions[key].append(during)
                     if with_indices:
                         indices[key] = index
-        stacked = ({key: np.array(values) for key, values in one.items()} for one in (decisions, transitions))
-        return Evaluation(*stacked, errors=errors, indices=indices)
+        return Evaluation(
+            {key: np.array(values) for key, values in decisions.items()},
+            {key: np.array(values) for key, values in transitions.items()},
+            errors,
+            indices=indices,
+        )
 
     def _answers(self, records: Sequence[Records], with_indices: bool, name: str) -> list[tuple[Any, Array, Any]]:
         """Damage index, decisions and those of transitions of one detector for each of some records."""
@@ -423,10 +536,12 @@ class Simulation:
 def _together(records: Iterable[Records]) -> Iterator[list[Records]]:
     """Records that are evaluated together, of so many rows that memory is bounded."""
     some: list[Records] = []
+    n_rows = 0
     for one in records:
-        if some and sum(len(other.rows) for other in some) + len(one.rows) > MOST_ROWS:
+        n_rows += len(one.rows)
+        if some and n_rows > MOST_ROWS:
             yield some
-            some = []
+            some, n_rows = [], len(one.rows)
         some.append(one)
     if some:
         yield some

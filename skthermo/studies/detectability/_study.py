@@ -22,19 +22,18 @@ from skthermo._tables.arrays import as_random_state, check_jobs, check_probabili
 from skthermo._validation import Stages, held, last_step, seeded
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
-from skthermo.studies.detectability._candidates import Candidate
+from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._replicate_rates import ReplicateRates
+from skthermo.studies.detectability._replicates import ReplicateRates, Replicates
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
+    Candidate,
     Evaluation,
     Measurement,
     Simulation,
     ask_each,
     clean_frequencies,
 )
-from skthermo.studies.replicates import Replicates
-from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
 
 LEAST_REPEATS, MOST_REPEATS = 3, 20
@@ -138,8 +137,8 @@ class DetectabilityStudy(BaseEstimator):
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is evaluated by them. Measured records have none.
-    arrangements_ : dict of str to object
-        Columns that each detector sees, and the number of healthy records that it has learned.
+    columns_ : dict of str to list
+        Names of the columns that each detector sees.
     uncertainty_ : DataFrame or None
         Indexed by detector and scenario: standard deviation of the rate due to each part of ``uncertainty`` ("noise",
         "weather", "baseline", "model") and to all ("together"), and the share of each in the variance ("model share").
@@ -237,11 +236,11 @@ class DetectabilityStudy(BaseEstimator):
     results_ = held("_found.table")
     detectors_ = held("_found.detectors")
     thresholds_ = held("_found.thresholds")
-    indices_ = held("_found.indices")
-    decisions_ = held("_found.decisions")
-    transitions_ = held("_found.transitions")
-    calibration_ = held("_found.calibration")
-    arrangements_ = held("_found.arrangements")
+    indices_ = held("_found.evaluation.indices")
+    decisions_ = held("_found.evaluation.decisions")
+    transitions_ = held("_found.evaluation.transitions")
+    calibration_ = held("_found.evaluation.calibration")
+    columns_ = held("_found.columns")
     uncertainty_ = held("_found.uncertainty")
     replicates_ = held("_found.replicates")
     scenarios_ = held("_found.scenarios")
@@ -340,7 +339,7 @@ class DetectabilityStudy(BaseEstimator):
         stages = Stages(self, 5 + bool(replicates.parts))
         with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
             learned = partial(Candidate.learned, self.fem, baseline, seeded(self.random_state), self.memory)
-            candidates, errors = ask_each(detectors, lambda name: learned(name, detectors[name]), {})
+            candidates, errors = ask_each(detectors, lambda name: learned(detectors[name]), {})
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)

@@ -29,11 +29,17 @@ from skthermo._tables.frames import Table, column_names, has_stamps, row_times, 
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
-from skthermo.studies.detectability._candidates import SeenColumns, has_targets
-from skthermo.studies.detectability._intervals import Rate, rate_of
-from skthermo.studies.detectability._simulation import LARGEST_SEED, Measurement, Simulation, clean_frequencies
+from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
+from skthermo.studies.detectability._rates import Rate, rate_of
+from skthermo.studies.detectability._simulation import (
+    LARGEST_SEED,
+    Measurement,
+    SeenColumns,
+    Simulation,
+    clean_frequencies,
+    has_targets,
+)
 from skthermo.studies.detectability._study import check_detector
-from skthermo.studies.scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.surrogate import FittedChain
 
 FIRST_ROWS = "not-predicted", "no-earlier-records"  # kinds of warnings that the first rows of each state would give
@@ -59,7 +65,7 @@ class Decisions:
     def worth(self, limit: float) -> float:
         """1, or the limit over the lower bound of the false alarms where this is more: the detector will work with its
         own threshold, not with a raised one."""
-        return limit / max(self.false_alarms().lowest, limit)
+        return limit / max(self.false_alarms().ci_low, limit)
 
     def found(self, limit: float) -> float:
         """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
@@ -340,12 +346,12 @@ class DetectionTask(Bunch):
         alarms, worth = found.false_alarms(confidence), found.worth(limit)
         return {
             "fresh": found.score(limit),
-            "fresh_ci_low": worth * float(np.mean([pod.lowest for pod in pods])),
-            "fresh_ci_high": worth * float(np.mean([pod.highest for pod in pods])),
+            "fresh_ci_low": worth * float(np.mean([pod.ci_low for pod in pods])),
+            "fresh_ci_high": worth * float(np.mean([pod.ci_high for pod in pods])),
             "false_alarms": alarms.rate,
-            "false_alarms_ci_low": alarms.lowest,
-            "false_alarms_ci_high": alarms.highest,
-            "within_limit": alarms.lowest <= limit,
+            "false_alarms_ci_low": alarms.ci_low,
+            "false_alarms_ci_high": alarms.ci_high,
+            "within_limit": alarms.ci_low <= limit,
             "not_evaluated": float(np.isnan(found.values).mean()),
         }
 
@@ -519,7 +525,7 @@ def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
         stamped = T if has_stamps(T) else F
         index = stamped.index if has_stamps(stamped) else None
         return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
-    known = SeenColumns(names, n_sensors, np.arange(len(names)), False)._positions_of(baseline, "the baseline")
+    known = SeenColumns(names, n_sensors, np.arange(len(names)), False).positions_of(baseline, "the baseline")
     index = baseline.index if has_stamps(baseline) else None
     records = pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
     is_sensor = np.asarray(known) < n_sensors

@@ -1,29 +1,9 @@
-"""Which causes explain a shift of frequencies, and how probably."""
+"""Which causes explain a shift of frequencies, how probably, and where in its groups a structure is damaged."""
 
-from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior
-from skthermo.studies.identification._curves import Curves, Effects, ShiftComparison
-from skthermo.studies.identification._evidence import Observed
-from skthermo.studies.identification._explanations import Scale, screen
+from skthermo.studies.identification._causes import DamagePrior
 from skthermo.studies.identification._identified import IdentifiedDamage
-from skthermo.studies.identification._identify import compared, identify_damage
-from skthermo.studies.identification._observe import observe
-from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._shift import FrequencyShift
+from skthermo.studies.identification._identify import identify_damage
+from skthermo.studies.identification._locate import locate_damage
+from skthermo.studies.identification._located import LocatedDamage
 
-__all__ = [
-    "SOMETHING_ELSE",
-    "Cause",
-    "Curves",
-    "ShiftComparison",
-    "DamagePrior",
-    "Effects",
-    "IdentifiedDamage",
-    "Observed",
-    "Posterior",
-    "Scale",
-    "FrequencyShift",
-    "compared",
-    "identify_damage",
-    "observe",
-    "screen",
-]
+__all__ = ["DamagePrior", "IdentifiedDamage", "LocatedDamage", "identify_damage", "locate_damage"]

@@ -1,4 +1,4 @@
-"""Measured shifts beside the effects of causes, exact and tabulated."""
+"""Measured shifts in coordinates with independent errors, and the effects of causes on them, exact and tabulated."""
 
 from __future__ import annotations
 
@@ -7,16 +7,79 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
+from scipy.linalg import block_diag
+from scipy.special import logsumexp
 
 from skthermo._tables.arrays import Array
 from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._evidence import Observed
 
 Effects = Callable[[Array], tuple[Array, Array]]
 
 SHARES = np.array([0.0, 1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6, 11 / 12, 1.0])  # of the bounds, where effects are tabulated
 LOGARITHMS = -np.log1p([0.0, -0.3, -0.6, -0.9])  # of 1 / (1 - severity), between which effects of damage are smooth
 N_SMALL = 3  # nodes that all causes have; those of larger amounts are computed for causes that need them
+COMMON_SHARE = 0.3  # share of the mean square of all shifts in the error of the model's effect on one of them
+FARTHEST = 1e-6  # probability of scales of Student's law beyond the smallest one that counts
+WIDTHS = 1.5  # standard deviations of the posterior of ln scale between two of them
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Measured shifts and their errors in coordinates in which these are independent, with unit variance.
+
+    ``rotation`` leads to them. There, ``elsewhere`` (n_observed,) are the variances of a shift by something else of
+    size 1, and ``of_model`` the part of the unit variance that is the model's error. Errors of those coordinates that
+    ``is_scaled`` marks follow Student's law, as a mixture of normal laws whose precisions are ``scales`` times 1, with
+    the logarithms of their weights, ``log_scales``.
+    """
+
+    measured: Array
+    rotation: Array
+    elsewhere: Array
+    of_model: Array
+    is_scaled: Array
+    scales: Array
+    log_scales: Array
+
+    @classmethod
+    def of(cls, parts: list[tuple[Array, Array, float]], model_error: float = 0.0) -> Observed:
+        """Of parts with measured shifts, their covariance, and the freedom of their errors.
+
+        The model is wrong by a share of what it explains, which is about what was measured.
+        """
+        rotations, variances, of_model = [], [], []
+        for measured, covariance, _ in parts:
+            squares = (1 - COMMON_SHARE) * measured**2 + COMMON_SHARE * (measured**2).mean()
+            squares *= model_error**2
+            values, vectors = np.linalg.eigh(covariance + np.diag(squares))
+            of_model.append((vectors**2).T @ squares / values)
+            rotations.append((vectors / np.sqrt(values)).T)
+            variances.append(1 / values)
+        is_scaled = np.concatenate([np.full(len(part[0]), np.isfinite(part[2])) for part in parts])
+        freedom = min(part[2] for part in parts)
+        scales, log_scales = student_scales(freedom, int(is_scaled.sum()))
+        rotation = block_diag(*rotations)
+        measured = rotation @ np.concatenate([part[0] for part in parts])
+        return cls(
+            measured, rotation, np.concatenate(variances), np.concatenate(of_model), is_scaled, scales, log_scales
+        )
+
+    def variances(self, sizes: Array, factors: Array) -> Array:
+        """Variances with something else of some sizes and the model's error times factors, (n_errors, n_observed)."""
+        return 1 + sizes[:, np.newaxis] ** 2 * self.elsewhere + (factors[:, np.newaxis] ** 2 - 1) * self.of_model
+
+
+def student_scales(freedom: float, n_observed: int) -> tuple[Array, Array]:
+    """Precisions of normal laws that mix to Student's, and the logarithms of their weights."""
+    if not np.isfinite(freedom):
+        return np.ones(1), np.zeros(1)
+    law = stats.gamma(freedom / 2, scale=2 / freedom)
+    lowest, highest = np.log(law.ppf(FARTHEST)), np.log(law.isf(FARTHEST**2))
+    number = int(np.ceil((highest - lowest) / (WIDTHS * np.sqrt(2 / (freedom + n_observed))))) + 1
+    steps = np.linspace(lowest, highest, number)
+    logs = law.logpdf(np.exp(steps)) + steps
+    return np.exp(steps), logs - logsumexp(logs)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Identified damage, as `identify_damage` returns it, and what it says in sentences."""
+"""Identified damage, as `identify_damage` returns it: its parts, and what they say in sentences."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from skthermo._effects import HIGHEST_SEVERITY
 from skthermo._tables.arrays import Array
 from skthermo._tables.text import SPACE, Sentences, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
-from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, DamagePrior
-from skthermo.studies.identification._observe import ComparedRecords
-from skthermo.studies.identification._separability import VISIBLE
-from skthermo.studies.scenarios import UncertainDamage
+from skthermo.studies._scenarios import UncertainDamage
+from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
+from skthermo.studies.identification._shift import ComparedRecords
 
 ALIKE = 0.95  # cosine between effects from which on indistinguishable causes are named together
 PHRASES = {
@@ -37,6 +36,8 @@ RARE = 0.05  # p value below which a misfit, or a shift of a healthy structure, 
 CLEAR = 2.0  # standard errors by which a frequency must move to count as moved
 PILED_UP = 1.05  # standard errors between the mean of an exponential law and its bound, with some margin
 EVEN = 0.1  # relative scatter of shifts up to which they count as even
+VISIBLE = 0.1  # largest standard error with which a severity counts as known
+IMITATING_SHARE = 0.25  # smallest share in the reproduced effect with which a group counts as imitating another
 
 
 @dataclass(frozen=True)
@@ -148,12 +149,12 @@ def statements(found: IdentifiedDamage) -> list[Statement]:
 
     They differ only in causes that look alike, or in causes that these modes do not show.
     """
-    sets = alike_sets(found.indistinguishable, found.similarity)
+    sets = found.separability.alike()
     together: dict[frozenset[Any], list[tuple[float, tuple[str, ...]]]] = {}
     known: set[tuple[str, ...]] = set()
     for name, probability in found.explanations["probability"].items():
         causes = causes_of(found, str(name))
-        seen = tuple(cause for cause in causes if cause not in found.unobservable)
+        seen = tuple(cause for cause in causes if cause not in found.separability.unobservable)
         shown = seen if seen in known else causes
         known.add(causes)
         key = frozenset(next((group for group in sets if cause in group), cause) for cause in shown)
@@ -186,7 +187,8 @@ def causes_of(found: IdentifiedDamage, name: str) -> tuple[str, ...]:
     """The causes of an explanation by its name."""
     amounts = found.estimates.index
     named = [str(cause) for explanation, cause in amounts if explanation == name]
-    return (*named, SOMETHING_ELSE) if name.endswith(SOMETHING_ELSE) else tuple(named)
+    has_else = " + ".join(named) != name and name != NO_DAMAGE
+    return (*named, SOMETHING_ELSE) if has_else else tuple(named)
 
 
 def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amount:
@@ -194,18 +196,6 @@ def amount_of(found: IdentifiedDamage, causes: Sequence[str], cause: str) -> Amo
     row = found.estimates.loc[(" + ".join(causes), cause)]
     values = [float(row[name]) for name in ("severity", "ci_low", "ci_high")]
     return Amount(cause, str(found.table["kind"].get(cause, "damage")), *values)
-
-
-def alike_sets(indistinguishable: Sequence[Sequence[str]], similarity: pd.DataFrame) -> list[frozenset[str]]:
-    """Sets of causes whose effects are nearly the same, among those that are indistinguishable."""
-    sets: list[frozenset[str]] = []
-    for members in indistinguishable:
-        for one, other in combinations(members, 2):
-            if similarity.loc[one, other] >= ALIKE:
-                touched = [group for group in sets if one in group or other in group]
-                joined = frozenset({one, other}).union(*touched)
-                sets = [group for group in sets if group not in touched] + [joined]
-    return sets
 
 
 def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
@@ -222,7 +212,9 @@ def _others(first: Statement, others: Sequence[Statement]) -> Iterator[str]:
 
 def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
     """Causes that are likely over all explanations together, unless they are those of the first and sure."""
-    table = found.table[(found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.unobservable)]
+    table = found.table[
+        (found.table["probability"] >= LIKELY) & ~found.table.index.isin(found.separability.unobservable)
+    ]
     in_first = {amounts[0].cause for amounts in first.changes}
     if in_first.issuperset(table.index) and (table["probability"] >= SURE).all():
         return
@@ -237,7 +229,7 @@ def _averages(found: IdentifiedDamage, first: Statement) -> Iterator[str]:
 
 
 def _unnoticed(found: IdentifiedDamage) -> Iterator[str]:
-    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.unobservable)]
+    table = found.table[(found.table["kind"] == "damage") & ~found.table.index.isin(found.separability.unobservable)]
     losses = [f"{percent(bound, '.2g')} in {group}" for group, bound in table["highest_if_damaged"].dropna().items()]
     if losses:
         yield f"95{SPACE}% upper bounds on undetected losses of stiffness: {listed(losses)}."
@@ -295,6 +287,113 @@ def explanation_text(causes: Sequence[str], amounts: Sequence[float]) -> str:
     return ", ".join([*parts, *causes[len(amounts) :]]) or NO_DAMAGE
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Separability:
+    """Which causes the measured modes show, and which they distinguish.
+
+    Parameters
+    ----------
+    similarity : DataFrame
+        Cosines between the effects of the causes, in standard errors of the shifts.
+    indistinguishable : list of tuple of str
+        Sets of causes of which one looks like the others in these modes.
+    unobservable : list of str
+        Causes whose severity alone would have a standard error above 10 %. Their probability hardly differs from what
+        the prior says.
+    precision : DataFrame
+        One row a cause: the least standard error that any method can reach (Cramer-Rao), ``alone`` if nothing else
+        could have changed, and ``together`` if all other causes may have changed as much as is likely beforehand. With
+        mode shapes, ``alone_without_shapes`` and ``together_without_shapes`` are what frequencies alone would give.
+    """
+
+    similarity: pd.DataFrame
+    indistinguishable: list[tuple[str, ...]]
+    unobservable: list[str]
+    precision: pd.DataFrame
+
+    @classmethod
+    def of(cls, slopes: Array, nominal: Array, causes: Sequence[Cause], precision: pd.DataFrame) -> Separability:
+        """From effects of small amounts, (n_observed, n_causes), in standard errors, at the parameters of the records
+        and at the model's nominal state."""
+        names = [cause.name for cause in causes]
+        is_seen = precision["alone"].to_numpy() <= VISIBLE
+        seen = np.flatnonzero(is_seen)
+        sets = indistinguishable_groups(nominal[:, seen]) + indistinguishable_groups(slopes[:, seen])
+        return cls(
+            similarity=pd.DataFrame(cosines(nominal), names, names),
+            indistinguishable=list(dict.fromkeys(tuple(names[seen[column]] for column in one) for one in sets)),
+            unobservable=[name for name, is_shown in zip(names, is_seen, strict=True) if not is_shown],
+            precision=precision,
+        )
+
+    def alike(self) -> list[frozenset[str]]:
+        """Sets of causes whose effects are nearly the same, among those that are indistinguishable."""
+        sets: list[frozenset[str]] = []
+        for members in self.indistinguishable:
+            for one, other in combinations(members, 2):
+                if self.similarity.loc[one, other] >= ALIKE:
+                    touched = [group for group in sets if one in group or other in group]
+                    joined = frozenset({one, other}).union(*touched)
+                    sets = [group for group in sets if group not in touched] + [joined]
+        return sets
+
+    def sentences(self) -> Iterator[str]:
+        """What these modes do not determine."""
+        for causes in self.indistinguishable:
+            yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
+        if self.unobservable:
+            yield f"Damage in {listed(self.unobservable, 'or')} is unobservable in these modes."
+
+    def warnings(self) -> Iterator[SkthermoWarning]:
+        """What is doubtful."""
+        if self.indistinguishable:
+            sets = "; ".join(" and ".join(causes) for causes in self.indistinguishable)
+            yield ResultWarning(
+                f"these modes cannot distinguish groups: {sets}. Only their common effect is known. Measure their "
+                "shapes, or other modes",
+                "indistinguishable-groups",
+            )
+        if self.unobservable:
+            yield ResultWarning(
+                f"these modes do not show damage of {', '.join(self.unobservable)}: its severity would have a standard "
+                f"error above {VISIBLE:.0%}. Take records over a longer time, or measure other modes",
+                "unobservable-groups",
+            )
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences()) or "These modes show and distinguish all causes."
+
+
+@dataclass(frozen=True, repr=False)
+class Probabilities:
+    """Probabilities over all explanations, and of shifts by chance.
+
+    Parameters
+    ----------
+    damage : float
+        That anything changed.
+    other : float
+        That something else than the named causes shifted the frequencies, beside them or alone.
+    even : float
+        That all groups lost the same share of their stiffness, as where a whole structure ages or gains mass: "all
+        groups" in ``explanations``, which nobody has to ask for. In ``table`` it is damage of each group.
+    p_value : float
+        That a healthy structure shows as large a shift.
+    misfit_p_value : float
+        Of a larger misfit than that of the most probable explanation, if it is right; NaN if it has as many causes as
+        there are modes. A low one says that something else changed too.
+    """
+
+    damage: float
+    other: float
+    even: float
+    p_value: float
+    misfit_p_value: float
+
+    def __repr__(self) -> str:
+        return f"Probabilities({', '.join(f'{name}={value:.2g}' for name, value in vars(self).items())})"
+
+
 @dataclass(frozen=True, eq=False)
 class IdentifiedDamage(Sentences):
     """Explanations of a shift of frequencies with their probabilities, and what follows for each possible cause.
@@ -322,38 +421,23 @@ class IdentifiedDamage(Sentences):
         One row a mode: mean relative shift ``measured`` and ``explained`` by the causes, the mean over explanations,
         ``standard_error`` of the measured one, ``n_records``, and ``n_independent``, as many independent records as
         would determine it as well.
-    rest : float
-        Probability of all explanations that are not listed.
-    most_probable : tuple of str
-        Causes of the most probable explanation, "something else" among them; empty for "no damage".
-    probability_of_damage : float
-        Probability that anything changed.
-    probability_other : float
-        Probability that something else than the named causes shifted the frequencies, beside them or alone.
-    probability_even : float
-        Probability that all groups lost the same share of their stiffness, as where a whole structure ages or gains
-        mass: "all groups" in ``explanations``, which nobody has to ask for. In ``table`` it is damage of each group.
-    similarity : DataFrame
-        Cosines between the effects of the causes, in standard errors of the shifts.
-    indistinguishable : list of tuple of str
-        Sets of causes of which one looks like the others in these modes.
-    unobservable : list of str
-        Causes whose severity alone would have a standard error above 10 %. Their probability hardly differs from what
-        the prior says.
-    members : mapping of str to list of str
-        The model's groups behind each cause; none for a cause that is no group.
     draws : DataFrame
         Severities of the model's groups, drawn from all explanations by their probability; one draw a row.
-    precision : DataFrame
-        One row a cause: the least standard error that any method can reach (Cramer-Rao), ``alone`` if nothing else
-        could have changed, and ``together`` if all other causes may have changed as much as is likely beforehand. With
-        mode shapes, ``alone_without_shapes`` and ``together_without_shapes`` are what frequencies alone would give.
-    p_value : float
-        Probability that a healthy structure shows as large a shift.
-    misfit_p_value : float
-        Probability of a larger misfit than that of the most probable explanation, if it is right; NaN if it has as
-        many causes as there are modes. A low one says that something else changed too.
-    records : ComparedRecords
+    members : mapping of str to list of str
+        The model's groups behind each cause; none for a cause that is no group.
+    probabilities : part
+        That anything changed, ``damage``; that something else than the named causes shifted the frequencies, ``other``;
+        that all groups lost the same share of their stiffness, ``even``; ``p_value``, that a healthy structure shows as
+        large a shift; ``misfit_p_value``, of a larger misfit than that of the most probable explanation, if it is right
+        (NaN if it has as many causes as there are modes). A low one says that something else changed too.
+    separability : part
+        What these modes do not determine, which it prints: ``indistinguishable``, sets of causes of which one looks
+        like the others; ``unobservable``, causes whose severity alone would have a standard error above 10 %, and whose
+        probability hardly differs from what the prior says; ``similarity``, cosines between their effects in standard
+        errors of the shifts; ``precision``, the least standard error of each cause that any method can reach
+        (Cramer-Rao), ``alone`` if nothing else could have changed and ``together`` if all other causes may have changed
+        as much as is likely beforehand, with shapes also ``alone_without_shapes`` and ``together_without_shapes``.
+    records : part
         The records that were compared, those that were left out, by reason, and how many independent ones they are
         worth.
     prior : DamagePrior
@@ -379,21 +463,22 @@ class IdentifiedDamage(Sentences):
     estimates: pd.DataFrame
     table: pd.DataFrame
     shifts: pd.DataFrame
-    rest: float
-    most_probable: tuple[str, ...]
-    probability_of_damage: float
-    probability_other: float
-    probability_even: float
-    similarity: pd.DataFrame
-    indistinguishable: list[tuple[str, ...]]
-    unobservable: list[str]
-    members: Mapping[str, list[str]]
     draws: pd.DataFrame = field(repr=False)
-    precision: pd.DataFrame
-    p_value: float
-    misfit_p_value: float
+    members: Mapping[str, list[str]]
+    probabilities: Probabilities
+    separability: Separability
     records: ComparedRecords
     prior: DamagePrior
+
+    @property
+    def most_probable(self) -> tuple[str, ...]:
+        """Causes of the most probable explanation, "something else" among them; empty for "no damage"."""
+        return causes_of(self, str(self.explanations.index[0]))
+
+    @property
+    def rest(self) -> float:
+        """Probability of all explanations that are not listed."""
+        return float(max(1 - sum(self.explanations["probability"]), 0.0))
 
     @property
     def probability(self) -> float:
@@ -404,16 +489,6 @@ class IdentifiedDamage(Sentences):
     def severities(self) -> pd.Series:
         """Amount of each cause, the mean over all explanations."""
         return self.table["severity"]
-
-    @property
-    def standard_errors(self) -> pd.Series:
-        """Standard error of each amount."""
-        return self.table["standard_error"]
-
-    @property
-    def is_unexplained(self) -> bool:
-        """Whether the most probable explanation leaves more of the shifts unexplained than chance would."""
-        return self.misfit_p_value < RARE
 
     @property
     def unexplained(self) -> Array:
@@ -458,7 +533,7 @@ class IdentifiedDamage(Sentences):
     def _answer(self) -> Iterator[str]:
         explanations = statements(self)
         first, *others = explanations
-        shown = " observable in these modes" if self.unobservable else ""
+        shown = " observable in these modes" if self.separability.unobservable else ""
         yield (
             f"Most probable: {first.phrase(in_full=True)}{shown * first.is_healthy}, probability "
             f"{chance_text(first.probability)}."
@@ -474,7 +549,7 @@ class IdentifiedDamage(Sentences):
         yield from _others(first, others)
         if not first.is_healthy:
             unchanged = sum(one.probability for one in explanations if one.is_healthy)
-            observable = "observable " if self.unobservable else ""
+            observable = "observable " if self.separability.unobservable else ""
             yield f"Probability of no {observable}change: {chance_text(unchanged)}."
         if first.probability < SURE and not first.is_else:
             yield from _averages(self, first)
@@ -483,19 +558,16 @@ class IdentifiedDamage(Sentences):
 
     def _limits(self) -> Iterator[str]:
         best = statements(self)[0]
-        for causes in self.indistinguishable:
-            yield f"{listed(causes)} cannot be distinguished by these modes: only their common effect is known."
-        if self.unobservable:
-            yield f"Damage in {listed(self.unobservable, 'or')} is unobservable in these modes."
-        if best.is_healthy and self.p_value < RARE:
-            rare = probability_text(self.p_value)
+        yield from self.separability.sentences()
+        if best.is_healthy and self.probabilities.p_value < RARE:
+            rare = probability_text(self.probabilities.p_value)
             yield f"However, such shifts are rare in a healthy structure (p value {rare})."
-        if np.isnan(self.misfit_p_value):
+        if np.isnan(self.probabilities.misfit_p_value):
             yield "There are no more shifts than causes: the fit explains any shift and cannot be tested."
-        elif self.misfit_p_value < RARE and not best.has_else:
+        elif self.probabilities.misfit_p_value < RARE and not best.has_else:
             yield (
                 "The most probable explanation does not explain all of the shifts (p value "
-                f"{probability_text(self.misfit_p_value)}): {_departure(self)}."
+                f"{probability_text(self.probabilities.misfit_p_value)}): {_departure(self)}."
             )
         if self.rest >= NAMED:
             yield f"Explanations that are not listed have a probability of {chance_text(self.rest)} together."
@@ -512,20 +584,8 @@ class IdentifiedDamage(Sentences):
             With its ``kind``.
         """
         yield from self.records.warnings()
+        yield from self.separability.warnings()
         best = statements(self)[0]
-        if self.indistinguishable:
-            sets = "; ".join(" and ".join(causes) for causes in self.indistinguishable)
-            yield ResultWarning(
-                f"these modes cannot distinguish groups: {sets}. Only their common effect is known. Measure their "
-                "shapes, or other modes",
-                "indistinguishable-groups",
-            )
-        if self.unobservable:
-            yield ResultWarning(
-                f"these modes do not show damage of {', '.join(self.unobservable)}: its severity would have a standard "
-                f"error above {VISIBLE:.0%}. Take records over a longer time, or measure other modes",
-                "unobservable-groups",
-            )
         highest = [str(cause) for cause in self.most_probable if _is_at_bound(self, cause)]
         if highest:
             yield ResultWarning(
@@ -533,11 +593,11 @@ class IdentifiedDamage(Sentences):
                 "something else has changed. See summary_table",
                 "severity-at-bound",
             )
-        if best.has_else or self.misfit_p_value < RARE:
+        if best.has_else or self.probabilities.misfit_p_value < RARE:
             doubt = (
-                f"probability of something else {chance_text(self.probability_other)}"
+                f"probability of something else {chance_text(self.probabilities.other)}"
                 if best.has_else
-                else f"probability of such a misfit by chance {chance_text(self.misfit_p_value)}"
+                else f"probability of such a misfit by chance {chance_text(self.probabilities.misfit_p_value)}"
             )
             yield ResultWarning(
                 f"damage of these groups alone does not explain the shifts ({doubt}). Likely causes: "
@@ -548,3 +608,67 @@ class IdentifiedDamage(Sentences):
     def __repr__(self) -> str:
         best = self.explanations.iloc[0]
         return f"IdentifiedDamage({best['text'] or best.name}, probability {self.probability:.2g})"
+
+
+def cosines(slopes: Array) -> Array:
+    """Cosines between the whitened effects of groups, (n_groups, n_groups)."""
+    unit = slopes / np.linalg.norm(slopes, axis=0)
+    return unit.T @ unit
+
+
+def errors_alone(slopes: Array) -> Array:
+    """Standard error of each severity if no other group could be damaged, (n_groups,)."""
+    return 1 / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+
+
+def errors_together(slopes: Array, causes: Sequence[Cause], severity: float) -> Array:
+    """Standard error of each amount if all others may have changed as much as is likely beforehand, (n_causes,)."""
+    information = slopes.T @ slopes + np.diag([(severity * cause.scale) ** -2 for cause in causes])
+    errors = []
+    for column, cause in enumerate(causes):
+        beside = [other for other, one in enumerate(causes) if other == column or not cause.excludes(one)]
+        inverse = np.linalg.inv(information[np.ix_(beside, beside)])
+        errors.append(np.sqrt(inverse[beside.index(column), beside.index(column)]))
+    return np.array(errors)
+
+
+def precision(slopes: Array, n_frequencies: int, causes: Sequence[Cause], severity: float) -> pd.DataFrame:
+    """Cramer-Rao bounds of each cause alone and beside the others; if there are shapes, without them, too.
+
+    The first rows of the slopes, (n_observed, n_causes), in standard errors, are those of frequencies.
+    """
+    parts = {"": slopes}
+    if len(slopes) > n_frequencies:
+        parts["_without_shapes"] = slopes[:n_frequencies]
+    columns = {f"alone{name}": errors_alone(part) for name, part in parts.items()}
+    columns |= {f"together{name}": errors_together(part, causes, severity) for name, part in parts.items()}
+    return pd.DataFrame(columns, index=[cause.name for cause in causes])
+
+
+def indistinguishable_groups(slopes: Array) -> list[tuple[int, ...]]:
+    """Sets of two or three groups of which one looks like the other or the other two together, most similar first.
+
+    Only the part of an effect that no non-negative combination of the others reproduces is informative.
+    """
+    lengths = np.linalg.norm(slopes, axis=0)
+    alike, size = cosines(slopes), slopes.shape[1]
+    found: dict[tuple[int, ...], float] = {}
+    for group in range(size):
+        others = np.delete(np.arange(size), group)
+        rest = np.sqrt(np.maximum(1 - np.maximum(alike[group, others], 0.0) ** 2, 0.0))
+        for other in np.flatnonzero(rest * lengths[group] * VISIBLE < 1):
+            members = tuple(sorted((group, int(others[other]))))
+            found[members] = min(float(rest[other]), found.get(members, 1.0))
+    pairs = list(found)
+    for group in range(size):
+        first, second = np.triu_indices(size, 1)
+        along, first_along, second_along = alike[first, second], alike[group, first], alike[group, second]
+        left = np.maximum(1 - along**2, np.finfo(float).eps)
+        shares = (first_along - along * second_along) / left, (second_along - along * first_along) / left
+        rest = np.sqrt(np.maximum(1 - shares[0] * first_along - shares[1] * second_along, 0.0))
+        looks = (rest * lengths[group] * VISIBLE < 1) & (np.minimum(*shares) >= IMITATING_SHARE)
+        for place in np.flatnonzero(looks & (first != group) & (second != group)):
+            members = tuple(sorted((group, int(first[place]), int(second[place]))))
+            if not any(set(pair) <= set(members) for pair in pairs):
+                found[members] = min(float(rest[place]), found.get(members, 1.0))
+    return sorted(found, key=lambda members: found[members])

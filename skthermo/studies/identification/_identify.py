@@ -16,24 +16,21 @@ from skthermo._effects import FrequencyEffects, StructuralChanges
 from skthermo._estimators.warnings import warn_each, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
+from skthermo.studies._scenarios import check_chain, checked_models
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior, read_causes
-from skthermo.studies.identification._curves import Part, ShiftComparison
-from skthermo.studies.identification._evidence import Observed
-from skthermo.studies.identification._explanations import Scale, explanations
-from skthermo.studies.identification._identified import IdentifiedDamage, explanation_text
-from skthermo.studies.identification._observe import ComparedRecords, observe
-from skthermo.studies.identification._posterior import Posterior
-from skthermo.studies.identification._separability import (
+from skthermo.studies.identification._curves import Observed, Part, ShiftComparison
+from skthermo.studies.identification._evidence import Posterior, Scale, explanations
+from skthermo.studies.identification._identified import (
     VISIBLE,
-    cosines,
+    IdentifiedDamage,
+    Probabilities,
+    Separability,
     errors_alone,
-    indistinguishable_groups,
+    explanation_text,
     precision,
 )
-from skthermo.studies.identification._shapes import ShapeEffects, ShapeShift
-from skthermo.studies.identification._shift import FrequencyShift
-from skthermo.studies.replicates import checked_models
-from skthermo.studies.scenarios import check_chain
+from skthermo.studies.identification._shapes import ShapeEffects, shape_shift
+from skthermo.studies.identification._shift import ComparedRecords, FrequencyShift, observe
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
@@ -213,8 +210,7 @@ def compared(
         raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
     states = (effects.theta, np.ones((1, effects.theta.shape[1])))
     candidates = [ShapeEffects.of(effects.structure, theta, dofs) for theta in states]
-    of_shapes = ShapeShift.of(candidates, shapes, shape_noise, effects.structure.fem.mode_names_)
-    return ShiftComparison([*parts, Part(of_shapes.effects, of_shapes.change, np.diag(of_shapes.variances))])
+    return ShiftComparison([*parts, shape_shift(candidates, shapes, shape_noise, effects.structure.fem.mode_names_)])
 
 
 def findings(
@@ -233,21 +229,20 @@ def findings(
     ``slopes`` (n_observed, n_causes) are effects of small amounts in standard errors, in the weather of the records;
     what the causes have in common is assessed at the model's nominal state, too.
     """
-    every, observed = [cause.name for cause in causes], nominal.observed()
+    observed = nominal.observed()
     signs = np.array([1.0 if cause.highest > 0 else -1.0 for cause in causes])  # of the amounts
-    slopes, at_nominal = signs * slopes, signs * nominal.slopes(len(causes))
     asked = [cause for cause in causes if not cause.is_even]  # they come first
-    names = [cause.name for cause in asked]
-    slopes, at_nominal = slopes[:, : len(asked)], at_nominal[:, : len(asked)]
+    slopes, at_nominal = ((signs * all_)[:, : len(asked)] for all_ in (slopes, nominal.slopes(len(causes))))
     factor = two_errors(shift.freedom)
-    alone = factor * errors_alone(slopes)
-    seen = np.flatnonzero(alone <= VISIBLE)
-    groups = indistinguishable_groups(at_nominal[:, seen]) + indistinguishable_groups(slopes[:, seen])
+    n_frequencies = int((~np.isnan(shift.mean)).sum())
+    separability = Separability.of(
+        slopes, at_nominal, asked, factor * precision(slopes, n_frequencies, asked, prior.severity)
+    )
     table = posterior.table(asked)
-    table["error_alone"], table["kind"] = alone, [cause.kind for cause in asked]
-    first, factors = changes.n_parameters, changes.factors(posterior.drawn(every, N_DRAWS, random))
-    estimates, best = posterior.estimates(LISTED), posterior.explanations[0]
-    listed = [one for one in posterior.explanations if one.probability >= LISTED] or [best]
+    table["error_alone"], table["kind"] = separability.precision["alone"], [cause.kind for cause in asked]
+    drawn = posterior.drawn([cause.name for cause in causes], N_DRAWS, random)
+    listed, best = posterior.listed(LISTED), posterior.explanations[0]
+    unchanged = sum(one.probability for one in posterior.explanations if not one.causes)
     return IdentifiedDamage(
         explanations=pd.DataFrame(
             {
@@ -257,22 +252,19 @@ def findings(
             },
             index=[one.name for one in listed],
         ),
-        estimates=estimates,
+        estimates=posterior.estimates(LISTED),
         table=table,
         shifts=_shift_table(shift, posterior.explained(), factor),
-        rest=max(1 - sum(one.probability for one in listed), 0.0),
-        most_probable=best.causes,
-        probability_of_damage=1 - min(sum(one.probability for one in posterior.explanations if not one.causes), 1.0),
-        probability_other=posterior.probability_of(SOMETHING_ELSE),
-        probability_even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
-        similarity=pd.DataFrame(cosines(at_nominal), names, names),
-        indistinguishable=list(dict.fromkeys(tuple(names[seen[column]] for column in group) for group in groups)),
-        unobservable=[name for name, error in zip(names, alone, strict=True) if error > VISIBLE],
+        draws=pd.DataFrame(changes.severities(drawn), columns=list(changes.groups)),
         members={cause.name: list(cause.of) if cause.kind in OF_GROUPS else [] for cause in causes},
-        draws=pd.DataFrame(1 - factors[:, first : first + len(changes.groups)], columns=list(changes.groups)),
-        precision=factor * precision(slopes, int((~np.isnan(shift.mean)).sum()), asked, prior.severity),
-        p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
-        misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
+        probabilities=Probabilities(
+            damage=1 - min(unchanged, 1.0),
+            other=posterior.probability_of(SOMETHING_ELSE),
+            even=sum(posterior.probability_of(cause.name) for cause in causes if cause.is_even),
+            p_value=p_of_misfit(observed.measured @ observed.measured, 0, observed, shift.freedom),
+            misfit_p_value=p_of_misfit(best.misfit, len(best.named), observed, shift.freedom),
+        ),
+        separability=separability,
         records=records,
         prior=prior,
     )

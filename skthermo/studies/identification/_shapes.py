@@ -11,6 +11,7 @@ from skthermo._effects import ChangedStructure, central_differences
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, as_floats, check_dofs
 from skthermo.exceptions import RecordsWarning
+from skthermo.studies.identification._curves import Part
 from skthermo.studies.identification._shift import stated_deviations
 
 STATES = ("healthy", "damaged")
@@ -107,54 +108,39 @@ class ShapeEffects:
         return np.concatenate(parts, axis=-1)
 
 
-@dataclass(frozen=True)
-class ShapeShift:
-    """Change of the components of measured shapes, (n_observed,), and the variances of its errors.
+def shape_shift(
+    candidates: Sequence[ShapeEffects], shapes: Any, noise: ArrayLike | Literal["fitted"], modes: Sequence[Any]
+) -> Part:
+    """Change of the components of measured shapes, with independent errors.
 
-    Effects are on the same components. The errors are independent and relative to the largest component of a shape.
+    From one or several records of each state, as `identify_damage` takes them. Of effects at different theta, those
+    count whose unchanged shapes are most like the measured healthy ones: frequencies alone may have led theta astray
+    where they hardly depend on it.
     """
-
-    effects: ShapeEffects
-    change: Array
-    variances: Array
-
-    @classmethod
-    def of(
-        cls,
-        candidates: Sequence[ShapeEffects],
-        shapes: Any,
-        noise: ArrayLike | Literal["fitted"],
-        modes: Sequence[Any],
-    ) -> "ShapeShift":
-        """From one or several records of each state, as `identify_damage` takes them.
-
-        Of effects at different theta, those count whose unchanged shapes are most like the measured healthy ones:
-        frequencies alone may have led theta astray where they hardly depend on it.
-        """
-        stated = stated_deviations(noise, len(modes), what="shape_noise", most=1)
-        records = read_records(shapes, candidates[0].reference.shape)
-        known = np.logical_and(*(measured_sensors(state) for state in records))
-        known &= known.sum(axis=0) > 1
-        complete = np.logical_and(*((~np.isnan(state) | ~known).all(axis=1).any(axis=0) for state in records))
-        effects = max((one.at(known & complete) for one in candidates), key=lambda one: mac_of(one, records[0]).sum())
-        foreign = (mac_of(effects, records[0]) < ALIKE) & effects.known.any(axis=0)
-        if foreign.any():
-            warn_user(
-                f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
-                f"model's, {modes[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
-                "modes, with rows in the order of dofs",
-                RecordsWarning,
-                "foreign-shapes",
-            )
-        effects = effects.at(effects.known & ~foreign)
-        if not len(effects.modes):
-            raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
-        components = [effects.components(state) for state in records]
-        number = [(~np.isnan(values)).sum(axis=0) for values in components]
-        healthy, changed = (np.nanmean(values, axis=0) for values in components)
-        variance = scatter(components, effects.modes, len(modes), is_needed=stated is None)
-        variance = np.maximum(variance, 0.0 if stated is None else stated**2)[effects.modes]
-        return cls(effects, changed - healthy, variance * (1 / number[0] + 1 / number[1]))
+    stated = stated_deviations(noise, len(modes), what="shape_noise", most=1)
+    records = read_records(shapes, candidates[0].reference.shape)
+    known = np.logical_and(*(measured_sensors(state) for state in records))
+    known &= known.sum(axis=0) > 1
+    complete = np.logical_and(*((~np.isnan(state) | ~known).all(axis=1).any(axis=0) for state in records))
+    effects = max((one.at(known & complete) for one in candidates), key=lambda one: mac_of(one, records[0]).sum())
+    foreign = (mac_of(effects, records[0]) < ALIKE) & effects.known.any(axis=0)
+    if foreign.any():
+        warn_user(
+            f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below {ALIKE} with the "
+            f"model's, {modes[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
+            "modes, with rows in the order of dofs",
+            RecordsWarning,
+            "foreign-shapes",
+        )
+    effects = effects.at(effects.known & ~foreign)
+    if not len(effects.modes):
+        raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
+    components = [effects.components(state) for state in records]
+    number = [(~np.isnan(values)).sum(axis=0) for values in components]
+    healthy, changed = (np.nanmean(values, axis=0) for values in components)
+    variance = scatter(components, effects.modes, len(modes), is_needed=stated is None)
+    variance = np.maximum(variance, 0.0 if stated is None else stated**2)[effects.modes]
+    return Part(effects, changed - healthy, np.diag(variance * (1 / number[0] + 1 / number[1])))
 
 
 def read_records(shapes: Any, expected: tuple[int, ...]) -> list[NDArray]:

@@ -81,9 +81,26 @@ def check_chain(fem: FittedChain) -> None:
     check_is_fitted(fem)
 
 
+def checked_models(fem: FittedChain, models: Any) -> list[FEModel]:
+    """Models that a chain can be refitted with, or an error."""
+    if isinstance(models, str) or not isinstance(models, Sequence) or not len(models):
+        raise ValueError(
+            f"models is {models!r:.200}; expected a list of FE models, as ModelUpdater.sample_models gives"
+        )
+    wanted = list(fem.model.parameter_names), fem.model.n_modes
+    for number, model in enumerate(models):
+        found = list(getattr(model, "parameter_names", [])), getattr(model, "n_modes", None)
+        if found != wanted:
+            raise ValueError(
+                f"model {number} of models is {model!r:.200} with parameters {found[0]} and {found[1]} modes; expected "
+                f"the chain's {wanted[0]} and {wanted[1]} modes"
+            )
+    return list(models)
+
+
 def check_groups(groups: Sequence[str], known: Any) -> None:
     """Raise an error for damage groups that the model does not have."""
-    unknown = [group for group in groups if group not in known]
+    unknown = sorted(set(groups).difference(known))
     if unknown:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
 

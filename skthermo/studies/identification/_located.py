@@ -11,12 +11,21 @@ import pandas as pd
 from skthermo._tables.arrays import check_probability
 from skthermo._tables.text import Sentences, counted, listed, percent, share_text
 from skthermo.fem import Structure
-from skthermo.studies.identification import IdentifiedDamage
-from skthermo.studies.location._question import Answer, Explained
+from skthermo.studies.identification._identified import IdentifiedDamage
 
 LIKELY, PROBABLE = 0.9, 0.5
 """Probabilities with which a summary says where damage is: almost surely, and more likely than not."""
 WORTH_NAMING = 0.1  # probability of a group from which on a summary says where in it
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One explanation: the damaged members and the severity of each group in it, and its probability."""
+
+    probability: float
+    members: Mapping[str, frozenset[Hashable]]
+    severities: Mapping[str, float]
+    has_else: bool
 
 
 @dataclass(frozen=True)
@@ -92,8 +101,6 @@ class LocatedDamage(Sentences):
         90 %.
     found : IdentifiedDamage
         What was found for whole groups.
-    structure : Structure
-        Whose members these are.
     probability_of_damage : float
         Probability that a member is damaged.
     probability_other : float
@@ -129,7 +136,6 @@ class LocatedDamage(Sentences):
     groups: pd.DataFrame
     levels: pd.DataFrame
     found: IdentifiedDamage
-    structure: Structure = field(repr=False)
     probability_of_damage: float
     probability_other: float
     alike: list[str]
@@ -163,10 +169,12 @@ class LocatedDamage(Sentences):
     def _sets(self, group: str | None) -> list[tuple[frozenset[Hashable], float]]:
         if group is not None:
             return [(e.members[group], e.probability) for e in self.explained if group in e.members]
-        return visible_sets(self.explained, self.found.unobservable)
+        return visible_sets(self.explained, self.found.separability.unobservable)
 
     def _answer(self) -> Iterator[str]:
-        is_named = (self.groups["probability"] >= WORTH_NAMING) & ~self.groups.index.isin(self.found.unobservable)
+        is_named = (self.groups["probability"] >= WORTH_NAMING) & ~self.groups.index.isin(
+            self.found.separability.unobservable
+        )
         probable = self.groups[is_named]
         if probable.empty:
             yield f"No group is damaged with a probability above {percent(WORTH_NAMING)}: no place is given."
@@ -182,8 +190,8 @@ class LocatedDamage(Sentences):
             yield f"These modes do not distinguish {' from '.join(self.alike)}."
         if self.probability_other >= WORTH_NAMING:
             yield f"Another cause may have shifted the frequencies (probability {_share(self.probability_other)})."
-        if self.found.unobservable:
-            yield f"Damage in {listed(self.found.unobservable)} is unobservable in these modes."
+        if self.found.separability.unobservable:
+            yield f"Damage in {listed(self.found.separability.unobservable)} is unobservable in these modes."
 
     def _of_group(self, group: str, row: pd.Series) -> Iterator[str]:
         damaged = f"{group} is damaged with a probability of {_share(row['probability'])}"
@@ -220,16 +228,16 @@ class LocatedDamage(Sentences):
 
 
 def located_damage(
-    answer: Answer,
+    explained: Sequence[Explained],
+    alike: list[str],
     found: IdentifiedDamage,
     places: Mapping[str, Places],
     pieces: Mapping[str, int],
     levels: pd.DataFrame,
 ) -> LocatedDamage:
     """From the explanations of the finest division, and the number of pieces of each group that was divided."""
-    explained = answer.explained
     total = sum(one.probability for one in explained)
-    likely, rows = set(fewest(visible_sets(explained, found.unobservable), LIKELY)[0]), {}
+    likely, rows = set(fewest(visible_sets(explained, found.separability.unobservable), LIKELY)[0]), {}
     for group, where in places.items():
         for member, number in where.numbers.items():
             if member not in rows:
@@ -256,13 +264,11 @@ def located_damage(
             "likely": len(fewest(of_group, LIKELY)[0]),
         }
     groups = pd.DataFrame.from_dict(by_group, orient="index")
-    alike = [f"{places[one.group].text(one.members)} of {one.group}" for one in answer.alike]
     return LocatedDamage(
         table=table,
         groups=groups,
         levels=levels,
         found=found,
-        structure=next(iter(places.values())).structure,
         probability_of_damage=sum(one.probability for one in explained if one.members) / total,
         probability_other=sum(one.probability for one in explained if one.has_else) / total,
         alike=alike,

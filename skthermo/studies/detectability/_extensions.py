@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,10 +11,10 @@ import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._estimators.warnings import warn_user, warnings_once, without_warnings
+from skthermo._estimators.warnings import reported_by_caller, warn_user, warnings_once, without_warnings
 from skthermo._io import run_jobs
 from skthermo._tables.arrays import (
     Array,
@@ -27,14 +27,14 @@ from skthermo._tables.arrays import (
 from skthermo._tables.frames import Table, check_same_rows, column_names
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
-from skthermo.studies.detectability import Arrangement, DetectabilityStudy, Measurement
-from skthermo.studies.scenarios import Scenario
+from skthermo.studies._scenarios import Scenario
+from skthermo.studies.detectability._pod_curve import pod_curve
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Candidate, Measurement
+from skthermo.studies.detectability._study import DetectabilityStudy
 from skthermo.surrogate import FittedChain
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
 """What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
-
-LARGEST_SEED = np.iinfo(np.int32).max
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,61 @@ HIGHEST_SEVERITY = 0.95  # of those that are simulated
 N_MODES = 3  # number of further modes that are candidates by default
 CONFIDENCE = 0.95  # of the bounds of a gain
 DOUBTFUL_RATIO = 2.0  # scatter of a mode predicted from one record, over that of measured modes, that makes it doubtful
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """An unfitted detector, the names of the columns that it sees, in order, as a frame or an array, and the number of
+    healthy records that it learns from."""
+
+    detector: BaseEstimator
+    columns: Sequence[Hashable]
+    n_baseline: int
+    is_frame: bool
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> Arrangement:
+        """What a detector of a study measures and has learned."""
+        return cls(clone(candidate.detector), candidate.columns, candidate.n_baseline, candidate.view.is_frame)
+
+    def with_mode(self, name: str) -> Arrangement:
+        """The arrangement with one more measured mode, which is a target where a part of the detector has targets."""
+        detector, added = clone(self.detector), name if self.is_frame else len(self.columns)
+        targets = {key: value for key, value in detector.get_params().items() if key.rsplit("__", 1)[-1] == "targets"}
+        detector.set_params(**{key: [*value, added] for key, value in targets.items()})
+        return replace(self, detector=detector, columns=[*self.columns, name])
+
+    def with_sensor(self, name: Hashable) -> Arrangement:
+        """The arrangement with one more temperature."""
+        return replace(self, columns=[*self.columns, name])
+
+    def with_baseline(self, factor: float) -> Arrangement:
+        """The arrangement with a longer baseline."""
+        return replace(self, n_baseline=int(np.ceil(self.n_baseline * factor)))
+
+    def smallest(self, baseline: pd.DataFrame, tables: Mapping[tuple[str, float], pd.DataFrame]) -> dict[str, float]:
+        """Severity at which the curve of the probability of detection reaches 0.9, by family."""
+        detector = clone(self.detector).fit(self._seen(baseline.iloc[: self.n_baseline]))
+        counts: dict[str, list[tuple[float, int, int]]] = {}
+        for (family, severity), table in tables.items():
+            decisions = np.asarray(detector.decision_function(self._seen(table)), dtype=float)
+            evaluated = int((~np.isnan(decisions)).sum())
+            counts.setdefault(family, []).append((abs(severity), int((decisions < 0).sum()), evaluated))
+        return {family: _a90(*np.transpose(rows)) for family, rows in counts.items()}
+
+    def _seen(self, table: pd.DataFrame) -> Table:
+        seen = table[list(self.columns)]
+        return seen if self.is_frame else seen.to_numpy()
+
+
+def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
+    """a90 of the curve; without a finite slope, the middle of its bracket; infinite where damage is not found."""
+    try:
+        with reported_by_caller({"separated-severities", "poor-curve-fit"}):
+            curve = pod_curve(severities, n_detected, n_records)
+    except ValueError:  # the rate does not increase with severity, or nothing could be evaluated
+        return np.inf
+    return curve.a90 if np.isfinite(curve.a90) else float(np.nan_to_num(np.mean(curve.bracket), nan=np.inf))
 
 
 @dataclass(frozen=True)
@@ -220,7 +275,7 @@ def compare_extensions(
     if not isinstance(study, DetectabilityStudy):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy that has been run")
     name = study.detector_name(detector)
-    present = study.arrangements_[name]
+    present = Arrangement.of(study.findings_.candidates[name])
     changes, fem = changes_by_severity(study, name), study.fem
     factors = _checked_factors(baseline_factors)
     ranks = _further_modes(fem.model, modes)
