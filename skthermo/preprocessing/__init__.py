@@ -14,7 +14,6 @@ from skthermo.preprocessing.checks import (
     RecordFindings,
     SetAside,
     check_records,
-    gross_errors,
     residual_trend,
     set_aside,
 )
@@ -34,7 +33,6 @@ __all__ = [
     "SetAside",
     "check_records",
     "find_memory",
-    "gross_errors",
     "residual_trend",
     "set_aside",
 ]
