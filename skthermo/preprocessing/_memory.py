@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import timedelta
 from numbers import Integral
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
 from skthermo._tables.frames import (
+    DAY,
     DAY_NS,
     Table,
     as_duration,
@@ -27,14 +28,14 @@ from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
 from skthermo._validation import check_array, check_is_fitted
 from skthermo.exceptions import FewRecordsWarning
-from skthermo.preprocessing._records import PastFeatures
-from skthermo.preprocessing._weather_regression import (
+from skthermo.preprocessing._folds import (
     KNOTS,
     Grams,
     WeatherBasis,
     out_of_fold,
     without_far,
 )
+from skthermo.preprocessing._records import PastFeatures
 
 REACH = 4  # time constants beyond which records have no weight; they would have 2 % of it
 PAST = 2  # time constants after the first record from which means are as good as later
@@ -383,133 +384,95 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     ExponentialMeans(sensors=['air'], time_constants=['40D'])
     """
     check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
-    T, F = (
-        check_array(table, dtype=np.float64, input_name=name)
-        for table, name in ((temperatures, "temperatures"), (frequencies, "frequencies"))
-    )
+    T = check_array(temperatures, dtype=np.float64, input_name="temperatures")
+    F = check_array(frequencies, dtype=np.float64, input_name="frequencies")
     nothing = MemoryFindings(pd.DataFrame(columns=COLUMNS), None, 0.0)
     if not has_stamps(temperatures):
         return nothing
     stamps = temperatures.index.as_unit("ns").asi8
     order = np.argsort(stamps, kind="stable")
     first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
-    candidates = _Candidates.of(stamps[order], T[np.ix_(order, list(first.values()))], F[order])
-    return nothing if candidates is None else candidates.findings(list(first), column_names(frequencies, "f"))
+    T, F = T[np.ix_(order, list(first.values()))], F[order]
+    usable = np.flatnonzero(~np.isnan(T).all(axis=1) & ~np.isnan(F).all(axis=1))
+    if len(usable) < LEAST_ROWS:
+        return nothing
+    return _Candidates(stamps[order], T, F, usable).findings(list(first), column_names(frequencies, "f"))
 
 
-class _Mean(NamedTuple):
-    """A mean that may explain frequencies: positions of its time constant and sensor."""
-
-    constant: int
-    sensor: int
-
-
-@dataclass(frozen=True)
 class _Candidates:
-    """Inputs in rows: the weather, a trend and a step, and the means that are tried; their products by fold."""
+    """Inputs in rows: the weather, a trend and a step, and the means that are tried; their products by fold.
 
-    inputs: Array
-    values: Array
-    scale: Array
-    ages: Array
-    folds: NDArray[np.intp]
-    grams: Grams
-    weather: NDArray[np.intp]
-    time: NDArray[np.intp]
-    means: dict[_Mean, NDArray[np.intp]]
-    has_all_seasons: bool
-    known_left: dict[bytes, Array] = field(default_factory=dict)
+    Rows are in order of time. A mean has the positions of its time constant and its sensor as a key.
+    """
 
-    @classmethod
-    def of(cls, times: NDArray[np.int64], T: Array, F: Array) -> _Candidates | None:
-        """Those of records in order of time; None where these are too few."""
-        usable = np.flatnonzero(~np.isnan(T).all(axis=1) & ~np.isnan(F).all(axis=1))
-        if len(usable) < LEAST_ROWS:
-            return None
+    def __init__(self, times: NDArray[np.int64], T: Array, F: Array, usable: NDArray[np.intp]):
         rows = spread_evenly(usable, MOST_ROWS)
-        folds = np.arange(len(rows)) * N_FOLDS // len(rows)
+        self.ages, self.folds = (times[rows] - times[0]) / DAY_NS, np.arange(len(rows)) * N_FOLDS // len(rows)
+        self.has_all_seasons = pd.Timedelta(np.ptp(times), "ns") >= ALL_SEASONS
         basis = WeatherBasis.of(T)
         lines = basis.lines(basis.coordinates(T[rows]))
-        left = F[rows] - out_of_fold(lines, F[rows], folds)
-        scale, centre = robust_deviation(left), median(F[rows])
-        values = without_far(F[rows] - centre, left) / np.where(scale > 0, scale, np.inf)
-        blocks, means = [lines, _time_shapes(without_far(left, left))], []
+        left = F[rows] - out_of_fold(lines, F[rows], self.folds)
+        self.scale = robust_deviation(left)
+        self.values = without_far(F[rows] - median(F[rows]), left) / np.where(self.scale > 0, self.scale, np.inf)
+        blocks: dict[Any, Array] = {"weather": lines, "time": _time_shapes(without_far(left, left))}
         sensors = spread_evenly(np.flatnonzero(~np.isnan(T).all(axis=0)), MOST_SENSORS)
         for i, one in enumerate(TIME_CONSTANTS):
             constant = pd.Timedelta(one).as_unit("ns").value
-            if not np.median(np.diff(times)) <= constant <= np.ptp(times) / LEAST_SPANS:
-                continue
-            averages = trailing_means(times, T[:, sensors], constant)[rows]
-            for sensor, column in zip(sensors, averages.T, strict=True):
-                if np.ptp(column) > 0:  # False for NaN
-                    means.append(_Mean(i, int(sensor)))
-                    blocks.append(lines_of(column))
-        ends = np.cumsum([block.shape[1] for block in blocks])
-        weather, time, *others = (np.arange(end - block.shape[1], end) for end, block in zip(ends, blocks, strict=True))
-        inputs = np.hstack(blocks)
-        grams = Grams.of(inputs, values, folds)
-        return cls(
-            np.ascontiguousarray(inputs.T),
-            values,
-            scale,
-            (times[rows] - times[0]) / DAY_NS,
-            folds,
-            grams,
-            weather,
-            time,
-            dict(zip(means, others, strict=True)),
-            pd.Timedelta(np.ptp(times), "ns") >= ALL_SEASONS,
-        )
+            if np.median(np.diff(times)) <= constant <= np.ptp(times) / LEAST_SPANS:
+                averages = trailing_means(times, T[:, sensors], constant)[rows]
+                for sensor, column in zip(sensors, averages.T, strict=True):
+                    if np.ptp(column) > 0:  # False for NaN
+                        blocks[i, int(sensor)] = lines_of(column)
+        self.places: dict[Any, NDArray[np.intp]] = {}  # of the columns of each block
+        start = 0
+        for key, block in blocks.items():
+            self.places[key] = np.arange(start, start + block.shape[1])
+            start += block.shape[1]
+        self.means = list(self.places)[2:]
+        inputs = np.hstack(list(blocks.values()))
+        self.grams = Grams.of(inputs, self.values, self.folds)
+        self.inputs = np.ascontiguousarray(inputs.T)
+        self.known_left: dict[tuple[Any, ...], Array] = {}
 
-    def least_fall(self, mean: _Mean) -> float:
-        """Share by which a mean has to lower the error."""
-        constant = pd.Timedelta(TIME_CONSTANTS[mean.constant])
-        if constant > pd.Timedelta(days=1) and not self.has_all_seasons:
-            return LEAST_FALL_WITHOUT_SEASONS
-        return LEAST_FALL_OF_WEEKS if constant >= WEEKS else LEAST_FALL
-
-    def errors(self, *blocks: NDArray[np.intp], after: float = 0.0) -> Array:
-        """Mean absolute error out of fold by fold and mode, relative to the scale of the mode, after some time."""
-        left = self._left(np.concatenate(blocks))
-        counted = ~np.isnan(left) & (self.ages >= after)[:, np.newaxis]
-        starts = np.searchsorted(self.folds, np.arange(N_FOLDS))
-        sums, counts = (np.add.reduceat(part, starts) for part in (np.where(counted, left, 0.0), counted.astype(float)))
-        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
-
-    def _left(self, columns: NDArray[np.intp]) -> Array:
-        """What some columns leave of each value out of fold, found once."""
-        key = columns.tobytes()
-        if key not in self.known_left:
+    def errors(self, *blocks: Any, after: float = 0.0) -> Array:
+        """Mean absolute error out of fold by fold and mode, relative to the scale of the mode, after some days."""
+        if blocks not in self.known_left:
+            columns = np.concatenate([self.places[block] for block in blocks])
             square = np.ix_(range(N_FOLDS), range(self.values.shape[1]), columns, columns)
             grams = Grams(self.grams.inputs[square], self.grams.targets[..., columns], self.grams.counts)
             inputs, left = self.inputs[columns], np.empty_like(self.values)
-            for fold, coefficients in enumerate(grams.coefficients_without_each()):
+            for fold, coefficients in enumerate(grams.coefficients()):
                 rows = self.folds == fold
                 left[rows] = np.abs(self.values[rows] - (coefficients @ inputs[:, rows]).T)
-            self.known_left[key] = left
-        return self.known_left[key]
+            self.known_left[blocks] = left
+        left = self.known_left[blocks]
+        counted = ~np.isnan(left) & (self.ages >= after)[:, np.newaxis]
+        starts = np.searchsorted(self.folds, np.arange(N_FOLDS))
+        sums = np.add.reduceat(np.where(counted, left, 0.0), starts)
+        counts = np.add.reduceat(counted.astype(float), starts)
+        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
 
-    def fall(self, known: list[NDArray[np.intp]], block: NDArray[np.intp], mean: _Mean) -> tuple[float, float]:
-        """By what share a mean lowers the error, and the ratio of errors in the fold where it does so least.
+    def chosen(self) -> list[tuple[int, int]]:
+        """Means that lower the error clearly, in nearly every part of the records, and beside a trend and a step.
 
         Records of the first two time constants do not count: their means lack the weather before.
         """
-        after = PAST * (pd.Timedelta(TIME_CONSTANTS[mean.constant]) / pd.Timedelta(days=1))
-        return _fall(self.errors(*known, after=after), self.errors(*known, block, after=after))
-
-    def chosen(self) -> list[_Mean]:
-        """Means that lower the error clearly, in nearly every part of the records, and beside a trend and a step."""
-        chosen: list[_Mean] = []
+        chosen: list[tuple[int, int]] = []
         while len(chosen) < MOST_CHOSEN:
-            known = [self.weather, *(self.means[one] for one in chosen)]
-            found = []
-            for mean, block in self.means.items():
-                if chosen and (mean in chosen or mean.sensor != chosen[0].sensor):
+            known, found = ["weather", *chosen], []
+            for mean in self.means:
+                if chosen and (mean in chosen or mean[1] != chosen[0][1]):
                     continue
-                fall, worst = self.fall(known, block, mean)
-                if fall >= self.least_fall(mean) and worst <= WORST:
-                    fall_beside, _ = self.fall([*known, self.time], block, mean)
-                    if fall_beside >= LEAST_BESIDE * fall:
+                constant = pd.Timedelta(TIME_CONSTANTS[mean[0]])
+                least = LEAST_FALL_OF_WEEKS if constant >= WEEKS else LEAST_FALL
+                if constant > DAY and not self.has_all_seasons:
+                    least = LEAST_FALL_WITHOUT_SEASONS
+                after = PAST * (constant / DAY)
+                fall, worst = _fall(self.errors(*known, after=after), self.errors(*known, mean, after=after))
+                if fall >= least and worst <= WORST:
+                    known_beside = [*known, "time"]
+                    beside = self.errors(*known_beside, after=after), self.errors(*known_beside, mean, after=after)
+                    if _fall(*beside)[0] >= LEAST_BESIDE * fall:
                         found.append((fall, mean))
             if not found:
                 break
@@ -519,29 +482,27 @@ class _Candidates:
     def findings(self, sensors: list[Hashable], modes: list[Hashable]) -> MemoryFindings:
         """What is chosen, as a table and a transformer."""
         chosen = self.chosen()
-        before = means_of_known(self.errors(self.weather))
-        table = []
+        without = self.errors("weather")
+        before, table = means_of_known(without), []
         for i, constant in enumerate(TIME_CONSTANTS):
-            errors = {
-                mean: means_of_known(self.errors(self.weather, block))
-                for mean, block in self.means.items()
-                if mean.constant == i
-            }
-            if errors:
-                wanted = [mean for mean in chosen if mean.constant == i]
+            best, least, after, ratio = None, np.inf, before, before
+            for mean in self.means:
+                if mean[0] != i or (best in chosen and best is not None):
+                    continue
+                error = means_of_known(self.errors("weather", mean))
                 with np.errstate(invalid="ignore", divide="ignore"):  # of modes without an error
-                    ratios = {mean: error / before for mean, error in errors.items()}
-                best = wanted[0] if wanted else min(ratios, key=lambda mean: np.nansum(ratios[mean]))
-                columns = modes, before * self.scale, errors[best] * self.scale, 1 - ratios[best]
-                table += [[constant, sensors[best.sensor], *row, bool(wanted)] for row in zip(*columns, strict=True)]
-        after = self.errors(self.weather, *(self.means[one] for one in chosen))
+                    share = error / before
+                if best is None or mean in chosen or np.nansum(share) < least:
+                    best, least, after, ratio = mean, np.nansum(share), error, share
+            if best is not None:
+                columns = modes, before * self.scale, after * self.scale, 1 - ratio
+                table += [[constant, sensors[best[1]], *row, best in chosen] for row in zip(*columns, strict=True)]
         features = None
         if chosen:
-            constants = [TIME_CONSTANTS[i] for i in sorted(mean.constant for mean in chosen)]
-            features = ExponentialMeans(constants, sensors=[sensors[chosen[0].sensor]])
-        return MemoryFindings(
-            pd.DataFrame(table, columns=COLUMNS), features, _fall(self.errors(self.weather), after)[0]
-        )
+            constants = [TIME_CONSTANTS[i] for i, _ in sorted(chosen)]
+            features = ExponentialMeans(constants, sensors=[sensors[chosen[0][1]]])
+        fall = _fall(without, self.errors("weather", *chosen))[0]
+        return MemoryFindings(pd.DataFrame(table, columns=COLUMNS), features, fall)
 
 
 def lines_of(column: Array) -> Array:
@@ -567,9 +528,8 @@ def _fall(before: Array, after: Array) -> tuple[float, float]:
     What is not known in a fold is NaN in both.
     """
     known = ~np.isnan(before) & (before > 0)
-    ratios = np.divide(after, before, out=np.full(before.shape, np.nan), where=known)
-    in_folds = ratios[known.any(axis=1)]
-    sums = [np.where(known, errors, 0.0).sum(axis=0)[known.any(axis=0)] for errors in (before, after)]
-    if not len(in_folds):
+    if not known.any():
         return 0.0, np.inf
-    return 1 - float(np.mean(sums[1] / sums[0])), float(np.nanmean(in_folds, axis=1).max())
+    modes, sums = known.any(axis=0), np.where(known, [before, after], 0.0).sum(axis=1)
+    ratios = np.divide(after, before, out=np.full(before.shape, np.nan), where=known)[known.any(axis=1)]
+    return 1 - float(np.mean(sums[1, modes] / sums[0, modes])), float(np.nanmean(ratios, axis=1).max())

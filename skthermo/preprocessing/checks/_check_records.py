@@ -23,10 +23,8 @@ from skthermo._tables.arrays import (
 )
 from skthermo._tables.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
 from skthermo._validation import check_array
-from skthermo.preprocessing._folds import BlockedKFold
-from skthermo.preprocessing._hampel import distances_from_neighbours
+from skthermo.preprocessing._folds import BlockedKFold, WeatherBasis, distances_from_neighbours, out_of_fold
 from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
-from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
 from skthermo.preprocessing.checks._columns import stuck_columns
 from skthermo.preprocessing.checks._findings import Finding, RecordFindings, findings_table, period_of
 from skthermo.preprocessing.checks._set_aside import FEW_WRONG, CleanedRecords
