@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._tables.arrays import NORMAL, Array, median, piecewise_linear, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, as_duration, has_stamps, row_times
+from skthermo._tables.frames import Table, check_duration, has_stamps, row_times
 from skthermo._validation import _num_samples
 
 WEEK = "7D"
@@ -165,7 +165,7 @@ class BlockedKFold(BaseCrossValidator):
                 raise ValueError(f"block is {self.block!r}; expected a number of rows of 1 or more, or a duration")
             return int(self.block)
         if has_stamps(X):
-            return pd.Timedelta(as_duration(WEEK if self.block is None else self.block, "block"))
+            return check_duration(WEEK if self.block is None else self.block, "block", may_be_zero=False)
         if self.block is not None:
             raise ValueError(f"block is {self.block!r}, but X has no DatetimeIndex; expected a number of rows")
         return max(_num_samples(X) // BLOCKS_OF_ROWS, 1)

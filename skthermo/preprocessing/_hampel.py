@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
 from skthermo._tables.frames import (
     Table,
-    as_duration,
-    check_positions_are_names,
+    check_duration,
     frame_like,
     has_stamps,
     positions_of,
@@ -114,8 +113,7 @@ class HampelFilter(RecordTransformer):
     def _learn(self, X: Table, values: NDArray) -> None:
         self.targets_, self.regression_ = np.arange(values.shape[1]), None
         if self.targets is not None:
-            check_positions_are_names(self.targets, getattr(X, "columns", ()))
-            self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+            self.targets_ = positions_of(self.targets, values.shape[1], getattr(X, "columns", ()))
             floats = as_floats(values)
             self.regression_ = WeatherRegression.of(np.delete(floats, self.targets_, axis=1), floats[:, self.targets_])
         self.deviations_ = np.full(values.shape[1], np.nan)
@@ -151,7 +149,7 @@ class HampelFilter(RecordTransformer):
             return int(self.window)
         if not has_stamps(X):
             raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")
-        return pd.Timedelta(as_duration(self.window, "window"))
+        return check_duration(self.window, "window", may_be_zero=False)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.frames import Table, as_duration
+from skthermo._tables.frames import Table, check_duration
 from skthermo._tables.text import duration_text
 from skthermo._validation import Interval, StrOptions
 from skthermo.exceptions import FewRecordsWarning
@@ -121,10 +121,14 @@ class LagFeatures(PastFeatures):
                         f"expected a frame on one, or {name}=None"
                     )
         else:
-            self.freq_ = _most_frequent_step(stamps) if self.freq is None else as_duration(self.freq, "freq")
+            self.freq_ = (
+                _most_frequent_step(stamps)
+                if self.freq is None
+                else check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
+            )
             self.tolerance_ = DEFAULT_TOLERANCE * self.freq_
             if self.tolerance is not None:
-                self.tolerance_ = as_duration(self.tolerance, "tolerance", may_be_zero=True)
+                self.tolerance_ = check_duration(self.tolerance, "tolerance").to_timedelta64()
             if max(self.lags_) > LONGEST_LAG / self.freq_:
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"

@@ -18,7 +18,7 @@ from skthermo._tables.frames import (
     DAY,
     DAY_NS,
     Table,
-    as_duration,
+    check_duration,
     check_same_rows,
     column_names,
     columns_by_sensor,
@@ -261,10 +261,10 @@ def _read_time_constants(given: Any, is_timed: bool) -> NDArray[np.int64]:
     for one in given:
         is_count = isinstance(one, Integral) and not isinstance(one, bool | np.bool_ | np.timedelta64)
         if is_timed:
-            duration = as_duration(one, "time constant")
+            duration = check_duration(one, "time constant", may_be_zero=False)
             if duration > LONGEST:
                 raise ValueError(f"time constant is {one!r}; expected at most ten years")
-            constants.append(int(duration.astype(np.int64)))
+            constants.append(duration.value)
         elif not is_count:
             raise ValueError(
                 f"time constant {one!r} is a duration, but X has no DatetimeIndex; expected a number of rows"
