@@ -316,7 +316,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
-    ("preprocessing/_lags.py", "preprocessing/test_lags.py"): [
+    ("preprocessing/_past.py", "preprocessing/test_lags.py"): [
         ("records that lags reach to", "max(self.lags_) * freq + tolerance", "max(self.lags_) * freq"),
     ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [

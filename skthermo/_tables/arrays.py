@@ -73,7 +73,7 @@ def as_floats(values: Any) -> Array:
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
     is_pandas = hasattr(values, "iloc")
     dtypes: list[Any] = np.ravel(values.dtypes).tolist() if is_pandas else [getattr(values, "dtype", None)]
-    if dtypes and all(dtype == np.float64 for dtype in dtypes):
+    if set(dtypes) == {np.dtype(float)}:
         return np.array(values) if is_pandas else np.asarray(values)
     refuse_no_numbers(values)
     array: Any = values if is_pandas else np.asarray(values)
@@ -144,7 +144,7 @@ def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp])
 
 def piecewise_linear(values: Array, knots: Array) -> Array:
     """Columns, then max(column - knot, 0) of all columns for each row of knots."""
-    return np.hstack([values, *(np.maximum(values - row, 0.0) for row in knots)])
+    return np.hstack([values, *np.maximum(values - knots[:, np.newaxis], 0.0)])
 
 
 def median(values: Array) -> Array:
@@ -520,12 +520,10 @@ def is_label(dof: Any) -> bool:
     return isinstance(dof, tuple) and len(dof) == 2 and not any(isinstance(part, bool) for part in dof)
 
 
-MEMBERS = ("parameter_names", "n_modes", "frequencies")
-
-
 def is_model(candidate: Any) -> bool:
     """Whether an object has the attributes of an FE model."""
-    return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in MEMBERS)
+    has_names = hasattr(candidate, "parameter_names") and hasattr(candidate, "n_modes")
+    return has_names and hasattr(candidate, "frequencies") and not isinstance(candidate, type)
 
 
 def check_model(candidate: Any) -> None:

@@ -6,9 +6,8 @@ It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
-from skthermo.preprocessing._lags import LagFeatures
-from skthermo.preprocessing._memory import ExponentialMeans, MemoryFindings, find_memory
 from skthermo.preprocessing._mode_tracker import ModeTracker
+from skthermo.preprocessing._past import ExponentialMeans, LagFeatures, MemoryFindings, find_memory
 from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
 from skthermo.preprocessing.checks import (
     RecordFindings,

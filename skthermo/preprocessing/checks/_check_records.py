@@ -24,7 +24,7 @@ from skthermo._tables.arrays import (
 from skthermo._tables.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
 from skthermo._validation import check_array
 from skthermo.preprocessing._folds import BlockedKFold, WeatherBasis, distances_from_neighbours, out_of_fold
-from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
+from skthermo.preprocessing._past import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
 from skthermo.preprocessing.checks._columns import stuck_columns
 from skthermo.preprocessing.checks._findings import Finding, RecordFindings, findings_table, period_of
 from skthermo.preprocessing.checks._set_aside import FEW_WRONG, CleanedRecords
@@ -141,12 +141,12 @@ class _Records:
     def __init__(self, cleaned: CleanedRecords, unit: str):
         T, F = cleaned.readings
         useful = cleaned.useful_values(T)
-        has_stamps = any(isinstance(reading.index, pd.DatetimeIndex) for reading in cleaned.readings)
+        is_timed = isinstance(T.index, pd.DatetimeIndex)
         rows, self.index = T.whole, pd.RangeIndex(len(T.values))
-        if has_stamps and not cleaned.have_wrong_times:
+        if is_timed and not cleaned.have_wrong_times:
             rows = np.flatnonzero(~T.index.duplicated())
             self.index = T.index[rows]
-        elif not isinstance(T.index, pd.DatetimeIndex):
+        elif not is_timed:
             self.index = T.index
         sensors = columns_by_sensor(T)
         self.sensors, self.modes = list(sensors), F.columns
@@ -193,7 +193,8 @@ class _Records:
             )
             yield Finding.of(self.index, "no-thermal-effect", "", usable, detail)
             return
-        yield from (finding for finding, _ in slow)
+        for finding, _ in slow:
+            yield finding
         yield from changes
 
     def _stuck(self, what: str, table: Array, names: list[Hashable], unit: str) -> Iterator[Finding]:

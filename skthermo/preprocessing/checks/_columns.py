@@ -193,9 +193,9 @@ class Column:
         first, self.counts = equal_runs(known)
         self.ordered, self.levels = known, known[first]
 
-    def quantile(self, share: float) -> float:
-        """A value of the column that this share of the known values does not exceed."""
-        return float(self.ordered[int(share * (len(self.ordered) - 1))])
+    def quantiles(self, *shares: float) -> Array:
+        """Values of the column that these shares of the known values do not exceed."""
+        return self.ordered[(np.array(shares) * (len(self.ordered) - 1)).astype(int)]
 
     @property
     def span(self) -> str:
@@ -276,7 +276,7 @@ class Column:
             above = np.append(False, np.logical_or.accumulate((gaps > FAR) & (levels[1:] > HOTTEST)))
             below = np.append(np.logical_or.accumulate(((gaps > FAR) & (levels[:-1] < COLDEST))[::-1])[::-1], False)
             lonely = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf)) > JUMP
-            if self.quantile(0.95) < HOTTEST:  # tenths of a degree pass through -99
+            if self.quantiles(0.95) < HOTTEST:  # tenths of a degree pass through -99
                 above |= np.isin(levels, LOGGED) & lonely
             is_none = beyond & (above | below)
             in_kelvin = is_none & (levels > KELVIN[0]) & (levels < KELVIN[1])
@@ -299,7 +299,7 @@ class Column:
 
 def texts_of(levels: Array) -> str:
     """Numbers as a sentence lists them."""
-    return ", ".join(f"{level:.6g}" for level in levels)
+    return ", ".join(map("{:.6g}".format, levels))
 
 
 def equal_runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -376,23 +376,21 @@ def look_at_temperatures(T: Reading) -> None:
         if not column.is_poor():
             varying.append(column)
     T.find_equal_columns()
-    mirrored = _opposite_signs(varying)
+    mirrored = _opposite_signs(T, varying)
     columns = [column for column in varying if column not in mirrored]
     if not columns or len(mirrored) == 1 == len(columns):
         return
-    middles = [column.quantile(0.5) for column in columns]
-    ends = np.array([column.levels[[0, -1]] for column in columns])
+    lowest, middles, warmest, highest = np.array([column.quantiles(0, 0.5, 0.99, 1) for column in columns]).T
     is_warm = WARM[0] < np.median(middles) < WARM[1]
-    if not is_warm and np.median(middles) < WARM[0]:
-        is_warm = np.median([column.quantile(0.99) for column in columns]) > WARMEST
-    if is_warm and min(middles) > FREEZING / 2 and ends.min() > COLD and ends.max() < HOT:
+    is_warm |= np.median(middles) < WARM[0] and np.median(warmest) > WARMEST
+    if is_warm and middles.min() > FREEZING / 2 and lowest.min() > COLD and highest.max() < HOT:
         for column in columns:
             column.found("fahrenheit", column.levels, column.span)
         return
-    known = np.flatnonzero(~np.isnan(_side_by_side(columns)).any(axis=1))
+    values = T.values[:, [column.place for column in columns]]
+    known = np.flatnonzero(~np.isnan(values).any(axis=1))
     if len(columns) > 1 and len(known) >= LEAST_KNOWN:
-        some = _side_by_side(columns)[spread_evenly(known, MOST_COMPARED)]
-        quantiles = np.quantile(some, [0.05, 0.5, 0.95], axis=0)
+        quantiles = np.quantile(values[spread_evenly(known, MOST_COMPARED)], [0.05, 0.5, 0.95], axis=0)
         columns = [column for place, column in enumerate(columns) if not _is_in_another_unit(column, place, quantiles)]
     fine = [column for column in columns if not _is_scaled(column)]
     for column in fine:
@@ -403,20 +401,17 @@ def look_at_temperatures(T: Reading) -> None:
             column.put_aside("implausible-values", column.levels[beyond])
 
 
-def _side_by_side(columns: list[Column]) -> Array:
-    return columns[0].reading.values[:, [column.place for column in columns]]
-
-
-def _opposite_signs(columns: list[Column]) -> list[Column]:
+def _opposite_signs(T: Reading, columns: list[Column]) -> list[Column]:
     """Sensors that fall where the others rise, about at the level of the others with another sign; and say so.
 
     Of two sensors, either may be the one.
     """
-    if len(columns) < 2 or len(columns[0].reading.values) < LEAST_KNOWN:
+    if len(columns) < 2 or len(T.values) < LEAST_KNOWN:
         return []
-    lows, middles, highs = np.array([[column.quantile(share) for column in columns] for share in (0.25, 0.5, 0.75)])
+    lows, middles, highs = np.array([column.quantiles(0.25, 0.5, 0.75) for column in columns]).T
     spreads = np.where(highs > lows, highs - lows, np.inf)
-    standard = np.clip(np.nan_to_num((_side_by_side(columns) - middles) / spreads), -CLIPPED, CLIPPED)
+    values = T.values[:, [column.place for column in columns]]
+    standard = np.clip(np.nan_to_num((values - middles) / spreads), -CLIPPED, CLIPPED)
     norms = np.sqrt((standard**2).sum(axis=0))
     correlations = standard.T @ standard / np.maximum(np.outer(norms, norms), 1e-300)
     mirrored = []
@@ -427,9 +422,8 @@ def _opposite_signs(columns: list[Column]) -> list[Column]:
         against, among = np.median(correlations[place, others]), np.median(correlations[np.ix_(others, others)])
         if is_mirrored and against < AGAINST and among > -AGAINST:
             partner = f"{columns[1].name!r}" if len(columns) == 2 else "the others"
-            whole = column.reading.whole
-            detail = f"{column.name!r} and {partner} have a correlation of {against:.2f} in {len(whole)} rows"
-            column.reading.found("opposite-signs", column.name, whole, detail)
+            detail = f"{column.name!r} and {partner} have a correlation of {against:.2f} in {len(T.values)} rows"
+            T.found("opposite-signs", column.name, T.whole, detail)
             mirrored.append(column)
             if len(columns) == 2:
                 break
@@ -462,16 +456,15 @@ def _is_in_another_unit(column: Column, place: int, quantiles: Array) -> bool:
 
 def _is_scaled(column: Column) -> bool:
     """Whether a column, which spans more than the open does, is in tenths of a degree or less; and say so."""
-    ends = column.levels[0], column.levels[-1]
-    is_hot = column.quantile(0.95) > HOTTEST or column.quantile(0.05) < COLDEST
-    if not is_hot and ends[1] - ends[0] < WIDEST:
+    lowest, low, high, highest = column.quantiles(0, 0.05, 0.95, 1)
+    if high <= HOTTEST and low >= COLDEST and highest - lowest < WIDEST:
         return False
     series = column.reading.values[:, column.place]
     series = series[~np.isnan(series)]
     steps = np.abs(np.diff(series))[(series[1:] > HOTTEST) | (series[1:] < COLDEST)]
     for scale in SCALES:
-        if ends[0] / scale > COLDEST and ends[1] / scale < HOTTEST:
-            is_smooth = column.quantile(0.95) - column.quantile(0.05) > SMOOTH * np.median(steps)
+        if lowest / scale > COLDEST and highest / scale < HOTTEST:
+            is_smooth = high - low > SMOOTH * np.median(steps)
             if is_smooth:
                 column.found("scaled-temperatures", column.levels, f"{column.span}, as in degrees times {scale:g},")
             return bool(is_smooth)
@@ -490,15 +483,17 @@ def look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> No
             column.put_aside("not-positive", column.levels[column.levels <= 0])
         if column.is_poor():
             continue
-        middle, width = column.quantile(0.5), column.quantile(0.9) - column.quantile(0.1)
+        low, middle, high = column.quantiles(0.1, 0.5, 0.9)
+        width = high - low
         isolated, apart = column.isolated_levels(BEYOND * width), column.levels_apart()
         if in_hertz:
             isolated = isolated[(isolated > OTHER_MODE * middle) | (isolated < middle / OTHER_MODE)]
             apart = apart[(apart > OTHER_MODE * middle) | (apart < middle / OTHER_MODE)]
         column.put_aside("isolated-level", isolated if width > 0 else isolated[:0])
         column.put_aside("another-level", apart[~np.isin(apart, isolated)])
-        deviation = QUARTILES * (column.quantile(0.75) - column.quantile(0.25))
-        far = np.abs(column.levels - column.quantile(0.5)) > IMPLAUSIBLE * deviation
+        low, middle, high = column.quantiles(0.25, 0.5, 0.75)
+        deviation = QUARTILES * (high - low)
+        far = np.abs(column.levels - middle) > IMPLAUSIBLE * deviation
         if deviation > 0 and not beside_weather:
             column.put_aside("implausible-values", column.levels[far])
     F.find_equal_columns()

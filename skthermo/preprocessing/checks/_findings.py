@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skthermo._tables.frames import midnight
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._memory import MemoryFindings
+from skthermo.preprocessing._past import MemoryFindings
 
 MEANINGLESS, DOUBTFUL = "meaningless", "doubtful"
 COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]

@@ -289,22 +289,19 @@ def _different_rows(first: Reading, second: Reading) -> list[Finding]:
 def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
     """Columns that stand in both tables, or temperatures that are frequencies and frequencies that are none."""
     modes = {content: name for name, content in F.contents()}
-    shared = [(name, modes[content]) for name, content in T.contents() if content in modes]
-    what = "temperatures-are-frequencies" if shared else "exchanged-tables"
-    details = [f"{one!r} of the temperatures equals {two!r}" for one, two in shared]
-    names = [name for name, _ in shared]
-    if not shared and in_hertz and min(len(T.values), len(F.values)) >= FEW_ROWS:
+    found, details = [], {}
+    for name, content in T.contents():
+        if content in modes:
+            details[name] = f"{name!r} of the temperatures equals {modes[content]!r}"
+    what = "temperatures-are-frequencies" if details else "exchanged-tables"
+    if not details and in_hertz and min(len(T.values), len(F.values)) >= FEW_ROWS:
         (steady, is_positive), (changing, _) = _relative_change(T.values), _relative_change(F.values)
         if is_positive and steady < min(STEADY, changing / CHANGING):
-            names = [""]
-            details = [
-                f"half of the temperatures lie within {steady:.1%} of their median, of the frequencies within "
-                f"{changing:.0%}"
-            ]
-    return [
-        Finding.of(T.index, what, name, T.whole, detail, period=True)
-        for name, detail in zip(names, details, strict=True)
-    ]
+            part = f"{steady:.1%} of their median, of the frequencies within {changing:.0%}"
+            details[""] = f"half of the temperatures lie within {part}"
+    for name, detail in details.items():
+        found.append(Finding.of(T.index, what, name, T.whole, detail, period=True))
+    return found
 
 
 def _relative_change(values: Array) -> tuple[float, bool]:
