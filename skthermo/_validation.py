@@ -4,7 +4,6 @@ may be missing."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from importlib import import_module
 from numbers import Integral
 from operator import attrgetter
@@ -41,12 +40,11 @@ from skthermo._tables.arrays import (
     as_columns,
     is_frame_of_floats,
     is_model,
+    is_numbered,
     refuse_huge,
-    refuse_infinite,
     refuse_no_numbers,
     refuse_no_table,
     without_mask,
-    without_missing,
 )
 from skthermo.exceptions import WeatherWarning
 
@@ -161,43 +159,43 @@ class Interval(sklearn.utils._param_validation.Interval):
         return not isinstance(val, bool | np.timedelta64) and super().is_satisfied_by(val)
 
 
-def validate_data(estimator: BaseEstimator, X: Any, **options: Any) -> Any:
-    """scikit-learn's `validate_data` of a table of numbers, in which values may be missing: masked ones become NaN.
-
-    With ``allow_infinite``, infinite ones stay, because the caller lists them among other errors.
-    """
-    check = _validate_floats if is_frame_of_floats(X) else sklearn.utils.validation.validate_data
-    return _as_numbers(partial(check, estimator), X, "X", options)
-
-
-def _validate_floats(estimator: BaseEstimator, X: pd.DataFrame, *, reset: bool = True, **options: Any) -> Any:
-    """scikit-learn's `validate_data` of a frame of floats, whose values it checks sooner as an array."""
+def validate_data(estimator: BaseEstimator, X: Any, *, reset: bool = True, **options: Any) -> Any:
+    """scikit-learn's `validate_data` of a table of numbers, as `check_array` reads it."""
+    values = check_array(X, input_name="X", estimator=estimator, **options)
     sklearn.utils.validation.validate_data(estimator, X, reset=reset, skip_check_array=True)
-    return sklearn.utils.check_array(X.to_numpy(), input_name="X", estimator=estimator, **options)
+    return values
 
 
-def check_array(values: Any, *, input_name: str = "y", **options: Any) -> Any:
-    """scikit-learn's `check_array` of numbers, of which some may be missing: masked ones become NaN."""
-    return _as_numbers(sklearn.utils.check_array, values, input_name, options)
+def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = False, **options: Any) -> Any:
+    """scikit-learn's `check_array` of numbers, of which some may be missing: masked ones become NaN.
 
-
-def _as_numbers(check: Callable[..., Any], values: Any, what: str, options: dict[str, Any]) -> Any:
-    """An array that one of scikit-learn's checks makes; what is wrong with a table is said first, in one sentence."""
+    What is wrong with a table is said first, in one sentence. With ``allow_infinite``, infinite values stay, because
+    the caller lists them among other errors.
+    """
     refuse_no_table(
         values,
-        what,
+        input_name,
         least_rows=options.get("ensure_min_samples", 1),
         least_columns=options.get("ensure_min_features", 1),
         or_vector=not options.get("ensure_2d", True),
     )
-    allow_infinite = options.pop("allow_infinite", False)
+    numbers = values.to_numpy() if is_frame_of_floats(values) else with_nan(values)
     try:
-        array = check(with_nan(values), ensure_all_finite=False, **options)
+        array = sklearn.utils.check_array(numbers, input_name=input_name, ensure_all_finite=False, **options)
     except TypeError as error:
-        raise TypeError(f"{what} holds what is no number; expected numbers ({error})") from error
+        raise TypeError(f"{input_name} holds what is no number; expected numbers ({error})") from error
+    infinite = np.isinf(array)
+    if not allow_infinite and infinite.any():
+        place = tuple(np.argwhere(infinite)[0])
+        index, columns = getattr(values, "index", None), getattr(values, "columns", None)
+        row = f"row {place[0]}" + ("" if index is None or is_numbered(index) else f" ({index[place[0]]})")
+        column = "" if len(place) < 2 else f" of column {int(place[1]) if columns is None else columns[place[1]]!r}"
+        raise ValueError(
+            f"{input_name} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; "
+            "expected finite numbers, and NaN where a value is missing"
+        )
     if not allow_infinite:
-        refuse_infinite(array, what, values)
-        refuse_huge(array, what)
+        refuse_huge(array, input_name)
     return array
 
 
@@ -210,9 +208,10 @@ def with_nan(X: Any) -> Any:
         return X
     refuse_no_numbers(X)
     if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
-        return pd.DataFrame(without_missing(X.to_numpy(dtype=object)), X.index, X.columns)
+        return pd.DataFrame(with_nan(X.to_numpy(dtype=object)), X.index, X.columns)
     if isinstance(X, np.ndarray) and X.dtype == object:
-        return without_missing(np.asarray(X))
+        objects = np.asarray(X)
+        return np.where(pd.isna(objects), np.nan, objects)
     return without_mask(X)
 
 
@@ -356,8 +355,12 @@ def fit_weighted(estimator: BaseEstimator, X: Any, y: Any, sample_weight: Array 
         return estimator.fit(X, y)
     if inside(estimator) is None or routes_weights(estimator):
         return estimator.fit(X, y, sample_weight=sample_weight)
+    part, steps = estimator, []
+    while part is not None:
+        steps += [part.steps[-1][0]] if isinstance(part, Pipeline) else []
+        part = inside(part)
     with config_context(enable_metadata_routing=False):  # nobody has said which step gets them
-        return estimator.fit(X, y, **{name_of_weights(estimator): sample_weight})
+        return estimator.fit(X, y, **{"__".join([*steps, "sample_weight"]): sample_weight})
 
 
 def takes_weights(estimator: Any) -> bool:
@@ -387,18 +390,6 @@ def inside(estimator: Any) -> BaseEstimator | None:
     if isinstance(estimator, TransformedTargetRegressor):
         return LinearRegression() if estimator.regressor is None else estimator.regressor
     return estimator.estimator if isinstance(estimator, MultiOutputRegressor | BaseSearchCV) else None
-
-
-def name_of_weights(estimator: Any) -> str:
-    """The argument of ``fit`` that hands weights on to what is inside, without metadata routing."""
-    part = inside(estimator)
-    if part is None:
-        return "sample_weight"
-    return (
-        f"{estimator.steps[-1][0]}__{name_of_weights(part)}"
-        if isinstance(estimator, Pipeline)
-        else name_of_weights(part)
-    )
 
 
 def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:

@@ -273,13 +273,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
-    ("preprocessing/checks/_signs.py", "preprocessing/test_checks.py"): [
+    ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
         ("stuck sensors beside rounding", "length >= USUAL * usual", "length >= usual"),
         ("stuck sensors beside resting values", "length < USUAL * same[USUAL_RANK]", "False"),
         ("stuck sensors at all", "SHORTEST = 5", "SHORTEST = 500"),
+    ],
+    ("preprocessing/checks/_check_records.py", "preprocessing/test_checks.py"): [
         ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
         ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
-        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < IN_ORDER:", "        if True:"),
+        ("exchanged modes that cross", "            if np.sqrt(ratio.prod()) < IN_ORDER:", "            if True:"),
     ],
     ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
         ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
@@ -320,7 +322,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks of a given length", "if block is not None:", "if False:"),
         ("stamps of blocks", "np.ptp(self.times) > MOST_ROWS\n            stamps", "False\n            stamps"),
     ],
-    ("preprocessing/_lags.py", "preprocessing/test_lags.py"): [
+    ("preprocessing/_past.py", "preprocessing/test_lags.py"): [
         ("records that lags reach to", "max(self.lags_) * freq + tolerance", "max(self.lags_) * freq"),
     ],
     ("detection/_base.py", "detection/test_mahalanobis.py"): [

@@ -5,7 +5,7 @@ return their argument, or raise a ValueError that says what was got and what was
 name.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from datetime import date, time, timedelta
 from numbers import Integral, Real
 from os import PathLike
@@ -73,7 +73,7 @@ def as_floats(values: Any) -> Array:
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
     is_pandas = hasattr(values, "iloc")
     dtypes: list[Any] = np.ravel(values.dtypes).tolist() if is_pandas else [getattr(values, "dtype", None)]
-    if dtypes and all(dtype == np.float64 for dtype in dtypes):
+    if set(dtypes) == {np.dtype(float)}:
         return np.array(values) if is_pandas else np.asarray(values)
     refuse_no_numbers(values)
     array: Any = values if is_pandas else np.asarray(values)
@@ -83,8 +83,11 @@ def as_floats(values: Any) -> Array:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
     except TypeError:  # pandas' NA in an object array is not a float
         pass
+    from pandas import isna
+
+    objects = np.asarray(array, dtype=object)
     try:
-        return without_missing(np.asarray(array, dtype=object)).astype(float)
+        return np.where(isna(objects), np.nan, objects).astype(float)
     except TypeError as error:
         raise ValueError(f"the input is {values!r:.100}; expected numbers ({error})") from error
 
@@ -97,22 +100,10 @@ def without_mask(values: Any) -> Any:
     return floats.filled(np.nan)
 
 
-def without_missing(objects: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Objects with NaN in place of None and of pandas' NA."""
-    from pandas import isna
-
-    return np.where(isna(objects), np.nan, objects)
-
-
 def as_columns(values: ArrayLike) -> Array:
     """A 2-D array of floats; a vector becomes a single column."""
     array = as_floats(values)
     return array[:, np.newaxis] if array.ndim == 1 else array
-
-
-def as_dense(matrix: Matrix) -> Array:
-    """A matrix as an array."""
-    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
 def positive_integer(value: Any, what: str) -> int:
@@ -153,7 +144,7 @@ def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp])
 
 def piecewise_linear(values: Array, knots: Array) -> Array:
     """Columns, then max(column - knot, 0) of all columns for each row of knots."""
-    return np.hstack([values, *(np.maximum(values - row, 0.0) for row in knots)])
+    return np.hstack([values, *np.maximum(values - knots[:, np.newaxis], 0.0)])
 
 
 def median(values: Array) -> Array:
@@ -254,7 +245,13 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     """
     if isinstance(values, type) or callable(values):
         raise ValueError(f"{what} is {values!r:.100}; expected numbers")
-    for name, part in _parts(values):
+    parts = {None: values}
+    if hasattr(type(values), "columns") and hasattr(type(values), "dtypes"):
+        parts = {}
+        for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
+            if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc" or dtype == np.float16:
+                parts[name] = values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
+    for name, part in parts.items():
         kind, example = _no_number(part)
         if kind:
             where, hint = what if name is None else f"column {name!r}", ""
@@ -310,12 +307,7 @@ def refuse_no_table(
             f"{what} has {shape[0]} sample(s) (shape={tuple(shape)}) while a minimum of {least_rows} is required; "
             f"{expected}"
         )
-    _refuse_names(getattr(values, "columns", ()), what)
-
-
-def _refuse_names(columns: Any, what: str) -> None:
-    """Raise an error for names of columns that stand twice, are of several levels, or are only partly text."""
-    names = list(columns)
+    names = list(getattr(values, "columns", ()))
     if len(set(names)) < len(names):
         raise ValueError(f"{what} has the columns {names}; expected each name once")
     are_text = {isinstance(name, str) for name in names}
@@ -324,20 +316,6 @@ def _refuse_names(columns: Any, what: str) -> None:
         raise ValueError(
             f"the names of the columns of {what} are {kind}, such as {names[0]!r}; expected text, as in "
             f"{what}.columns = ['T1', 'T2', 'f1']"
-        )
-
-
-def refuse_infinite(values: NDArray, what: str, like: Any) -> None:
-    """Raise an error for infinite values, with the column and row of the first by the names of a table like them."""
-    infinite = np.isinf(values)
-    if infinite.any():
-        place = tuple(np.argwhere(infinite)[0])
-        index, columns = getattr(like, "index", None), getattr(like, "columns", None)
-        row = f"row {place[0]}" + ("" if index is None or is_numbered(index) else f" ({index[place[0]]})")
-        column = "" if len(place) < 2 else f" of column {int(place[1]) if columns is None else columns[place[1]]!r}"
-        raise ValueError(
-            f"{what} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; expected "
-            "finite numbers, and NaN where a value is missing"
         )
 
 
@@ -350,16 +328,6 @@ def refuse_huge(values: Any, what: str) -> None:
             raise ValueError(f"{what} holds {huge[0]:g}; expected numbers from {-HUGE:g} to {HUGE:g}")
 
 
-def _parts(values: Any) -> Iterator[tuple[Any, Any]]:
-    """Columns of a frame that may hold no numbers, by name; of anything else the values themselves."""
-    if not (hasattr(type(values), "columns") and hasattr(type(values), "dtypes")):
-        yield None, values
-        return
-    for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
-        if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc" or dtype == np.float16:
-            yield name, values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
-
-
 def _no_number(values: Any) -> tuple[str, Any]:
     """What kind of values are no numbers, and the first of them; an empty text if all are numbers."""
     if isinstance(values, list | tuple):
@@ -367,27 +335,19 @@ def _no_number(values: Any) -> tuple[str, Any]:
             return "rows of different lengths", values
         return next((found for found in map(_no_number, values) if found[0]), ("", None))
     dtype = getattr(values, "dtype", None)
-    if dtype is None:
-        return _kind_of(values), values
     named = {"category": "categories", "float16": HALF}.get(str(dtype), "")
     kind = named or KINDS.get(getattr(dtype, "kind", ""), "")
     if kind:
         return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
+    objects = [values] if dtype is None else []
     if getattr(dtype, "kind", "") == "O":
         objects = np.ravel(np.asarray(values, dtype=object))
-        kinds = {kind: _kind_of_type(kind) for kind in set(map(type, objects))}
-        if any(kinds.values()):
-            example = next(value for value in objects if kinds[type(value)])
-            return kinds[type(example)], example
+    firsts = dict(zip(map(type, objects[::-1]), objects[::-1], strict=True))  # the first value of each type
+    for kind, classes in NO_NUMBERS.items():
+        for cls, example in firsts.items():
+            if issubclass(cls, classes):
+                return kind, example
     return "", None
-
-
-def _kind_of(value: Any) -> str:
-    return _kind_of_type(type(value))
-
-
-def _kind_of_type(cls: type) -> str:
-    return next((what for what, classes in NO_NUMBERS.items() if issubclass(cls, classes)), "")
 
 
 def check_theta(
@@ -395,7 +355,7 @@ def check_theta(
 ) -> Array:
     """Rows of finite, positive multipliers, one column for each parameter."""
     names = list(parameter_names)
-    values = real_array(by_name(columns_by_name(theta, names, "theta"), names, "theta"), "theta")
+    values = real_array(by_name(theta, names, "theta"), "theta")
     rows = values[np.newaxis] if values.ndim == 1 else values
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(
@@ -418,10 +378,19 @@ def check_bounds(bounds: Bounds, parameter_names: Sequence[str]) -> Array:
     """Lowest and highest multiplier of every parameter."""
     names = list(parameter_names)
     if isinstance(bounds, Mapping) or is_labelled(bounds):
-        widths = by_name(bounds, names, "bounds")
-        return np.vstack([check_bounds(_pair(width, name), [name]) for name, width in zip(names, widths, strict=True)])
-    ends = columns_by_name(bounds, ("lowest", "highest"), "bounds", "columns")
-    array = real_array(rows_by_name(ends, names, "bounds"), "bounds")
+        ends = np.empty((len(names), 2))
+        for name, own, width in zip(names, ends, by_name(bounds, names, "bounds"), strict=True):
+            what = f"bounds of parameter {name!r} are {width!r}; expected a half-width"
+            if np.ndim(width) == 0 and not (is_real(width) and 0 < float(width) < 1):
+                raise ValueError(f"{what} between 0 and 1, or (lowest, highest)")
+            if np.shape(width) not in ((), (2,)):
+                raise ValueError(f"{what} or (lowest, highest)")
+            own[:] = check_bounds(width if np.ndim(width) == 0 else [width], [name])
+        return ends
+    table = by_name(bounds, ("lowest", "highest"), "bounds", "columns")
+    if hasattr(table, "iloc") and table.ndim == 2 and not is_numbered(table.index):
+        table = by_name(table.T, names, "bounds").T
+    array = real_array(table, "bounds")
     if array.ndim == 0:
         if not 0 < array < 1:
             raise ValueError(f"bounds is {array}; expected a half-width between 0 and 1, such as 0.3 for 30 %")
@@ -543,7 +512,23 @@ Label: TypeAlias = tuple[Hashable, Hashable]
 
 def check_dofs(dofs: ArrayLike, n_dof: int, labels: Sequence[Label] = ()) -> NDArray[np.intp]:
     """Different degrees of freedom of a model by position, from positions or from labels, such as (12, "x")."""
-    array = integer_row(_positions(dofs, labels, n_dof), "dofs")
+    given: Any = dofs.tolist() if isinstance(dofs, np.ndarray) else dofs
+    are_rows = isinstance(given, list | tuple) and len(given) > 0
+    if are_rows and all(isinstance(row, list | tuple) and len(row) == 2 for row in given):
+        if not labels:
+            raise ValueError(
+                f"dofs holds {given[0]!r:.100}, but the model's degrees of freedom have no labels; expected 0 to "
+                f"{n_dof - 1}"
+            )
+        places = {label: i for i, label in enumerate(labels)}
+        unknown = [row for row in map(tuple, given) if not is_label(row) or row not in places]
+        if unknown:
+            raise ValueError(
+                f"dofs holds {unknown[0]!r:.100}; expected degrees of freedom of the model, such as {labels[0]!r} "
+                "(model.dofs lists all)"
+            )
+        dofs = [places[tuple(row)] for row in given]
+    array = integer_row(dofs, "dofs")
     outside = array[(array < 0) | (array >= n_dof)]
     if outside.size:
         raise ValueError(f"dofs holds {outside[0]}; expected 0 to {n_dof - 1}, the model's degrees of freedom")
@@ -551,27 +536,6 @@ def check_dofs(dofs: ArrayLike, n_dof: int, labels: Sequence[Label] = ()) -> NDA
     if (counts > 1).any():
         raise ValueError(f"dofs holds {values[counts > 1][0]} more than once; expected each degree of freedom once")
     return array.astype(np.intp)
-
-
-def _positions(dofs: Any, labels: Sequence[Label], n_dof: int) -> Any:
-    """Positions of labels among those of a model; anything but pairs is returned as it is."""
-    rows = dofs.tolist() if isinstance(dofs, np.ndarray) else dofs
-    if not isinstance(rows, list | tuple) or not rows:
-        return dofs
-    if not all(isinstance(row, list | tuple) and len(row) == 2 for row in rows):
-        return dofs
-    if not labels:
-        raise ValueError(
-            f"dofs holds {rows[0]!r:.100}, but the model's degrees of freedom have no labels; expected 0 to {n_dof - 1}"
-        )
-    places = {label: i for i, label in enumerate(labels)}
-    unknown = [row for row in map(tuple, rows) if not is_label(row) or row not in places]
-    if unknown:
-        raise ValueError(
-            f"dofs holds {unknown[0]!r:.100}; expected degrees of freedom of the model, such as {labels[0]!r} "
-            "(model.dofs lists all)"
-        )
-    return [places[tuple(row)] for row in rows]
 
 
 def is_label(dof: Any) -> bool:
@@ -583,32 +547,10 @@ def is_label(dof: Any) -> bool:
     return isinstance(dof, tuple) and len(dof) == 2 and not any(isinstance(part, bool) for part in dof)
 
 
-def seem_rad_per_s(ratios: ArrayLike, tolerance: float = 0.15) -> bool:
-    """Whether all known ratios of measured to expected frequencies are about 2 pi: rad/s given in place of Hz."""
-    offsets = np.abs(np.asarray(ratios, dtype=float) / (2 * np.pi) - 1)
-    return bool(np.isfinite(offsets).any() and not (offsets >= tolerance).any())
-
-
-def _pair(width: Any, name: str) -> Any:
-    """A half-width, or lowest and highest as the only row."""
-    if np.ndim(width) == 0:
-        if not (is_real(width) and 0 < float(width) < 1):
-            raise ValueError(
-                f"bounds of parameter {name!r} are {width!r}; expected a half-width between 0 and 1, or (lowest, "
-                "highest)"
-            )
-        return width
-    if np.shape(width) != (2,):
-        raise ValueError(f"bounds of parameter {name!r} are {width!r}; expected a half-width or (lowest, highest)")
-    return [width]
-
-
-MEMBERS = ("parameter_names", "n_modes", "frequencies")
-
-
 def is_model(candidate: Any) -> bool:
     """Whether an object has the attributes of an FE model."""
-    return not isinstance(candidate, type) and all(hasattr(candidate, name) for name in MEMBERS)
+    has_names = hasattr(candidate, "parameter_names") and hasattr(candidate, "n_modes")
+    return has_names and hasattr(candidate, "frequencies") and not isinstance(candidate, type)
 
 
 def check_model(candidate: Any) -> None:
@@ -621,44 +563,22 @@ def check_model(candidate: Any) -> None:
 
 
 def by_name(values: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
-    """Values of a mapping, or of a Series with labels, in the order of the names; anything else unchanged.
+    """Values of a mapping, a Series with labels or a frame with named columns, in the order of the names; anything else
+    unchanged.
 
     The labels must be exactly the names. Labels 0, 1, 2, ... are no names.
     """
-    if isinstance(values, Mapping):
-        labels = list(values)
-    elif is_labelled(values):
-        labels = list(values.index)
-    else:
+    is_table = hasattr(values, "columns") and not is_numbered(values.columns)
+    if not is_table and not isinstance(values, Mapping) and not is_labelled(values):
         return values
-    check_labels(labels, names, what, kind)
-    return [values[name] for name in names]
-
-
-def rows_by_name(table: Any, names: Sequence[Any], what: str) -> Any:
-    """A frame with labelled rows in the order of the names; anything else unchanged."""
-    if not hasattr(table, "iloc") or table.ndim != 2 or is_numbered(table.index):
-        return table
-    check_labels(list(table.index), names, what, "parameters")
-    return table.loc[list(names)]
-
-
-def columns_by_name(table: Any, names: Sequence[Any], what: str, kind: str = "parameters") -> Any:
-    """A frame with labelled columns in the order of the names; anything else unchanged."""
-    if not hasattr(table, "columns") or is_numbered(table.columns):
-        return table
-    check_labels(list(table.columns), names, what, kind)
-    return table[list(names)]
-
-
-def check_labels(labels: Sequence[Any], names: Sequence[Any], what: str, kind: str) -> None:
-    """Raise an error unless labels are the names, in any order."""
+    labels = list(values.columns if is_table else values if isinstance(values, Mapping) else values.index)
     unknown = [label for label in labels if label not in names]
     missing = [name for name in names if name not in labels]
     repeated = [label for place, label in enumerate(labels) if label in labels[:place]]
     for wrong, problem in ((unknown, "unknown"), (missing, "missing"), (repeated, "repeated")):
         if wrong:
             raise ValueError(f"{what}: {wrong} are {problem}; expected each of the {kind} {list(names)}")
+    return values[list(names)] if is_table else [values[name] for name in names]
 
 
 def is_labelled(values: Any) -> bool:

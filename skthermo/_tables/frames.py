@@ -22,7 +22,6 @@ MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a
 YEAR, DAY = pd.Timedelta(days=365.25), pd.Timedelta(days=1)
 DAY_NS = DAY.value  # nanoseconds
 LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
-ZERO = np.timedelta64(0, "ns")
 DATE_AS_TEXT = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 
 
@@ -57,35 +56,25 @@ def columns_by_sensor(T: Any) -> dict[Hashable, list[int]]:
     return columns
 
 
-def check_positions_are_names(targets: Any, columns: Any) -> None:
-    """Refuse integer targets where they could be names of columns as well as positions."""
-    targets = as_targets(targets)
-    integers = all(isinstance(name, Integral) for name in (*columns, *targets))
-    if integers and list(columns) not in ([], list(range(len(columns)))):
-        raise ValueError(
-            f"targets are the integers {list(targets)}, which may be names or positions of the columns {list(columns)}"
-            "; expected columns named by text, or 0, 1, 2, ..."
-        )
-
-
-def as_targets(targets: Any) -> list[Any]:
-    """Targets as a list; a single name or number, or what has no order, is an error."""
+def positions_of(targets: Any, n_columns: int, columns: Iterable[Hashable]) -> NDArray[np.intp]:
+    """Positions of the targets, which are given by the names of a frame's columns, or by position. Integers that could
+    be names as well as positions are refused."""
     if isinstance(targets, str | bytes | type | Mapping | Set) or not isinstance(targets, Iterable):
         hint = f", such as [{targets!r}]" if isinstance(targets, str | Integral) else ""
         raise ValueError(
             f"targets is {targets!r:.100}, of type {type(targets).__name__}; expected a list of names of columns or "
             f"of positions from 0{hint}"
         )
-    return list(targets)
-
-
-def positions_of(targets: Any, n_columns: int, names: NDArray[np.object_] | None) -> NDArray[np.intp]:
-    """Positions of the targets, which are given by name or by position."""
-    targets = as_targets(targets)
+    targets, columns = list(targets), list(columns)
+    are_integers = all(isinstance(name, Integral) for name in (*columns, *targets))
+    if are_integers and columns not in ([], list(range(len(columns)))):
+        raise ValueError(
+            f"targets are the integers {targets}, which may be names or positions of the columns {columns}; expected "
+            "columns named by text, or 0, 1, 2, ..."
+        )
     if targets and all(isinstance(target, str) for target in targets):
-        if names is None:
+        if not all(isinstance(name, str) for name in columns) or not columns:
             raise ValueError(f"targets are the names {targets}, but X has no column names; expected a frame or indexes")
-        columns = list(names)
         unknown = [target for target in targets if columns.count(target) != 1]
         if unknown:
             raise ValueError(f"targets {unknown} are not columns of X, or more than one; expected some of {columns}")
@@ -120,14 +109,6 @@ def warn_of_markers(X: ArrayLike) -> None:
             RecordsWarning,
             "placeholders",
         )
-
-
-def first_disorder(X: Any) -> int:
-    """Position of the first row of a frame that is earlier than the row before it; 0 if there is none."""
-    times = getattr(X, "index", None)
-    if not isinstance(times, pd.DatetimeIndex) or times.is_monotonic_increasing:
-        return 0
-    return int(np.argmax(times[1:] < times[:-1])) + 1
 
 
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
@@ -231,11 +212,6 @@ def check_stamp(moment: Any, index: pd.DatetimeIndex, name: str) -> pd.Timestamp
     raise ValueError(f"{name} is {moment!r:.100}; expected a time{zone}, such as {index[-1]}")
 
 
-def check_duration(value: Any, name: str) -> pd.Timedelta:
-    """A duration of zero or more, as a text or a Timedelta."""
-    return pd.Timedelta(as_duration(value, name, may_be_zero=True))
-
-
 def usual_step(stamps: pd.DatetimeIndex) -> pd.Timedelta:
     """Median time between records in order of time; zero for one record alone."""
     steps = np.diff(stamps.as_unit("ns").asi8)
@@ -265,8 +241,11 @@ def correlation_time(series: Array) -> float:
         return 1.0
     centred = np.where(known, series - series[known].mean(), 0.0)
     variance = (centred**2).sum() / known.sum()
-    pairs = np.maximum(np.rint(_products(known.astype(float))), 1)
-    correlations = _products(centred) / pairs / variance
+    size = next_fast_len(2 * len(series), real=True)
+    spectra = np.abs(rfft([known.astype(float), centred], size)) ** 2  # of products of values 1, 2, ... places apart
+    pairs, products = irfft(spectra, size)[:, 1 : max(len(series) // 2, 1)]
+    pairs = np.maximum(np.rint(pairs), 1)
+    correlations = products / pairs / variance
     n_clear = int(np.argmin(np.append(correlations > 2 / np.sqrt(pairs), False)))
     return float(1 + 2 * correlations[:n_clear].sum())
 
@@ -274,12 +253,6 @@ def correlation_time(series: Array) -> float:
 def correlation_times(columns: Array) -> Array:
     """The `correlation_time` of each column, (n_columns,)."""
     return np.array([correlation_time(column) for column in columns.T])
-
-
-def _products(values: Array) -> Array:
-    """Sums of the products of values 1, 2, ... places apart, up to half of their number."""
-    size = next_fast_len(2 * len(values), real=True)
-    return irfft(np.abs(rfft(values, size)) ** 2, size)[1 : max(len(values) // 2, 1)]
 
 
 def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
@@ -312,8 +285,8 @@ def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
         ) from error
 
 
-def as_duration(value: Any, name: str, *, may_be_zero: bool = False) -> np.timedelta64:
-    """A positive duration of fixed length, or one of zero or more."""
+def check_duration(value: Any, name: str, *, may_be_zero: bool = True) -> pd.Timedelta:
+    """A duration of fixed length in nanoseconds, zero or more, or a positive one."""
     units = re.findall("[A-Za-z]+", value) if isinstance(value, str) else None
     if any(unit.isupper() and unit not in LONE_CAPITALS for unit in units or ()):
         raise ValueError(
@@ -323,10 +296,10 @@ def as_duration(value: Any, name: str, *, may_be_zero: bool = False) -> np.timed
         if is_real(value) or isinstance(value, bool):  # nanoseconds for pandas
             raise TypeError
         numbered = f"1{value}" if isinstance(value, str) and value[:1].isalpha() else value
-        duration = pd.Timedelta(numbered).as_unit("ns").to_timedelta64()
+        duration = pd.Timedelta(numbered).as_unit("ns")
     except (ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"{name} is {value!r}; expected a duration of fixed length, such as '1h'") from error
-    if units == [] or not duration >= ZERO or (duration == ZERO and not may_be_zero):
+    if units == [] or not duration.value >= (0 if may_be_zero else 1):
         expected = "a duration of zero or more" if may_be_zero else "a positive duration"
         raise ValueError(f"{name} is {value!r}; expected {expected} with its unit, such as '1h'")
     return duration

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import json
 import logging
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -16,7 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._estimators.warnings import reported_by_caller, warn_user
 from skthermo._io import alone_with
-from skthermo._tables.text import counted
+from skthermo._tables.text import counted, plain
 from skthermo.commands._new_records import (
     NewFile,
     Taken,
@@ -26,7 +28,6 @@ from skthermo.commands._new_records import (
     read_baseline,
     read_columns,
 )
-from skthermo.commands._outputs import append_transitions
 from skthermo.commands._record_files import CsvFormat, in_zone, read_file
 from skthermo.commands._settings import Settings, read_settings
 from skthermo.exceptions import SkthermoWarning
@@ -163,7 +164,7 @@ class Bridge:
             return
         own = {"bridge": self.name, "fitted": Taken.read(self.taken_file).fitted}
         try:
-            done.transitions = append_transitions(self.settings.path(name), monitor.transitions(), own)
+            done.transitions = append_lines(self.settings.path(name), monitor.transitions(), own)
         except (OSError, ValueError) as error:
             done.failed(error, f"{name} was not written: ")
 
@@ -452,3 +453,27 @@ def _of_file(bridge: Bridge) -> Settings:
     if bridge.settings is None:
         raise ValueError(f"{bridge.file} is no file of settings; expected a monitor.toml, as init writes it")
     return bridge.settings
+
+
+def append_lines(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Append those entries to a file of JSON lines that it does not have yet, and give them.
+
+    ``own`` are the values that lines of this monitor have. A line that a killed command has left unfinished is
+    removed; the caller holds the lock of the monitor.
+    """
+    known = 0
+    if file.exists():
+        content = file.read_bytes()
+        whole = content[: content.rfind(b"\n") + 1]
+        for line in map(json.loads, whole.splitlines()):
+            if all(line.get(name) == value for name, value in own.items()):
+                known = max(known, line["id"])
+        if len(whole) < len(content):
+            os.truncate(file, len(whole))
+    new = [dict(own) | dict(entry) for entry in entries if entry["id"] > known]
+    if new:
+        with open(file, "ab") as lines:
+            lines.write("".join(f"{json.dumps(plain(one), ensure_ascii=False)}\n" for one in new).encode())
+            lines.flush()
+            os.fsync(lines.fileno())
+    return new

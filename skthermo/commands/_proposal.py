@@ -7,7 +7,7 @@ import json
 import re
 import shutil
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,9 +21,8 @@ from skthermo._estimators.warnings import without_warnings
 from skthermo._io import write_when_complete
 from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
-from skthermo.commands._looking import Look, is_in_kelvin, look_at
 from skthermo.commands._new_records import in_celsius, joined
-from skthermo.commands._record_files import BINARY, PARQUET, CsvFormat
+from skthermo.commands._record_files import BINARY, MOSTLY, PARQUET, CsvFormat, Look, look_at
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -35,7 +34,6 @@ from skthermo.commands._settings import (
     settings_of,
 )
 from skthermo.detection import DirectionalDetector
-from skthermo.monitoring import Monitor
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
@@ -58,6 +56,7 @@ DAY_FALLS = (
     "the records of a day together, and falls of frequencies before all",
 )
 WIDTH = 110  # of comments
+KELVIN = (200.0, 340.0)  # range of a temperature in kelvin
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
 # a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
@@ -89,30 +88,6 @@ class Candidate:
 
     def __str__(self) -> str:
         return f"{self.kind}, {self.text}: {self.finds}"
-
-
-def candidates(
-    step: pd.Timedelta,
-    baseline: pd.DataFrame,
-    monitor: Callable[[str, Mapping[str, Any]], Monitor],
-    are_frequencies: bool,
-) -> list[Candidate]:
-    """Detectors that are possible, the best first; the single record where nothing speaks for another.
-
-    Of natural frequencies, those that know in which direction damage moves them.
-    """
-    single, day = (SINGLE_FALLS, DAY_FALLS) if are_frequencies else (SINGLE, DAY)
-    kinds = [single, day] if step <= DENSE else [single]
-    tried = []
-    for kind, chosen, text in kinds:
-        try:
-            with without_warnings():  # the fit that follows gives them
-                smallest = monitor(kind, chosen).fit(baseline).smallest_changes_
-            size = float(np.exp(np.log(list(smallest.single.values())).mean()))
-            tried.append(Candidate(kind, chosen, text, str(smallest), size if np.isfinite(size) else np.inf))
-        except ValueError as error:
-            tried.append(Candidate(kind, chosen, text, f"it cannot be fitted to this baseline: {error}", np.inf))
-    return sorted(tried, key=lambda one: one.size)
 
 
 @dataclass(frozen=True)
@@ -196,18 +171,29 @@ class Proposal:
 
     @cached_property
     def detectors(self) -> list[Candidate]:
-        """Detectors that are possible, the best first."""
+        """Detectors that are possible, the best first; the single record where nothing speaks for another.
+
+        Of natural frequencies, those that know in which direction damage moves them.
+        """
         parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
         parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
         options = {"compensator": {}, "monitor": self.monitor_options}
 
-        def monitor(kind: str, chosen: Mapping[str, Any]) -> Monitor:
+        are_frequencies = set(self.units.values()) == {HZ}
+        single, day = (SINGLE_FALLS, DAY_FALLS) if are_frequencies else (SINGLE, DAY)
+        tried = []
+        for kind, chosen, text in [single, day] if self.step <= DENSE else [single]:
             inner = {key: DirectionalDetector() for key, one in chosen.items() if one is FALLS}
-            detector = class_named(kind, CLASSES["detector"])(**{**chosen, **inner})
-            found = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
-            return found.monitor()
-
-        return candidates(self.step, self.baseline, monitor, set(self.units.values()) == {HZ})
+            try:
+                detector = class_named(kind, CLASSES["detector"])(**{**chosen, **inner})
+                made = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
+                with without_warnings():  # the fit that follows gives them
+                    smallest = made.monitor().fit(self.baseline).smallest_changes_
+                size = float(np.exp(np.log(list(smallest.single.values())).mean()))
+                tried.append(Candidate(kind, chosen, text, str(smallest), size if np.isfinite(size) else np.inf))
+            except ValueError as error:
+                tried.append(Candidate(kind, chosen, text, f"it cannot be fitted to this baseline: {error}", np.inf))
+        return sorted(tried, key=lambda one: one.size)
 
     @property
     def features(self) -> list[tuple[str, dict[str, Any]]]:
@@ -311,7 +297,7 @@ def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:
     unit = units.get(name, "")
     if unit in ("K", "°F"):
         return unit
-    return "K" if unit == "" and is_in_kelvin(records[name]) else ""
+    return "K" if unit == "" and records[name].between(*KELVIN).mean() > MOSTLY else ""
 
 
 def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:

@@ -101,10 +101,11 @@ class Records:
 
 
 class Setting(NamedTuple):
-    """A parameter by which something is called: its default, and what it is."""
+    """A parameter by which something is called: its default, what it is, and the type as its docstring has it."""
 
     default: Any
     text: str
+    kind: str
 
     @property
     def is_required(self) -> bool:
@@ -139,11 +140,11 @@ OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "mon
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
     """Parameters of a class or function by name, with their descriptions; defaults made by a factory are empty."""
     doc = inspect.getdoc(maker) or ""
-    types = dict(_types(doc))
+    types = dict(re.findall(r"^(\w+) : ([^\n]*?)(?:, optional|, default=[^\n]*)?$", doc, re.MULTILINE))
     texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
     kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
     return {
-        name: Setting({} if "factory" in repr(one.default) else one.default, texts.get(name, ""))
+        name: Setting({} if "factory" in repr(one.default) else one.default, texts.get(name, ""), types.get(name, ""))
         for name, one in inspect.signature(maker).parameters.items()
         if name not in without and one.kind not in kinds
     }
@@ -318,8 +319,8 @@ class _Reader:
         maker = SECTIONS[name][0]()
         for key, value in values.items():
             if not fits(value, get_type_hints(maker)[key]):
-                text = dict(_types(inspect.getdoc(maker) or ""))[key]
-                raise self.error(name, 0, key, f"[{name}] {key} is {value!r:.100}; expected {text}")
+                expected = settings_of(maker)[key].kind
+                raise self.error(name, 0, key, f"[{name}] {key} is {value!r:.100}; expected {expected}")
         return maker(**values)
 
     def _values(self, name: str) -> dict[str, Any]:
@@ -419,12 +420,6 @@ def fits(value: Any, hint: Any) -> bool:
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
     return isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
-
-
-def _types(doc: str) -> Iterator[tuple[str, str]]:
-    """Names of parameters and their types as the docstring has them."""
-    for match in re.finditer(r"^(\w+) : ([^\n]*?)(?:, optional|, default=[^\n]*)?$", doc, re.MULTILINE):
-        yield match[1], match[2]
 
 
 def _plain(value: Any, setting: Setting) -> Any:

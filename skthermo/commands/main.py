@@ -24,13 +24,15 @@ finding, 1 findings. All others: 0 done, 3 an error.
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -38,16 +40,34 @@ from typing import Any, NoReturn
 import pandas as pd
 
 import skthermo
-from skthermo._io import ReadWhenAsked
-from skthermo._tables.text import capital
+from skthermo._io import ReadWhenAsked, write_when_complete
+from skthermo._tables.text import capital, plain
 from skthermo.commands import _bridge
 from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
-from skthermo.commands._outputs import as_json, write_metrics
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
 OF_ONE = ("acknowledge", "rebaseline", "refit", "discard")  # commands on a single monitor
 WORST = (ALARM, FAILED, NOT_EVALUATED, HEALTHY)
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
+STATES = ("healthy", "watch", "alarm", "not evaluated")
+GAUGES = {
+    "up": "1 if the last command could do its work on this bridge, else 0",
+    "state": "1 for the state that the bridge is in, 0 for the others",
+    "damage_index": "Damage index of the newest record that was evaluated",
+    "threshold": "Damage index above which a damage event opens",
+    "watch_threshold": "Damage index above which the level watch begins",
+    "newest_record_timestamp_seconds": "Time of the newest record, in seconds since 1970",
+    "record_age_seconds": "Age of the newest record when the metrics were written",
+    "open_events": "Number of events that are open, by kind",
+    "failed_sensors": "Number of sensors that have failed",
+    "records": "Number of records since the baseline",
+    "records_not_evaluated": "Number of records since the baseline that were not evaluated",
+    "written_timestamp_seconds": "Time at which the metrics were written, in seconds since 1970",
+}
+"""Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
+
+KINDS = ("damage", "watch", "measurement or structure")
+ESCAPES = str.maketrans({"\\": r"\\", '"': r"\"", "\n": r"\n"})  # of labels, as the text format wants them
 
 logger = logging.getLogger("skthermo.commands")
 
@@ -85,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {sentence(error)}", file=sys.stderr)
         facts["errors"].append(sentence(error))
     if options.json:
-        _print(as_json(facts))
+        _print(json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False))
     return facts["exit_code"]
 
 
@@ -336,3 +356,43 @@ def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
         _print("\n".join([*found.account(), found.findings.summary(), *chosen]))
         _print(f"read it, then: skthermo fit {file}")
     return HEALTHY
+
+
+def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Timestamp) -> None:
+    """Replace a file of metrics of some bridges, as the JSON has them."""
+    samples = [(name, *sample) for bridge in bridges for name, sample in _samples(bridge, now)]
+    lines = []
+    for name, text in GAUGES.items():
+        lines += [f"# HELP skthermo_{name} {text}", f"# TYPE skthermo_{name} gauge"]
+        for one, labels, value in samples:
+            if one == name:
+                escaped = {label: text.translate(ESCAPES) for label, text in labels.items()}
+                shown = ",".join(f'{label}="{text}"' for label, text in escaped.items())
+                lines.append(f"skthermo_{name}{{{shown}}} {value:.10g}")
+    write_when_complete(file, "\n".join(lines) + "\n")
+
+
+def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str, tuple[dict[str, str], float]]]:
+    """Names of metrics, labels and values of one bridge; what is not known is left out."""
+    status, own = bridge["status"], {"bridge": bridge["name"]}
+    yield "up", (own, float(not bridge["errors"]))
+    yield "written_timestamp_seconds", (own, now.timestamp())
+    if status is None:
+        return
+    for state in STATES:
+        yield "state", (own | {"state": state}, float(status["state"] == state))
+    for kind in KINDS:
+        yield "open_events", (own | {"kind": kind}, sum(one["kind"] == kind for one in status["events"]))
+    yield "failed_sensors", (own, len(status["faults"]))
+    counts = status["counts"] or {}
+    newest = status["newest"] and datetime.fromisoformat(status["newest"]).timestamp()
+    values = {
+        "damage_index": status["index"],
+        "threshold": status["threshold"],
+        "watch_threshold": status["watch_threshold"],
+        "newest_record_timestamp_seconds": newest,
+        "record_age_seconds": status["age"],
+        "records": counts.get("n_records"),
+        "records_not_evaluated": counts.get("n_not_evaluated"),
+    }
+    yield from ((name, (own, value)) for name, value in values.items() if value is not None)

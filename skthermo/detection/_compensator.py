@@ -31,7 +31,6 @@ from skthermo._estimators.warnings import (
 )
 from skthermo._tables.arrays import Array, as_columns, as_floats, is_model, means_of_known
 from skthermo._tables.frames import (
-    check_positions_are_names,
     column_names,
     frame_like,
     has_stamps,
@@ -439,8 +438,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, RecordFindings]:
         values = validate_data(self, X, **AS_FLOATS, ensure_min_features=2, ensure_min_samples=2, allow_infinite=True)
-        check_positions_are_names(self.targets, getattr(X, "columns", ()))
-        self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+        self.targets_ = positions_of(self.targets, values.shape[1], getattr(X, "columns", ()))
         names = _check_feature_names_in(self, None)
         named = pd.DataFrame(values, getattr(X, "index", None), names, copy=False)
         T, F = named.drop(columns=names[self.targets_]), named[names[self.targets_]]

@@ -35,8 +35,7 @@ class Columns:
         compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
         reference = _among(monitor.reference or [], columns, "reference")
         inputs = [name for name in columns if name not in reference]
-        names = np.array(inputs, dtype=object)
-        places = [positions_of(one.targets, len(inputs), names) for one in compensators]
+        places = [positions_of(one.targets, len(inputs), inputs) for one in compensators]
         own = [inputs[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
         targets = _responses(monitor, inputs, own)
         return cls(inputs, reference, targets, inputs if compensators else targets, _units(monitor, columns, targets))

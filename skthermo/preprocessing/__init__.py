@@ -6,15 +6,13 @@ It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits
 from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
-from skthermo.preprocessing._lags import LagFeatures
-from skthermo.preprocessing._memory import ExponentialMeans, MemoryFindings, find_memory
 from skthermo.preprocessing._mode_tracker import ModeTracker
+from skthermo.preprocessing._past import ExponentialMeans, LagFeatures, MemoryFindings, find_memory
 from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
 from skthermo.preprocessing.checks import (
     RecordFindings,
     SetAside,
     check_records,
-    gross_errors,
     residual_trend,
     set_aside,
 )
@@ -34,7 +32,6 @@ __all__ = [
     "SetAside",
     "check_records",
     "find_memory",
-    "gross_errors",
     "residual_trend",
     "set_aside",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 from datetime import timedelta
 from numbers import Integral, Real
 
@@ -10,19 +11,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import NORMAL, Array, as_floats, robust_deviation
+from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
 from skthermo._tables.frames import (
     Table,
-    as_duration,
-    check_positions_are_names,
+    check_duration,
     frame_like,
     has_stamps,
     positions_of,
     row_times,
 )
 from skthermo._validation import Interval
+from skthermo.preprocessing._folds import (
+    MOST_LEARNED,
+    Grams,
+    WeatherBasis,
+    distances_from_neighbours,
+    without_far,
+)
 from skthermo.preprocessing._records import RecordTransformer
-from skthermo.preprocessing._weather_regression import WeatherRegression
 
 LEAST_WINDOW = 3  # rows
 
@@ -107,8 +113,7 @@ class HampelFilter(RecordTransformer):
     def _learn(self, X: Table, values: NDArray) -> None:
         self.targets_, self.regression_ = np.arange(values.shape[1]), None
         if self.targets is not None:
-            check_positions_are_names(self.targets, getattr(X, "columns", ()))
-            self.targets_ = positions_of(self.targets, values.shape[1], getattr(self, "feature_names_in_", None))
+            self.targets_ = positions_of(self.targets, values.shape[1], getattr(X, "columns", ()))
             floats = as_floats(values)
             self.regression_ = WeatherRegression.of(np.delete(floats, self.targets_, axis=1), floats[:, self.targets_])
         self.deviations_ = np.full(values.shape[1], np.nan)
@@ -144,20 +149,30 @@ class HampelFilter(RecordTransformer):
             return int(self.window)
         if not has_stamps(X):
             raise ValueError(f"window is {self.window!r}, but X has no DatetimeIndex; expected a number of rows")
-        return pd.Timedelta(as_duration(self.window, "window"))
+        return check_duration(self.window, "window", may_be_zero=False)
 
 
-def distances_from_neighbours(values: Array, times: Array, window: int | pd.Timedelta) -> tuple[Array, Array]:
-    """Distance of each value from the median of its neighbours in time, and the standard deviation of the distances.
+@dataclass(frozen=True)
+class WeatherRegression:
+    """Frequencies as piecewise-linear functions of the weather."""
 
-    That is estimated by the median of the neighbours' distances.
-    """
-    order = np.argsort(times, kind="stable")
-    table = pd.DataFrame(values[order])
-    if isinstance(window, pd.Timedelta):
-        table.index = pd.to_datetime(times[order], unit="ns")
-    around = {"window": window, "center": True, "min_periods": 1}
-    distances = table - table.rolling(**around).median()
-    local = NORMAL * distances.abs().rolling(**around).median()
-    back = np.argsort(order)
-    return distances.to_numpy()[back], local.to_numpy()[back]
+    basis: WeatherBasis
+    coefficients: Array
+    centre: Array
+
+    @classmethod
+    def of(cls, temperatures: Array, frequencies: Array) -> WeatherRegression:
+        """Learn from records, the second time without what was far away the first time."""
+        rows = spread_evenly(np.arange(len(temperatures)), MOST_LEARNED)
+        basis, known = WeatherBasis.of(temperatures), frequencies[rows]
+        centre = median(known)
+        inputs, values = basis.lines(basis.coordinates(temperatures[rows])), known - centre
+        fold = np.ones(len(rows), dtype=np.intp)  # without fold 0, all are there
+        for _ in range(2):
+            coefficients = Grams.of(inputs, values, fold).coefficients()[0]
+            values = without_far(values, values - inputs @ coefficients.T)
+        return cls(basis, coefficients, centre)
+
+    def predict(self, temperatures: Array) -> Array:
+        """Frequencies, (n_samples, n_modes); NaN where no sensor has a value."""
+        return self.basis.lines(self.basis.coordinates(as_floats(temperatures))) @ self.coefficients.T + self.centre

@@ -14,7 +14,7 @@ from sklearn.utils import Bunch
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
-from skthermo._tables.frames import as_duration, as_stamps
+from skthermo._tables.frames import as_stamps, check_duration
 from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing._poles import (
@@ -263,7 +263,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
             )
         if stamps.hasnans or len(stamps) < 2:
             raise ValueError(f"X has {len(stamps)} stamps, some of them missing or alone; expected two or more")
-        duration = as_duration(self.follow, "follow")
+        duration = check_duration(self.follow, "follow", may_be_zero=False).to_timedelta64()
         step = np.median(np.diff(stamps.as_unit("ns").asi8[order]))
         n_records = duration.astype(np.int64) / max(step, 1)
         if n_records < 1:

@@ -19,7 +19,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._estimators.memory import remembered
 from skthermo._estimators.threads import single_blas_thread
-from skthermo._tables.arrays import Array, as_columns, check_flag, columns_by_name
+from skthermo._tables.arrays import Array, as_columns, by_name, check_flag
 from skthermo._tables.frames import (
     Table,
     check_same_rows,
@@ -199,7 +199,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
             NaN if fewer than two rows are complete.
         """
         predicted = self.predict(X)
-        targets = y if self.parameter_names_ is None else columns_by_name(y, self.parameter_names_, "y")
+        targets = by_name(y, self.parameter_names_, "y") if self.parameter_names_ and hasattr(y, "columns") else y
         return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
 
     def _default_part(self, name: str) -> BaseEstimator | None:

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import Array, seem_rad_per_s
+from skthermo._tables.arrays import Array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, mac
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
@@ -18,6 +18,7 @@ DISTANCE_AT_BOUND = 1e-4
 """Distance from a bound, as a share of the box, below which a parameter counts as being at the bound."""
 
 LARGE_ERROR = 15.0  # error of a frequency of the updated model, in percent, above which a warning is given
+RAD_PER_S = 0.15  # error of frequencies over 2 pi, below which rad/s may have been given in place of Hz
 LARGE_DEVIATION = 1e4  # multiple of the smallest standard deviation above which a parameter is not determined
 NOISE_LIMIT = 10.0  # error of a frequency, in standard deviations, that noise does not explain
 SAME_OPTIMUM = 1e-3  # difference of multipliers below which two starts have ended at the same optimum
@@ -127,7 +128,8 @@ def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[Mo
     """Warnings about frequencies of the updated model that noise cannot explain."""
     far = table["error_after"].abs() > LARGE_ERROR
     if far.any():
-        units = " (rad/s instead of Hz?)" if seem_rad_per_s(table["measured"] / table["after"]) else ""
+        off = (table["measured"] / table["after"] / (2 * np.pi) - 1).abs().dropna()
+        units = " (rad/s instead of Hz?)" if len(off) and (off < RAD_PER_S).all() else ""
         yield ModelWarning(
             f"the updated model misses the frequencies {table.index[far].tolist()} by more than {LARGE_ERROR:g} "
             f"%{units}. Give frequencies in Hz, in the order of the model's modes, or correct the model",

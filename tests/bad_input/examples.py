@@ -1395,8 +1395,7 @@ fitted(
 )
 RECORDS = {"temperatures": (T, weather(T, fixed=False)), "frequencies": (F, frequencies(F, fixed=False))}
 MODEL = (TRUSS, {cause: value for cause, value in models().items() if cause != "None"})
-for name in ("check_records", "gross_errors"):
-    use(f"preprocessing.{name}", **RECORDS, model=MODEL)
+use("preprocessing.check_records", **RECORDS, model=MODEL)
 use(
     "preprocessing.set_aside",
     lambda **a: preprocessing.set_aside(**a).others,
@@ -1808,7 +1807,6 @@ UNTRIED |= {
     "fem.AffineModel": {"contents"},
     "preprocessing.ExponentialMeans": {"sensors", "time_constants"},
     "preprocessing.check_records": {"unit"},
-    "preprocessing.gross_errors": {"unit"},
     "preprocessing.set_aside": {"exclude", "is_baseline", "needs_all"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
     "studies.DetectabilityStudy": {"memory", "models", "n_replicates"},

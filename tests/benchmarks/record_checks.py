@@ -21,8 +21,8 @@ import pandas as pd
 from slow_soil import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
-from skthermo.preprocessing import HampelFilter, check_records, checks, set_aside
-from skthermo.preprocessing.checks._kinds import SET_ASIDE
+from skthermo.preprocessing import HampelFilter, check_records, set_aside
+from skthermo.preprocessing.checks._findings import SET_ASIDE
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
@@ -312,7 +312,7 @@ def found(T, F):
 def gross_found(T, F):
     """Kinds of gross errors that are found in two tables, or in either alone."""
     tables = [(T, F), (T, None), (None, F)]
-    return {what for pair in tables for what in checks.gross_errors(*pair).table["what"]}
+    return {what for pair in tables for what in check_records(*pair).table["what"]}
 
 
 def print_set_aside(records):

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from skthermo.commands._looking import DAYS, look_at
-from skthermo.commands._record_files import CsvFormat, read_file
+from skthermo.commands._record_files import DAYS, CsvFormat, look_at, read_file
 from tests.commands.folders import run
 from tests.nights import by_day
 

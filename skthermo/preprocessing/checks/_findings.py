@@ -1,339 +1,261 @@
-"""Looks at records before anything is learned from them."""
+"""What is found in records: its kinds, what each one means and what to do; as a table, text, warnings and an error."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Collection, Hashable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, columns_by_sensor, row_times
-from skthermo.preprocessing._folds import BlockedKFold
-from skthermo.preprocessing._hampel import distances_from_neighbours
-from skthermo.preprocessing._memory import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
-from skthermo.preprocessing._weather_regression import WeatherBasis, out_of_fold
-from skthermo.preprocessing.checks._gross import CleanedRecords
-from skthermo.preprocessing.checks._kinds import Finding
-from skthermo.preprocessing.checks._reading import finding, period_of
-from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table
-from skthermo.preprocessing.checks._signs import (
-    Inputs,
-    TimeShift,
-    best_shift,
-    explained,
-    largest_step,
-    stuck_columns,
-    swapped_modes,
-    trend_table,
-    with_past,
+from skthermo._tables.frames import midnight
+from skthermo._tables.saved_frames import SavesFrames
+from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing._past import MemoryFindings
+
+MEANINGLESS, DOUBTFUL = "meaningless", "doubtful"
+COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
+MOST_NAMED = 12  # findings of one kind that a sentence lists
+
+WARNINGS = {
+    "no-table": "what is given is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
+    "two-dimensional array of numbers, a row for each record",
+    "no-numbers": "columns hold something other than numbers: {}. Nothing can be learned from them. Convert or drop "
+    "these columns",
+    "column-names": "column names are ambiguous: {}. Columns are matched by name, so that one would be read as "
+    "another. Give every column a name of its own, one text each",
+    "different-rows": "the tables have different rows: {}. Frequencies would be compared with the temperatures of "
+    "other times. Join the tables by their times",
+    "no-rows": "there are too few records: {}. Nothing can be learned from them. Give the records of a year, or at "
+    "least of weeks",
+    "few-rows": "there are few records: {}. Outliers, shifts and trends cannot be distinguished from chance. Give the "
+    "records of a year, or at least of weeks",
+    "missing-stamps": "rows have no time: {}. Their place among the others is unknown. Drop these rows, or give their "
+    "times",
+    "equal-stamps": "all rows have the same time: {}. Order and duration of the records are unknown. Give each row "
+    "its own time",
+    "stamps-from-numbers": "times come from numbers that were read in the wrong unit: {}. Days would count as "
+    "fractions of a second. Convert them by pandas.to_datetime with format= or unit=",
+    "stamps-as-text": "the index holds times that are no DatetimeIndex: {}. Rows would count as equally spaced, in "
+    "the given order. Convert the index by pandas.to_datetime",
+    "repeated-stamps": "times occur more than once: {}. Lags and memory cannot know which of the rows was earlier. "
+    "Keep one row for each time, such as by groupby(level=0).mean()",
+    "unsorted-stamps": "rows are not in order of time: {}. Folds and lags take rows for periods of time. Sort them by "
+    "sort_index()",
+    "missing-column": "a column has no value: {}. Nothing can be learned from it. Leave it out, or check why it is "
+    "empty",
+    "infinite-values": "values are infinite or too large to be squared: {}. They count as missing. Put NaN there",
+    "placeholders": "values stand for missing ones: {}. They count as missing. Put NaN there",
+    "isolated-level": "values far from all others repeat exactly: {}. They count as missing. Put NaN there",
+    "another-level": "values are far from all others: {}. They count as missing. Put NaN there",
+    "implausible-values": "values are implausible: {}. They count as missing. Put NaN there",
+    "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "
+    "infinite. Leave it out",
+    "few-values": "a column has very few different values: {}. Its resolution hides the effect of the weather. Check "
+    "rounding and the settings of the logger",
+    "equal-columns": "columns are equal: {}. One channel counts twice, and another is missing. Keep one of them, and "
+    "check where the other was read from",
+    "not-positive": "frequencies are zero or negative: {}. They count as missing. Put NaN where a mode was not "
+    "identified",
+    "kelvin": "temperatures look like kelvin: {}. Bounds and reports are in degrees Celsius. Subtract 273.15",
+    "fahrenheit": "temperatures look like degrees Fahrenheit: {}. Frost and reports would be wrong by many degrees. "
+    "Convert them by (T - 32) / 1.8",
+    "scaled-temperatures": "temperatures look like fractions of a degree: {}. Frost and reports would be wrong by "
+    "that factor. Divide them by the factor",
+    "opposite-signs": "a sensor falls where the others rise: {}. Means of the sensors would cancel, and its summer "
+    "would count as frost. Check its sign",
+    "exchanged-tables": "temperatures and frequencies look exchanged: {}. Temperatures would be predicted from "
+    "frequencies. Exchange the two tables",
+    "temperatures-are-frequencies": "a column stands in both tables: {}. The frequency would predict itself and hide "
+    "all damage. Give temperatures only in the first table",
+    "number-of-modes": "frequencies and model have different numbers of modes: {}. A column would be read as another "
+    "mode. Give a column for each mode of the model, or the model with_modes of the columns",
+    "unit-of-frequencies": "frequencies are in another unit than the model's: {}. Changes of the frequencies would be "
+    "wrong by that factor. Convert them to Hz",
+    "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as those of another mode or "
+    "unit. Convert it to Hz, or order the columns as the model's modes",
+    "stuck-sensor": "values of a sensor only repeat: {}. They count as missing. Put NaN where it is stuck",
+    "stuck-mode": "values of a mode only repeat: {}. They count as missing. Put NaN where it is stuck",
+    "no-thermal-effect": "the temperatures explain nothing of the frequencies: {}. Nothing can be compensated by "
+    "them. Check whether the rows of both tables belong together",
+    "time-shift": "temperatures of other rows explain the frequencies better: {}. The weather of another time would "
+    "be learned. Join the tables by their times",
+    "exchanged-modes": "modes look exchanged in some rows: {}. The scatter of both would hide damage. Exchange them "
+    "back, or track modes by shape",
+    "frequency-outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}. "
+    "They widen the spread of a baseline. Put NaN where a value is wrong, as HampelFilter does",
+    "thermal-memory": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
+    "taken for changes of the structure. Append these means to the inputs of the regression",
+    "sudden-change": "frequencies change at once by what the weather does not explain: {}. Both levels would be "
+    "learned as healthy. Fit on records of one structure, in one state and by one way of identification",
+    "trend": "what the weather leaves of the frequencies has a trend: {}. A detector takes a trend that goes on for "
+    "damage. Check whether the structure or a sensor drifts",
+}
+"""By kind: what was found, with a place for details; what follows from it; what to do."""
+
+ARE_MEANINGLESS = frozenset(
+    {
+        *("no-table", "no-numbers", "column-names", "different-rows", "no-rows", "missing-stamps", "equal-stamps"),
+        *("stamps-from-numbers", "missing-column", "constant", "kelvin", "exchanged-tables", "number-of-modes"),
+        *("temperatures-are-frequencies", "unit-of-frequencies"),
+    }
 )
+"""Kinds with which no result of a fit means anything."""
 
-LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
-MOST_FITTED = 20_000  # rows, evenly spread, that a trend is fitted to
-NOTHING = 0.02  # share of a mode's variance that counts as explained by chance
-WINDOW = 25  # rows that are neighbours of a value
-OUTLYING = 8.0  # robust deviations from the neighbours, and from what the weather explains, of an outlier
-INERTIA = 24  # rows by which a structure may follow the weather late, where their times are not known
-SHORTEST_TREND = pd.Timedelta(days=90)  # of records; in fewer it may be the season
-CERTAIN = 5.0  # standard errors of a trend
-LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that matters changes them
-LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
-IMPLAUSIBLE = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
-PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
+SET_ASIDE = frozenset(
+    {
+        *("infinite-values", "placeholders", "isolated-level", "another-level", "implausible-values", "not-positive"),
+        *("stuck-sensor", "stuck-mode"),
+    }
+)
+"""Kinds of values that cannot be, which count as missing."""
+
+IMPOSSIBLE = frozenset({"infinite-values", "placeholders", "not-positive"})
+"""Those which cannot be in any state of a structure."""
+
+LEFT_OUT = frozenset({"missing-column", "constant"})
+"""Kinds of columns that say nothing."""
+
+UNWARNED = SET_ASIDE | {"few-rows"}
+"""Estimators set values aside, or need more records, and warn of that."""
 
 
-def check_records(temperatures: Any, frequencies: Any, *, unit: str = "Hz", model: Any = None) -> RecordFindings:
-    """Look at temperatures and frequencies for faults that would otherwise be learned.
+class Finding(NamedTuple):
+    """What was found in a column, in how many rows, from which row to which, and a sentence that says more."""
 
-    It looks for gross errors first: what is no table of numbers, wrong times, numbers that stand for missing values,
-    other units, empty, constant or equal columns, tables that are exchanged or have different rows. Whatever it is
-    given as a table, it does not fail. Such values are then left out, and it looks for sensors and modes that are
-    stuck, weather that explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory,
-    steps and trends. A finding is a reason to look at the records, no proof of a fault.
+    what: str
+    column: Hashable
+    n_rows: int
+    first: Hashable
+    last: Hashable
+    detail: str
+
+    @classmethod
+    def of(
+        cls, index: pd.Index, what: str, column: Hashable, rows: NDArray, detail: str, *, period: bool = False
+    ) -> Finding:
+        """A finding in some rows of an index, which the detail may end with."""
+        if not len(rows):
+            return cls(what, column, 0, None, None, detail)
+        where = f", {period_of(index, rows)}" if period else ""
+        return cls(what, column, len(rows), index[rows[0]], index[rows[-1]], detail + where)
+
+
+def period_of(index: pd.Index, rows: NDArray) -> str:
+    """First and last of some rows, as a sentence names them."""
+    first, last = label_of(index[rows[0]]), label_of(index[rows[-1]])
+    return f"{first} to {last}" if len(rows) > 1 else first
+
+
+def label_of(label: Any) -> str:
+    """How a sentence names a row: by its date, by its time, or by its label."""
+    if not isinstance(label, pd.Timestamp) or label is pd.NaT:
+        return f"row {label}"
+    return f"{label:%Y-%m-%d}" if label == midnight(label) else f"{label:%Y-%m-%d %H:%M}"
+
+
+def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
+    """Findings one by one as a table, with what follows from each if the records are used, and what to do."""
+    rows = []
+    for found in findings:
+        severity = MEANINGLESS if found.what in ARE_MEANINGLESS else DOUBTFUL
+        rows.append([*found, severity, *WARNINGS[found.what].split(". ")[1:3]])
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+@dataclass(frozen=True, repr=False)
+class RecordFindings(SavesFrames):
+    """What `check_records` has found.
 
     Parameters
     ----------
-    temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
-        In degrees Celsius; NaN is allowed.
-    frequencies : array-like or DataFrame of shape (n_samples, n_modes)
-        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed.
-    unit : str, default="Hz"
-        Unit of the second table, as the findings give it: "" for parameters, which are multipliers. Values in Hz have
-        to be positive.
-    model : FEModel, optional
-        The second table's modes are compared with its nominal frequencies, which shows other units and other modes.
-
-    Returns
-    -------
-    RecordFindings
-        Its ``table`` has a row for each finding, ``summary()`` a line.
-
-    Raises
-    ------
-    ValueError
-        If the unit is no text, or the model no FE model. Tables never raise an error.
-
-    See Also
-    --------
-    HampelFilter : Puts NaN in place of outliers.
-    find_memory : Means of earlier temperatures that explain the frequencies, also those of hours.
-    residual_trend : The trend of residuals of any regression.
-
-    Notes
-    -----
-    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` what its findings mean. The ``severity`` of a
-    gross error is "meaningless" if results of a fit would be.
+    table : DataFrame
+        A row for each finding: ``what`` was found (its code in the guide) in which ``column``, in how many rows
+        (``n_rows``), ``from`` and ``to`` which row by the labels of the records' index, a sentence that says more
+        (``detail``), its ``severity`` ("meaningless" if results of a fit would be, else "doubtful"), its
+        ``consequence``, and the ``action`` to take. Empty where nothing was found.
+    n_rows : int
+        Number of records.
+    outliers : DataFrame of bool of shape (n_records, n_modes), optional
+        Which frequencies are outliers, on the records' index.
+    memory : MemoryFindings, optional
+        What `find_memory` has found; None where nothing was looked for.
 
     Examples
     --------
     >>> from skthermo.datasets import make_truss_campaign
     >>> from skthermo.preprocessing import check_records
     >>> year = make_truss_campaign(random_state=0)
+    >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
     >>> print(check_records(year.temperatures, year.frequencies))
-    No finding in 365 records.
-    >>> late = year.frequencies.shift(60)
-    >>> check_records(year.temperatures, late).table[["what", "n_rows"]]
-             what  n_rows
-    0  time-shift     305
+    1 finding in 365 records.
+    stuck-sensor: 'T1' is 20 °C in 31 rows, 2025-12-01 to 2025-12-31
+        They count as missing. Put NaN where it is stuck
     """
-    tables = {"temperatures": temperatures, "frequencies": frequencies}
-    cleaned = CleanedRecords.of(tables, unit=unit, model=model)
-    if not cleaned.belong_together:
-        return RecordFindings(findings_table(cleaned.findings), cleaned.n_rows, cleaned.outliers())
-    records = _Records.of(cleaned, f" {unit}" if unit else "")
-    findings = [*cleaned.findings, *_stuck(records)]  # its rows then are NaN, and so on
-    findings += _against_weather(records) if records.n_usable >= LEAST_ROWS else _implausible(records)
-    far = cleaned.outliers()
-    far.iloc[records.order] |= records.outliers
-    return RecordFindings(findings_table(findings), cleaned.n_rows, far, records.memory)
 
-
-@dataclass
-class _Records:
-    """Records in order of time; what is found to be wrong becomes NaN."""
-
-    T: Array
-    F: Array
-    sensors: list[Hashable]
-    modes: list[Hashable]
-    order: NDArray[np.intp]
-    index: pd.Index
-    unit: str
-    outliers: NDArray[np.bool_]
-    has_faulty_sensors: bool = False
-    has_wrong_times: bool = False
+    table: pd.DataFrame
+    n_rows: int
+    outliers: pd.DataFrame | None = None
     memory: MemoryFindings | None = None
 
-    @classmethod
-    def of(cls, cleaned: CleanedRecords, unit: str) -> _Records:
-        """Of every sensor what it shows at that time, and of rows with one time the first."""
-        T, F = cleaned.readings
-        sensors = columns_by_sensor(T)
-        rows, index = T.whole, pd.RangeIndex(len(T.values))
-        if cleaned.have_times:
-            rows = np.flatnonzero(~T.index.duplicated())
-            index = T.index[rows]
-        elif not isinstance(T.index, pd.DatetimeIndex):
-            index = T.index
-        values, modes = (cleaned.useful_values(reading)[rows] for reading in (T, F))
-        now = values[:, [places[0] for places in sensors.values()]]
-        outliers = np.zeros((len(rows), len(F.columns)), dtype=bool)
-        records = cls(now, modes, list(sensors), F.columns, T.order[rows], index, unit, outliers)
-        records.has_faulty_sensors = cleaned.have_faulty_sensors
-        records.has_wrong_times = cleaned.have_wrong_times
-        return records
+    def summary(self) -> str:
+        """A line for each finding, and for each kind a line with its consequence and what to do.
 
-    @property
-    def n_usable(self) -> int:
-        """Number of rows with a temperature and a frequency."""
-        return int((~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)).sum())
+        Returns
+        -------
+        str
+            Text of several lines; a single one where nothing was found.
+        """
+        if self.table.empty:
+            return f"No finding in {self.n_rows} records."
+        lines = [f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."]
+        for kind, rows in self.table.groupby("what", sort=False):
+            lines += [f"{kind}: {detail}" for detail in rows["detail"]]
+            lines.append(f"    {rows['consequence'].iloc[0]}. {rows['action'].iloc[0]}")
+        return "\n".join(lines)
 
-    @property
-    def hours(self) -> float | None:
-        """Median time between records; None where they have no stamps."""
-        if not isinstance(self.index, pd.DatetimeIndex):
-            return None
-        return max(pd.Series(self.index).diff().median().total_seconds() / 3600, 1e-6)
+    def __repr__(self) -> str:
+        return self.summary()
 
-    @property
-    def inertia(self) -> int:
-        """Number of rows by which a structure may follow the weather late: a day, at least one."""
-        return INERTIA if self.hours is None else max(int(24 / self.hours), 1)
+    def warnings(self, *, exclude: Collection[str] = ()) -> Iterator[RecordsWarning]:
+        """One warning for each kind of finding.
 
-    def finding(self, what: str, column: Hashable, rows: NDArray[np.intp], detail: str) -> Finding:
-        return finding(self.index, what, column, rows, detail)
+        Parameters
+        ----------
+        exclude : collection of str, default=()
+            Kinds of findings of which there is no warning.
 
-    def period(self, rows: NDArray[np.intp]) -> str:
-        return period_of(self.index, rows)
+        Yields
+        ------
+        RecordsWarning
+            Its ``kind`` is what was found.
+        """
+        for kind, rows in self.table.groupby("what", sort=False):
+            if kind not in UNWARNED.union(exclude):
+                yield RecordsWarning(WARNINGS[kind].format(listed_details(rows["detail"])), kind)
 
+    def refuse_meaningless(self, *, exclude: Collection[str] = ()) -> None:
+        """Raise an error that lists everything with which results of a fit would be meaningless.
 
-def _stuck(records: _Records) -> Iterator[Finding]:
-    for what, table, names, unit in (
-        ("stuck-sensor", records.T, records.sensors, " °C"),
-        ("stuck-mode", records.F, records.modes, records.unit),
-    ):
-        for place, rows in stuck_columns(table):
-            name, value = names[place], table[rows[0], place]
-            detail = f"{name!r} is {value:.6g}{unit} in {len(rows)} rows, {records.period(rows)}"
-            yield records.finding(what, name, rows, detail)
-            table[rows, place] = np.nan
-            records.has_faulty_sensors |= table is records.T
+        Parameters
+        ----------
+        exclude : collection of str, default=()
+            Kinds of findings that do no harm to what is done with the records.
 
-
-def _against_weather(records: _Records) -> Iterator[Finding]:
-    basis = WeatherBasis.of(records.T)
-    places = basis.coordinates(records.T)
-    lines, past = basis.lines(places), with_past(places)
-    folds = BlockedKFold().fold_of(_with_stamps(records))
-    yield from _exchanged(records, lines, folds)
-    yield from _outliers(records, lines, folds)
-    slow = list(_slow_means(records))
-    changes, level = _changes(records, np.hstack([lines, past, *(inputs for _, inputs in slow)]))
-    F = records.F - level  # a step or a trend would pass for a season of another time
-    share = explained(lines, F, folds)
-    usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
-    shift = best_shift(lines, past, places, F, folds, records.inertia)
-    if shift is not None:
-        yield records.finding("time-shift", "", *_shifted(records, shift))
-        return
-    if len(share) and (share < NOTHING).all() and not records.has_faulty_sensors:
-        detail = f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
-        yield records.finding("no-thermal-effect", "", usable, detail)
-        return
-    yield from (finding for finding, _ in slow)
-    yield from changes
+        Raises
+        ------
+        ValueError
+            If the severity of a finding is "meaningless".
+        """
+        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(exclude))]
+        if len(severe):
+            kinds = severe.groupby("what", sort=False)
+            texts = [WARNINGS[kind].format(listed_details(rows["detail"])) for kind, rows in kinds]
+            raise ValueError(". ".join(text[0].upper() + text[1:] if n else text for n, text in enumerate(texts)))
 
 
-def _with_stamps(records: _Records) -> Table:
-    return pd.DataFrame(index=records.index) if isinstance(records.index, pd.DatetimeIndex) else records.T
-
-
-def _slow_means(records: _Records) -> Iterator[tuple[Finding, Array]]:
-    """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
-    names = {type(name) for name in (*records.sensors, *records.modes)}
-    if (
-        records.has_faulty_sensors
-        or records.has_wrong_times
-        or names != {str}
-        or len(set(records.modes)) < len(records.modes)
-    ):
-        return
-    tables = ((records.T, records.sensors), (records.F, records.modes))
-    found = find_memory(*(pd.DataFrame(values, records.index, names) for values, names in tables))
-    records.memory = found
-    chosen = found.table[found.table["chosen"].astype(bool)]
-    usable = np.flatnonzero(~np.isnan(records.F).all(axis=1))
-    for (constant, sensor), part in chosen.groupby(["time_constant", "sensor"], sort=False):
-        duration = pd.Timedelta(constant)
-        if duration >= WEEKS:
-            times, length = records.index.as_unit("ns").asi8, duration.as_unit("ns").value
-            mean = trailing_means(times, records.T[:, [records.sensors.index(sensor)]], length)
-            before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
-            detail = (
-                f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the out-of-fold error by "
-                f"{part['fall'].mean():.0%}: ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
-            )
-            inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-            yield records.finding("thermal-memory", sensor, usable, detail), inputs
-
-
-def _exchanged(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
-    for (first, second), rows in swapped_modes(lines, records.F, folds):
-        names = f"{records.modes[first]!r} and {records.modes[second]!r}"
-        n_both = int((~np.isnan(records.F[:, [first, second]])).all(axis=1).sum())
-        detail = f"{names} in {len(rows)} of {n_both} rows, {records.period(rows)}"
-        yield records.finding("exchanged-modes", names, rows, detail)
-        records.F[np.ix_(rows, [first, second])] = records.F[np.ix_(rows, [second, first])]
-
-
-def _outliers(records: _Records, lines: Array, folds: NDArray[np.intp]) -> Iterator[Finding]:
-    F, has_weather = records.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
-    rest = F - np.where(has_weather, out_of_fold(lines, F, folds), median(F))
-    distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
-    floor = PREDICTABLE * robust_deviation(F)
-    deviation = np.fmax(robust_deviation(rest), floor)
-    local = np.fmax(np.fmax(local, robust_deviation(distances)), floor)
-    with np.errstate(invalid="ignore"):
-        far = (np.abs(distances) > OUTLYING * local) & (np.abs(rest - median(rest)) > OUTLYING * deviation)
-    yield from _outliers_found(records, far & (deviation > 0) & (has_weather | _are_implausible(F)))
-
-
-def _implausible(records: _Records) -> Iterator[Finding]:
-    yield from _outliers_found(records, _are_implausible(records.F))
-
-
-def _are_implausible(F: Array) -> NDArray[np.bool_]:
-    """Values of twice or half the median of their mode, which need no weather to be doubtful."""
-    middle, deviation = median(F), robust_deviation(F)
-    with np.errstate(invalid="ignore"):
-        far = (IMPLAUSIBLE * middle < F) | (middle / IMPLAUSIBLE > F)
-        return far & (middle > 0) & (np.abs(F - middle) > OUTLYING * deviation)
-
-
-def _outliers_found(records: _Records, far: NDArray[np.bool_]) -> Iterator[Finding]:
-    F = records.F
-    for name, column, is_far in zip(records.modes, F.T, far.T, strict=True):
-        rows = np.flatnonzero(is_far)
-        if len(rows):
-            n_known = int((~np.isnan(column)).sum())
-            detail = (
-                f"{name!r} in {len(rows)} of {n_known} rows, the first {column[rows[0]]:.4g}{records.unit} in "
-                f"{records.period(rows[:1])}"
-            )
-            yield records.finding("frequency-outliers", name, rows, detail)
-    F[far] = np.nan
-    records.outliers |= far
-
-
-def _shifted(records: _Records, shift: TimeShift) -> tuple[NDArray[np.intp], str]:
-    rows = np.arange(max(shift.rows, 0), len(records.F) + min(shift.rows, 0))
-    length, direction = "", "before" if shift.rows > 0 else "after"
-    if records.hours is not None:
-        hours = abs(shift.rows) * records.hours
-        length = f" (about {hours:.3g} hours)" if hours < 48 else f" (about {hours / 24:.3g} days)"
-    detail = (
-        f"those of {abs(shift.rows)} rows {direction}{length} explain {shift.explained:.0%} of the variance out of "
-        f"fold, those of the same rows {shift.unshifted:.0%}"
-    )
-    return rows, detail
-
-
-def _changes(records: _Records, inputs: Array) -> tuple[list[Finding], Array]:
-    """Steps and trends that are found beside the weather, and what they add to each frequency."""
-    level = np.zeros(records.F.shape)
-    found: list[Finding] = []
-    rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
-    F, index = records.F[rows], records.index[rows]
-    timed = isinstance(index, pd.DatetimeIndex)
-    if records.has_faulty_sensors or records.has_wrong_times or (timed and index[-1] - index[0] < SHORTEST_TREND):
-        return found, level
-    times = row_times(pd.DataFrame(index=records.index))
-    beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
-    for mode, name in enumerate(records.modes):
-        known = np.flatnonzero(~np.isnan(records.F[:, mode]))
-        of_frequency = LEAST_OF_ALL * deviations[mode]
-        row = trend_table(beside, F[:, [mode]], times[rows], [name], timed).iloc[0]
-        step = largest_step(beside, F[:, mode])
-        if step is not None and abs(step.change) > max(CERTAIN * step.standard_error, of_frequency):
-            level[rows[step.row] :, mode] = step.change
-            detail = f"{name!r} changes by {step.change:+.2g}{records.unit} about {records.period(rows[[step.row]])}"
-            found.append(
-                records.finding("sudden-change", name, known, f"{detail}, standard error {step.standard_error:.1g}")
-            )
-            continue
-        change, error = row["change"], row["standard_error"]
-        scatter = error * np.sqrt(row["n_independent"] / 12)
-        if not (abs(change) > CERTAIN * error and abs(change) > max(LEAST_CHANGE * scatter, of_frequency)):
-            continue
-        level[:, mode] = change * (times - times[0]) / np.ptp(times)
-        a_year = f" ({row['per_year']:+.2g}{records.unit} a year)" if timed else ""
-        detail = (
-            f"{name!r} changes by {change:+.2g}{records.unit}, standard error {error:.1g}{a_year}; first fifth "
-            f"{row['first']:+.2g}{records.unit}, last fifth {row['last']:+.2g}{records.unit}"
-        )
-        found.append(records.finding("trend", name, known, detail))
-    return found, level
+def listed_details(details: pd.Series) -> str:
+    """Details of findings one after the other, not more than a reader can take in."""
+    rest = len(details) - MOST_NAMED
+    return "; ".join([*details[:MOST_NAMED], *([f"and {rest} more"] if rest > 0 else [])])

@@ -1,27 +1,51 @@
-"""Values that cannot be count as missing, and columns of which most are such, or that say nothing, are left out."""
+"""What is set aside before anything is learned: values that cannot be, columns of which most are such, wrong rows."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_each
-from skthermo._tables.frames import Table, frame_like
+from skthermo._tables.arrays import Array, check_model, spread_evenly
+from skthermo._tables.frames import MARKERS, Table, as_stamps, frame_like
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing.checks._gross import CleanedRecords
-from skthermo.preprocessing.checks._kinds import IMPOSSIBLE, LEFT_OUT, SET_ASIDE, Finding
-from skthermo.preprocessing.checks._reading import Reading
-from skthermo.preprocessing.checks._record_findings import RecordFindings, findings_table, listed_details
-from skthermo.preprocessing.checks._signs import stuck_columns
+from skthermo.preprocessing.checks._columns import (
+    MOST_COMPARED,
+    Reading,
+    compare_with_model,
+    look_at_responses,
+    look_at_temperatures,
+    stuck_columns,
+)
+from skthermo.preprocessing.checks._findings import (
+    IMPOSSIBLE,
+    LEFT_OUT,
+    SET_ASIDE,
+    Finding,
+    RecordFindings,
+    findings_table,
+    label_of,
+    listed_details,
+    period_of,
+)
 
 MOST, MANY = 0.5, 0.2
 """Shares of the values of a column, with more than which set aside the rest is not trusted: of any kind, and of values
 at another level, of which it is not certain which level is right."""
+NUMBERED = pd.Timestamp("1970-03-01")  # before which numbers that are read as nanoseconds fall
+SHORTEST_STEP = pd.Timedelta("1min")  # between records
+DATES = (19500101, 21001231)  # dates written as one integer
+WRONG_TIMES = {"missing-stamps", "equal-stamps", "stamps-from-numbers", "stamps-as-text"}
+FEW_WRONG = 0.01  # share of the rows in which a sensor may be wrong without a doubt on the others
+FEW_ROWS = 50
+STEADY, CHANGING = 0.1, 4.0  # quartile distance over the median of frequencies, and how often it is in temperatures
+NO_WEATHER = 30.0  # degrees, or the range of known ones, outside that range, which no weather gives
 
 
 @dataclass(frozen=True)
@@ -150,17 +174,21 @@ def set_aside(
     >>> int(found.temperatures["T1"].isna().sum())
     31
     """
-    tables = {"temperatures": temperatures, "frequencies": frequencies}
-    given = {what: table for what, table in tables.items() if table is not None}
-    records = CleanedRecords.of(given, unit=unit, model=model)
+    records = CleanedRecords(temperatures, frequencies, unit=unit, model=model)
     findings = findings_table(records.findings)
     kinds = (SET_ASIDE if is_baseline else IMPOSSIBLE).difference(exclude)
     harmless = SET_ASIDE | (set() if needs_all else LEFT_OUT) | set(exclude)
     others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
     others.refuse_meaningless()
+    cleaned: dict[str, Table] = {}
     left_out: dict[Hashable, str] = {}
-    for reading in records.readings:
-        _set_runs_aside(reading, exclude)
+    found: list[Finding] = []
+    for reading, table in zip(records.readings, records.given, strict=True):
+        what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
+        for place, rows in () if what in exclude else stuck_columns(reading.values):
+            name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
+            reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
+            reading.set_aside(what, rows, place)
         reading.restore(kinds)
         own = dict(_left_out(reading, exclude))
         if own and len(own) == len(reading.columns):
@@ -168,37 +196,25 @@ def set_aside(
                 f"no column of the {reading.what} can be used: {'; '.join(own.values())}; expected measurements"
             )
         left_out |= own
+        found += [one for one in reading.findings if one.what in LEFT_OUT.union(kinds)]
+        values = np.empty_like(reading.values)
+        values[reading.order] = reading.values
+        cleaned[reading.what] = frame_like(table, values, reading.columns)
     if needs_all and left_out:
         raise ValueError(f"columns cannot be used: {'; '.join(left_out.values())}; expected measurements in each")
-    found = [finding for reading in records.readings for finding in reading.findings]
-    cleaned = {one.what: _as_given(one, given[one.what]) for one in records.readings}
-    result = SetAside(
-        cleaned.get("temperatures"),
-        cleaned.get("frequencies"),
-        findings_table(one for one in found if one.what in LEFT_OUT.union(kinds)),
-        left_out,
-        others,
-    )
+    result = SetAside(cleaned.get("temperatures"), cleaned.get("frequencies"), findings_table(found), left_out, others)
     warn_each(result.warnings())
     return result
-
-
-def _set_runs_aside(reading: Reading, exclude: Collection[str]) -> None:
-    what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
-    for place, rows in () if what in exclude else stuck_columns(reading.values):
-        name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
-        reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
-        reading.set_aside(what, rows, place)
 
 
 def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hashable, str]]:
     """Columns that have no value or one, and those of which most values were set aside, each with a reason."""
     known = np.count_nonzero(reading.were_known, axis=0)
-    set_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
+    n_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
     for place, name in enumerate(reading.columns):
         own: list[Finding] = [found for found in reading.findings if found.column == name]
         elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
-        if set_aside[place] > MOST * known[place] or elsewhere > MANY * known[place]:
+        if n_aside[place] > MOST * known[place] or elsewhere > MANY * known[place]:
             yield name, "; ".join(found.detail for found in own if found.what in SET_ASIDE)
         else:
             useless = [found for found in own if found.what in LEFT_OUT and found.what not in exclude]
@@ -206,8 +222,204 @@ def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hash
                 yield name, f"{useless[0].detail} ({useless[0].what})"
 
 
-def _as_given(reading: Reading, table: Any) -> Table:
-    """The cleaned values in the rows of a table."""
-    values = np.empty_like(reading.values)
-    values[reading.order] = reading.values
-    return frame_like(table, values, reading.columns)
+class CleanedRecords:
+    """Temperatures, frequencies or both as numbers in order of time, NaN where a value is grossly wrong.
+
+    What was found on the way is in ``findings``. Statistics on both tables make sense only if they ``belong_together``.
+    """
+
+    def __init__(self, temperatures: Any, frequencies: Any, *, unit: str, model: Any):
+        if not isinstance(unit, str):
+            raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
+        given = {"temperatures": temperatures, "frequencies": frequencies}
+        self.given = [table for table in given.values() if table is not None]
+        self.readings = [Reading(table, what, unit) for what, table in given.items() if table is not None]
+        self.n_rows = max((len(reading.values) for reading in self.readings), default=0)
+        tables = [reading for reading in self.readings if reading.is_table]
+        for reading in tables:
+            frames = [one for one in self.readings if one.is_frame and len(one.values) == len(reading.values)]
+            reading.sort(reading.given_index if reading.is_frame or not frames else frames[0].given_index)
+        differing = _different_rows(*tables) if len(tables) == 2 else []
+        exchanged = _exchanged(*tables, in_hertz=unit == "Hz") if len(tables) == 2 else []
+        self.findings = [*differing, *_rows_found(tables)]
+        self.have_wrong_times = any(found.what in WRONG_TIMES for found in self.findings)
+        self.belong_together = len(tables) == 2 and not differing and not exchanged
+        for reading in tables if not exchanged and self.n_rows > 1 else []:
+            if reading.what == "temperatures":
+                look_at_temperatures(reading)
+            else:
+                look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=len(tables) == 2)
+                if model is not None and unit == "Hz":
+                    check_model(model)
+                    compare_with_model(reading, model)
+        for reading in self.readings:
+            self.findings += reading.findings
+        self.findings += exchanged
+
+    def outliers(self) -> pd.DataFrame | None:
+        """Which frequencies were put aside, in the rows and columns that were given; None where none were."""
+        F = self.readings[-1] if self.readings else None
+        if F is None or F.what != "frequencies":
+            return None
+        far = np.zeros(F.values.shape, dtype=bool)
+        far[F.order] = F.were_known & np.isnan(F.values)
+        return pd.DataFrame(far, F.given_index if F.is_frame else None, pd.Index(F.columns, tupleize_cols=False))
+
+    def useful_values(self, reading: Reading) -> Array:
+        """Values, NaN in columns that are constant or have very few different values."""
+        return np.where(np.isin(np.arange(len(reading.columns)), list(reading.useless)), np.nan, reading.values)
+
+
+def _different_rows(first: Reading, second: Reading) -> list[Finding]:
+    """Tables that differ in the number of rows or in their labels."""
+    what, here, there = "different-rows", first.given_index, second.given_index
+    if len(here) != len(there):
+        detail = f"{len(here)} rows of {first.what} and {len(there)} of {second.what}"
+        return [Finding(what, "", abs(len(here) - len(there)), None, None, detail)]
+    if not (first.is_frame and second.is_frame) or here.equals(there):
+        return []
+    differ = np.flatnonzero([one != other for one, other in zip(here, there, strict=True)])
+    row = differ[0] if len(differ) else 0
+    detail = (
+        f"{len(differ)} of {len(here)} rows have different labels, the first row {row}: {here[row]} and {there[row]}"
+    )
+    return [Finding(what, "", len(differ), here[row], here[differ[-1]], detail)]
+
+
+def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
+    """Columns that stand in both tables, or temperatures that are frequencies and frequencies that are none."""
+    modes = {content: name for name, content in F.contents()}
+    found, details = [], {}
+    for name, content in T.contents():
+        if content in modes:
+            details[name] = f"{name!r} of the temperatures equals {modes[content]!r}"
+    what = "temperatures-are-frequencies" if details else "exchanged-tables"
+    if not details and in_hertz and min(len(T.values), len(F.values)) >= FEW_ROWS:
+        (steady, is_positive), (changing, _) = _relative_change(T.values), _relative_change(F.values)
+        if is_positive and steady < min(STEADY, changing / CHANGING):
+            part = f"{steady:.1%} of their median, of the frequencies within {changing:.0%}"
+            details[""] = f"half of the temperatures lie within {part}"
+    for name, detail in details.items():
+        found.append(Finding.of(T.index, what, name, T.whole, detail, period=True))
+    return found
+
+
+def _relative_change(values: Array) -> tuple[float, bool]:
+    """Distance of the quartiles over the median of a typical column, and whether all columns are positive."""
+    some = values[spread_evenly(np.arange(len(values)), MOST_COMPARED)]
+    known = some[:, np.fmax.reduce(some) > np.fmin.reduce(some)]
+    if not known.size:
+        return np.nan, False
+    low, middle, high = np.nanquantile(known, [0.25, 0.5, 0.75], axis=0)
+    return float(np.median((high - low) / np.maximum(np.abs(middle), 1e-300))), bool((low > 0).all())
+
+
+def _rows_found(tables: list[Reading]) -> Iterator[Finding]:
+    """What is wrong with the times of rows, and whether few rows have a value in each table."""
+    indexes = [reading.given_index for reading in tables if reading.is_frame]
+    if len(indexes) == 2 and indexes[0].equals(indexes[1]):
+        del indexes[1]
+    for index in indexes:
+        yield from _stamps_found(index) if isinstance(index, pd.DatetimeIndex) else _labels_found(index)
+    if not tables:
+        return
+    n_rows = min(len(reading.values) for reading in tables)
+    is_known = np.ones(n_rows, dtype=bool)
+    for reading in tables:
+        is_known &= ~np.isnan(reading.values[:n_rows]).all(axis=1)
+    known = np.flatnonzero(is_known)
+    if len(known) < FEW_ROWS and (len(known) or not any(reading.findings for reading in tables)):
+        what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
+        yield Finding.of(tables[0].index, what, "", known, detail, period=True)
+
+
+def _stamps_found(index: pd.DatetimeIndex) -> Iterator[Finding]:
+    n_rows, everything = len(index), np.arange(len(index))
+    missing = np.flatnonzero(index.isna())
+    if len(missing):
+        detail = f"{len(missing)} of {n_rows} rows, the first row {missing[0]}"
+        yield Finding.of(index, "missing-stamps", "", missing, detail)
+        return
+    try:
+        stamps = index.as_unit("ns").asi8
+    except ValueError:  # beyond the years that nanoseconds reach
+        yield Finding.of(index, "stamps-from-numbers", "", everything, f"{index.min()} to {index.max()}")
+        return
+    steps = np.diff(stamps)
+    if n_rows > 1 and not steps.any():
+        detail = f"{label_of(index[0])} in all {n_rows} rows"
+        yield Finding.of(index, "equal-stamps", "", everything, detail)
+        return
+    if n_rows > 1 and 0 <= stamps.max() < NUMBERED.value and np.median(np.abs(steps)) < SHORTEST_STEP.value:
+        detail = f"{index[0]} to {index[-1]} in {n_rows} rows, all at the beginning of 1970"
+        yield Finding.of(index, "stamps-from-numbers", "", everything, detail)
+        return
+    again = np.flatnonzero(index.duplicated())
+    if len(again):
+        again = again[np.argsort(stamps[again], kind="stable")]
+        detail = f"{len(again)} of {n_rows} rows have the time of another, {period_of(index, again)}"
+        yield Finding.of(index, "repeated-stamps", "", again, detail)
+    late = 1 + np.flatnonzero(steps < 0)
+    if len(late):
+        detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
+        yield Finding.of(index, "unsorted-stamps", "", late, f"{detail} ({label_of(index[late[0]])})")
+
+
+def _labels_found(index: pd.Index) -> Iterator[Finding]:
+    """Labels that look like times although they are none."""
+    detail = ""
+    if len(index) > 1 and pd.api.types.is_integer_dtype(index.dtype) and not isinstance(index, pd.MultiIndex):
+        months = index.to_numpy() // 100 % 100
+        if DATES[0] <= index.min() < index.max() <= DATES[1] and ((months >= 1) & (months <= 12)).all():
+            detail = f"the index holds dates as integers, such as {index[0]}"
+    try:
+        as_stamps(index)
+    except Exception as error:  # labels of users may be anything
+        reason = str(error).partition(";")[0].replace("X has", "the index has").replace("of X ", "")
+        detail = f"{reason:.150}"
+    if detail:
+        yield Finding.of(index, "stamps-as-text", "", np.arange(len(index)), detail)
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """Which values can be measured: between bounds by column, and none that loggers write for a missing one.
+
+    A number such as -99 stands for a missing value only where the others of the baseline's column do not reach it.
+    """
+
+    lowest: Array
+    highest: Array
+    least: Array
+    most: Array
+
+    @classmethod
+    def of(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
+        """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
+        is_target = baseline.columns.isin(targets)
+        found = cls.beside(*_range(baseline.to_numpy()))
+        lowest, highest = np.where(is_target, -np.inf, found.lowest), np.where(is_target, np.inf, found.highest)
+        return replace(found, lowest=lowest, highest=highest)
+
+    @classmethod
+    def beside(cls, least: Array, most: Array) -> Plausible:
+        """Temperatures where these are known: none in kelvin, and none that is 100 degrees beyond them."""
+        return cls(np.fmin(least - 100, -80), np.fmax(most + 100, 100), least, most)
+
+    @classmethod
+    def of_weather(cls, temperatures: Array) -> Plausible:
+        """Temperatures that weather may bring where these are known."""
+        least, most = _range(temperatures)
+        beyond = np.maximum(most - least, NO_WEATHER)
+        return cls(least - beyond, most + beyond, least, most)
+
+    def implausible(self, values: Array) -> NDArray[np.bool_]:
+        """Which values no sensor measures."""
+        is_marker = np.isin(values, MARKERS) & ~((values >= self.least) & (values <= self.most))
+        return is_marker | np.isinf(values) | (values < self.lowest) | (values > self.highest)
+
+
+def _range(values: Array) -> tuple[Array, Array]:
+    """Least and most of each column, numbers that may stand for missing values left out."""
+    known = np.where(np.isin(values, MARKERS), np.nan, values)
+    return np.fmin.reduce(known), np.fmax.reduce(known)
