@@ -28,9 +28,9 @@ from skthermo.detection import (
 )
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, leading
-from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms
-from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, EventRule, leading
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate, estimate_false_alarms
+from skthermo.monitoring._records import Memory
 from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import MARKERS
-from skthermo.monitoring._transitions import Transition, fault_changes
+from skthermo.monitoring._events import Transition
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible
@@ -159,9 +159,7 @@ class Corrections:
     def fault_changes(self, before: CorrectionState, after: CorrectionState, newest: int) -> Iterator[Transition]:
         """Sensors that have failed between two states, and those that are used again."""
         if self.sensors is not None:
-            names = [*self.sensors.sensors, *self.sensors.modes]
-            lists = (state.sensors.faults.faults for state in (before, after))
-            yield from fault_changes(*lists, names, self.sensors.units, newest)
+            yield from self.sensors.changes(before.sensors, after.sensors, newest)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
         return None if self.drift is None else self.drift.report(state.drift)

@@ -8,17 +8,15 @@ from functools import cache, cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, correlation_time
-from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import counted_number
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, WeatherWarning
+from skthermo.monitoring._events import EventRule, find_events, levels
 from skthermo.monitoring._smallest import LARGE, SmallestChanges
 
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
@@ -35,77 +33,6 @@ DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to
 HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
-
-
-@dataclass(frozen=True)
-class EventState:
-    """Whether an event is open, since when all levels have stayed within the clear threshold, and the last indices.
-
-    ``quiet_since`` is in nanoseconds, None if the last level was above it, or there was none.
-    """
-
-    is_open: bool = False
-    quiet_since: int | None = None
-    recent: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class EventRule(SavesFrames):
-    """An event opens when ``persistence`` of the last ``2 persistence - 1`` evaluated records exceed ``threshold``.
-
-    That is when their level, the median index of these records, exceeds it; those before the first count as 0. An
-    event closes when the levels of ``hold`` have stayed within ``release``. Records that are not evaluated (NaN)
-    neither open nor close it: the time of quiet counts only between evaluated records.
-    """
-
-    threshold: float
-    release: float
-    hold: pd.Timedelta
-    persistence: int = 1
-
-    def follow(
-        self, state: EventState, index: Array, times: NDArray[np.int64]
-    ) -> tuple[NDArray[np.bool_], Array, EventState]:
-        """Whether an event is open after each record, in order of time (nanoseconds), levels, and the last state."""
-        after, level, recent = np.full(len(index), state.is_open), *levels(index, self.persistence, state.recent)
-        places = np.flatnonzero(~np.isnan(index))
-        if not len(places):
-            return after, level, state
-        values, at, order = level[places], times[places], np.arange(len(places))
-        quiet = values <= self.release
-        begins = quiet & ~np.append(state.quiet_since is not None, quiet[:-1])
-        last_begin = np.maximum.accumulate(np.where(begins, order, -1))
-        since = np.where(last_begin >= 0, at[last_begin], 0 if state.quiet_since is None else state.quiet_since)
-        closes = quiet & (at - since >= self.hold.value)
-        opens = values > self.threshold
-        last_change = np.maximum.accumulate(np.where(opens | closes, order, -1))
-        is_open = np.where(last_change >= 0, opens[last_change], state.is_open)
-        last_evaluated = np.searchsorted(places, np.arange(len(index)), side="right") - 1
-        after = np.where(last_evaluated >= 0, is_open[last_evaluated], state.is_open)
-        return after, level, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None, recent)
-
-
-def levels(index: Array, persistence: int, recent: tuple[float, ...] = ()) -> tuple[Array, tuple[float, ...]]:
-    """The median index of the last evaluated records at each of them, and the indices that the next ones need."""
-    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), 2 * (persistence - 1)
-    values = np.append([*np.zeros(n), *recent][len(recent) :], index[known])
-    if known.any():
-        level[known] = np.median(sliding_window_view(values, n + 1), axis=1)
-    return level, tuple(values[len(values) - n :].tolist())
-
-
-def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.DataFrame:
-    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` (level), ``peak_time``."""
-    is_open, values, _ = rule.follow(EventState(), np.asarray(index, dtype=float), times.as_unit("ns").asi8)
-    change = np.diff(is_open.astype(np.int8), prepend=0)
-    starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
-    bounds = np.append(stops, len(values))[: len(starts)]
-    peaks = np.array(
-        [start + np.nanargmax(values[start:stop]) for start, stop in zip(starts, bounds, strict=True)], int
-    )
-    ends = times[stops].append(pd.DatetimeIndex([pd.NaT] * (len(starts) - len(stops))).tz_localize(times.tz))
-    table = {"start": times[starts], "end": ends, "peak": values[peaks], "peak_time": times[peaks]}
-    return pd.DataFrame(table, index=pd.RangeIndex(1, len(starts) + 1, name="event"))
 
 
 @dataclass(frozen=True)

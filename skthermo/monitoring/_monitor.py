@@ -31,15 +31,13 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._columns import UsableBaseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement
+from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement, Transition
 from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._files import versions, write_monitor
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._records import OF_TRAINING, RecordStore, read_records
+from skthermo.monitoring._records import OF_TRAINING, Memory, RecordStore, read_records
 from skthermo.monitoring._smallest import SmallestChanges
 from skthermo.monitoring._state import MonitorState
 from skthermo.monitoring._status import MonitorStatus, facts_of, summary_lines
-from skthermo.monitoring._transitions import Transition
 from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 MOST_CAUSES = 3  # in a warning

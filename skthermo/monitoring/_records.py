@@ -1,25 +1,32 @@
-"""Records as they come: read, sorted into new, repeated and late ones, and kept."""
+"""Records as they come: read, sorted into new, repeated and late ones, kept, and how far back a detector looks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, is_dataclass, replace
+from datetime import timedelta
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.pipeline import Pipeline
 
-from skthermo._tables.arrays import as_floats, refuse_no_table
+from skthermo._tables.arrays import as_floats, is_model, refuse_no_table
 from skthermo._tables.frames import DAY_NS, YEAR, usual_step
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._tables.text import duration_text
 from skthermo._validation import with_nan
+from skthermo.preprocessing import HampelFilter
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
 TIMES_LONGEST, TIMES_USUAL = 2, 10  # the same in longest and usual steps of the baseline, if those are longer
 OF_TRAINING = frozenset({"no-rows", "missing-column", "constant"})  # gross errors that do no harm to a few records
 CONFIRMED = 10  # records after a jump that confirm each other
+Path = tuple[tuple[int, int], ...]
+"""Reaches of the steps on one way through a detector, the last step first: (rows, nanoseconds), one of them zero."""
 
 
 def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> pd.DataFrame:
@@ -186,3 +193,81 @@ class RecordStore(SavesFrames):
                 f"{old[row, column]:.10g}; expected each stamp once, or with the same values"
             )
         return known
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Which earlier records the evaluation of a record needs, on all ways from its records to its damage index."""
+
+    paths: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, detector: Any) -> Memory:
+        """That of a fitted detector by ``lookback_`` of its parts: those in a row add up, of several ways all count."""
+        return cls(tuple(sorted(_paths(detector, set()))))
+
+    @classmethod
+    def of_time(cls, duration: pd.Timedelta) -> Memory:
+        return cls((((0, duration.value),),))
+
+    def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
+        """Position of the earliest record that is needed for the one at a position, or at a time before it."""
+        return min(_back(path, times, place, time) for path in self.paths)
+
+    def duration(self, step: pd.Timedelta) -> pd.Timedelta:
+        """The longest of all ways in time, of records that are so far apart."""
+        return max(
+            sum((n * step + pd.Timedelta(time, "ns") for n, time in path), pd.Timedelta(0)) for path in self.paths
+        )
+
+    def __str__(self) -> str:
+        """The reaches in words, such as "30 h" or "24 records and 30 h"."""
+        rows, time = (max(sum(reach[part] for reach in path) for path in self.paths) for part in (0, 1))
+        words = [f"{rows} records"] if rows else []
+        words += [f"{time / 3.6e12:.3g} h"] if time else []
+        return " and ".join(words) or "nothing"
+
+
+def _back(path: Path, times: NDArray[np.int64], place: int, time: int | None) -> int:
+    for rows, duration in path:
+        if rows:
+            place, time = max(place - rows, 0), None
+        else:
+            moment = (times[place] if time is None else time) - duration
+            place, time = int(np.searchsorted(times[:place], moment)), None
+    return place
+
+
+def _paths(part: Any, seen: set[int]) -> set[Path]:
+    """Ways through a fitted part, each with the reaches on it."""
+    if id(part) in seen:
+        return {()}
+    if isinstance(part, Pipeline):
+        ways: set[Path] = {()}
+        for _, step in reversed(part.steps):
+            ways = {way + more for way in ways for more in _paths(step, seen)}
+        return ways
+    seen = seen | {id(part)}
+    if isinstance(part, HampelFilter):
+        raise ValueError(
+            f"the detector holds {part!r:.100}, which compares records with later ones; expected steps that look back "
+            "only: filter the baseline before fit"
+        )
+    if hasattr(part, "lookback_"):
+        lookback = part.lookback_
+        is_time = isinstance(lookback, np.timedelta64 | timedelta)
+        reach = (0, pd.Timedelta(lookback).as_unit("ns").value) if is_time else (int(lookback), 0)
+        return {(reach,)} if any(reach) else {()}
+    found = set().union(*(_paths(inner, seen) for inner in _inner(part)))
+    return found or {()}
+
+
+def _inner(part: Any) -> Iterator[Any]:
+    """Estimators and objects of which a part is made."""
+    for value in list(getattr(part, "__dict__", {}).values()):
+        values = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else [value]
+        for one in values:
+            for inner in one if isinstance(one, tuple) else (one,):
+                made = isinstance(inner, BaseEstimator) or (is_dataclass(inner) and not isinstance(inner, type))
+                if made and not is_model(inner):
+                    yield inner

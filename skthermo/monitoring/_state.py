@@ -21,12 +21,14 @@ from skthermo.monitoring._events import (
     WATCH,
     Acknowledgement,
     EventLog,
+    EventRule,
+    Transition,
+    event_changes,
     event_table,
     leading,
 )
-from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate
+from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
-from skthermo.monitoring._transitions import Transition, event_changes
 
 ANSWER = ("state", "index", "threshold", "modes", "groups", "reason", "event")
 

@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._memory import Memory
+from skthermo.monitoring._records import Memory
 from skthermo.monitoring.retraining._retraining import Harvest, margin_of
 
 YEAR = 365

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from skthermo.monitoring._transitions import event_changes
 
 from skthermo.monitoring import MonitorStatus, load_monitor
 from skthermo.monitoring._events import Event
-from skthermo.monitoring._transitions import event_changes
 from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 
 SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value

@@ -13,15 +13,15 @@ from scipy import stats
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, check_probability
-from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
-from skthermo.monitoring.drift._kalman import DailySteps, State
-from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, State
 from skthermo.monitoring.drift._observations import (
     MISLEARNED,
+    DailyMeans,
     DailyRecords,
     GroupEffects,
+    calendar,
     checked_records,
     length_of,
     observation,

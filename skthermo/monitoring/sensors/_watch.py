@@ -1,9 +1,10 @@
-"""The watch on sensors: from day to day, which are at fault."""
+"""The watch on sensors: from day to day, which are at fault, since when, and until when."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,25 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY_NS, columns_by_sensor, frame_like
-from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
-from skthermo.monitoring.sensors._faults import DEPARTURES, Fault, SensorFaults
+from skthermo._tables.frames import DAY_NS, as_index, columns_by_sensor, frame_like
+from skthermo.monitoring._events import Transition
 from skthermo.monitoring.sensors._responses import CERTAIN, Responses
-from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
+from skthermo.monitoring.sensors._thermometers import (
+    LEAST_DAYS,
+    LONGEST,
+    Change,
+    Days,
+    Departures,
+    Thermometers,
+    local_days,
+)
 from skthermo.preprocessing.checks import Plausible, equal_runs
 
+SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
+COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
+LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
+DEPARTURES = ("offset", "drift", "disagree")
+MONTH = 30.4  # days
 A_DEGREE = 1.0  # below which thermometers may depart without a fault
 LEAST_OTHERS = 2  # thermometers that tell which one is at fault
 CLEAR = 4.6  # logarithm of the odds that one thermometer is at fault, against each other one
@@ -33,6 +46,83 @@ KINDS_OF_RUNS = {"implausible": IMPLAUSIBLE, "stuck": REPEATED, "dead": MISSING}
 HELD = ("stuck", "implausible")  # faults of a response that may be a change of the structure
 RARER = 3.0  # times, a healthy thermometer is called faulty where a reference alone can say so
 REFERENCE = 2.0  # times `CLEAR`, the logarithm of the odds that a thermometer is at fault and not a reference
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Position of its column, the other one where two are concerned (else -1), times in nanoseconds, None as it lasts.
+
+    ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
+    """
+
+    kind: str
+    column: int
+    since: int
+    detected: int
+    other: int = -1
+    size: float = 0.0
+    rate: float = 0.0
+    until: int | None = None
+
+    def detail(self, other: Hashable, unit: str) -> str:
+        value = f"{self.size:.6g} {unit}".rstrip()
+        return {
+            "dead": "has had no value for longer than gaps of the baseline",
+            "stuck": f"repeats {value}; left out",
+            "implausible": f"shows implausible values, such as {value}; left out",
+            "offset": f"{self.size:+.1f} degrees beside what the other thermometers predict; left out",
+            "drift": f"{self.rate * MONTH:+.2f} degrees a month, {self.size:+.1f} so far, beside what the other "
+            "thermometers predict; left out",
+            "disagree": f"{abs(self.size):.1f} degrees between what it, {other!r} and any others predict: which is "
+            "wrong is not known; records are healthy only if they are so without either",
+            "swapped": f"its values are in the column of {other!r}; put back in place",
+        }[self.kind]
+
+
+@dataclass(frozen=True)
+class SensorFaults:
+    """All faults in the order in which they were detected."""
+
+    faults: tuple[Fault, ...] = ()
+
+    def lasting(self, *kinds: str) -> list[Fault]:
+        return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
+
+    def left_out(self) -> dict[int, Fault]:
+        """By position of each column that is left out, the fault for which it is."""
+        return {fault.column: fault for fault in self.lasting(*LEFT_OUT)}
+
+    def opened(self, fault: Fault) -> SensorFaults:
+        """With one more fault, or with that one again which has just ended."""
+        same = (fault.column, fault.other, fault.kind)
+        for known in reversed(self.faults):
+            lasts = known.until is None or known.until > fault.since - SOON
+            if (known.column, known.other, known.kind) == same and lasts:
+                return self.changed(known, until=None)
+        return SensorFaults((*self.faults, fault))
+
+    def changed(self, fault: Fault, **values: Any) -> SensorFaults:
+        return SensorFaults(tuple(replace(one, **values) if one is fault else one for one in self.faults))
+
+    def notes(self, names: Sequence[Hashable], zone: str) -> list[str]:
+        """What is left out or put back in place for the faults that last."""
+        return [
+            f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
+            if fault.kind == "swapped"
+            else f"{names[fault.column]} is left out ({fault.kind} since {as_index([fault.since], zone)[0]:%Y-%m-%d})"
+            for fault in self.lasting(*LEFT_OUT, "swapped")
+        ]
+
+    def table(self, names: Sequence[Hashable], zone: str, units: Sequence[str]) -> pd.DataFrame:
+        """One row a fault, two where two columns are concerned."""
+        rows = [
+            [names[own], fault.kind, fault.since, fault.detected, fault.until, fault.detail(names[other], units[own])]
+            for fault in self.faults
+            for own, other in [(fault.column, fault.other), (fault.other, fault.column)][: 1 if fault.other < 0 else 2]
+        ]
+        columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
+        table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
+        return pd.DataFrame(table | {name: as_index(columns[name], zone) for name in ("since", "detected", "until")})
 
 
 @dataclass(frozen=True)
@@ -335,6 +425,28 @@ class SensorWatch:
         if not np.array_equal(self._trusted(state.faults), self._trusted(before)):
             state = self._departing(state)
         return self._with_departures(self._without_ended(state, midnight), midnight)
+
+    def changes(self, before: WatchState, after: WatchState, newest: int) -> Iterator[Transition]:
+        """Sensors that have failed, in another way than before perhaps, and those that are used again."""
+        for old, new in zip_longest(before.faults.faults, after.faults.faults):
+            if old == new:
+                continue
+            is_other = old is None or new is None or (old.column, old.other) != (new.column, new.other)
+            is_again = not is_other and old.until is not None and new.until is None
+            failed = new is not None and (is_other or old.kind != new.kind or is_again)
+            ended = new if new is not None and new.until is not None and (failed or old.until is None) else None
+            if is_other and old is not None and old.until is None:
+                yield self._transition("put back", old, newest, newest)
+            if failed:
+                yield self._transition("fault", new, new.since, newest)
+            if ended is not None:
+                yield self._transition("put back", ended, ended.until, newest)
+
+    def _transition(self, what: str, fault: Fault, time: int, newest: int) -> Transition:
+        names = [*self.sensors, *self.modes]
+        columns = ", ".join(str(names[place]) for place in (fault.column, fault.other) if place >= 0)
+        detail = fault.detail(names[fault.other], self.units[fault.column]) if what == "fault" else ""
+        return Transition(what, time, newest, fault.kind, column=columns, detail=detail)
 
     def _midnight(self, day: int) -> np.int64:
         stamp = pd.Timestamp(day * DAY_NS)

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.testing import assert_allclose
-
 from skthermo.monitoring.sensors._changes import BEYOND, LONGEST, SEASONAL, Departures, ThermometerNoise
 
 
