@@ -29,9 +29,14 @@ from skthermo.detection import (
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, EventRule, leading
-from skthermo.monitoring._false_alarms import FalseAlarmEstimate, estimate_false_alarms
 from skthermo.monitoring._records import Memory
-from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
+from skthermo.monitoring._threshold import (
+    FalseAlarmEstimate,
+    SmallestChanges,
+    estimate_false_alarms,
+    lowered,
+    smallest_by_threshold,
+)
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
@@ -120,8 +125,9 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the responses; records go through ``corrections`` before. There is an estimate of false alarms for each kind of
-    event that has a damage index. After a new baseline, ``prior`` are records from before the intervention, which was
+    the responses; records go through ``corrections`` before. ``smallest`` are the falls of the responses that raise an
+    alarm in the weather of the baseline; there is an estimate of false alarms for each kind of event that has a damage
+    index. After a new baseline, ``prior`` are records from before the intervention, which was
     complete ``since`` then.
     """
 
@@ -134,7 +140,7 @@ class ActiveDetector(SavesFrames):
     usual: tuple[Array, Array]
     weather: TrainingRange
     corrections: Corrections
-    lowered: LoweredIndices
+    smallest: SmallestChanges
     estimates: dict[str, FalseAlarmEstimate]
     prior: pd.DataFrame | None = None
     since: pd.Timestamp | None = None
@@ -157,9 +163,9 @@ class ActiveDetector(SavesFrames):
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         index_of = partial(_index_of, detector, columns)
-        changes = LoweredIndices.of(index_of, trained, targets, usual[1], within, _losses_of(detector))
+        smallest_at = smallest_by_threshold(index_of, trained, targets, usual[1], within, _losses_of(detector))
         options = {"hold": DAY, "persistence": persistence}
-        damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=changes.smallest, **options)
+        damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=smallest_at, **options)
         estimates = {DAMAGE: damage}
         if monitor.watch_per_year is not None:
             with reported_by_caller(KINDS_OF_ESTIMATE):  # for the higher threshold
@@ -169,7 +175,8 @@ class ActiveDetector(SavesFrames):
             estimates[WATCH] = replace(
                 watch, rule=replace(watch.rule, threshold=lower, release=min(lower, watch.rule.release))
             )
-        parts = (memory, columns, temperatures, targets, usual, weather, corrections, changes, estimates)
+        smallest = smallest_at(damage.rule.threshold)
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, smallest, estimates)
         return cls(detector, trained, *parts)
 
     @property
@@ -191,11 +198,6 @@ class ActiveDetector(SavesFrames):
     def watch_threshold(self) -> float | None:
         """An event of a raised index opens above it; None if these are not asked for."""
         return self.estimates[WATCH].rule.threshold if WATCH in self.estimates else None
-
-    @property
-    def smallest(self) -> SmallestChanges:
-        """Falls of the responses that raise an alarm in the weather of the baseline."""
-        return self.lowered.smallest(self.threshold)
 
     @property
     def baseline_index(self) -> pd.Series:

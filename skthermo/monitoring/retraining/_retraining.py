@@ -18,9 +18,8 @@ from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time, us
 from skthermo._tables.text import capital, counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
-from skthermo.monitoring._false_alarms import levels
 from skthermo.monitoring._records import Memory
-from skthermo.monitoring._smallest import WEEK, blocks_of, crossing, lowered, whole_weeks
+from skthermo.monitoring._threshold import WEEK, blocks_of, crossing, levels, lowered, whole_weeks
 from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree, block_mean
 from skthermo.residuals.weather import BEYOND, TrainingRange
 

@@ -9,14 +9,13 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from sklearn.exceptions import NotFittedError
-from skthermo.monitoring.drift._noise import DailyNoise
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, add_noise
 from skthermo.monitoring import track_parameters
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
-from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State
+from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State
 from skthermo.monitoring.drift._observations import observation, shapes_of_time
 from skthermo.surrogate import DataInformedFEM
 

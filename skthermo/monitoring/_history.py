@@ -27,8 +27,8 @@ from skthermo.monitoring._events import (
     event_table,
     leading,
 )
-from skthermo.monitoring._false_alarms import FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
+from skthermo.monitoring._threshold import FalseAlarmEstimate
 
 ANSWER = ("state", "index", "threshold", "modes", "groups", "reason", "event")
 
@@ -43,7 +43,7 @@ class Checkpoint(SavesFrames):
 
 
 @dataclass(frozen=True)
-class MonitorState(SavesFrames):
+class History(SavesFrames):
     """Records, evaluations by record and by day, checkpoints of the last days, and what the owner has said of events.
 
     ``corrected`` are the records as the detector sees them, those kept and the memory before the first checkpoint. It
@@ -62,10 +62,10 @@ class MonitorState(SavesFrames):
     n_late: int = 0
     n_too_late: int = 0
     transitions: tuple[Transition, ...] = ()
-    before: MonitorState | None = None  # the latest jump of the stamps
+    before: History | None = None  # the latest jump of the stamps
 
     @classmethod
-    def of(cls, active: ActiveDetector, store: RecordStore) -> MonitorState:
+    def of(cls, active: ActiveDetector, store: RecordStore) -> History:
         """The state after the baseline, whose last records are the first memory."""
         times, end = store.baseline.index.asi8, store.last
         start = active.memory.start(times, len(times), int(times[-1]) + 1)
@@ -97,6 +97,16 @@ class MonitorState(SavesFrames):
         return any(all(time < start for time in self.acknowledged) for start in opened)
 
     @property
+    def state(self) -> str:
+        """How the structure is by the newest record, as `MonitorStatus` has it."""
+        if self.log.is_open(DAMAGE) or self.has_set_aside:
+            return "alarm"
+        if self.log.is_open(WATCH):
+            return "watch"
+        newest = self.evaluations["state"].iloc[-1] if len(self.evaluations) else "not evaluated"
+        return "not evaluated" if newest == "alarm" else newest  # what was set aside has been acknowledged
+
+    @property
     def counts(self) -> dict[str, int]:
         n_outside = self.n_too_late + len(self.store.ahead)
         n_records, n_evaluated, n_left_out = (
@@ -112,7 +122,7 @@ class MonitorState(SavesFrames):
             "n_left_out": n_left_out,
         }
 
-    def taken_in(self, active: ActiveDetector, intake: Intake) -> tuple[MonitorState, pd.DataFrame]:
+    def taken_in(self, active: ActiveDetector, intake: Intake) -> tuple[History, pd.DataFrame]:
         """The state after a batch, and what it says of its records and of others that are evaluated anew."""
         state = replace(
             self,
@@ -132,7 +142,7 @@ class MonitorState(SavesFrames):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index(kind="stable")
         return replace(state, store=intake.store.trimmed()).changed_from(self, active), answers
 
-    def changed_from(self, before: MonitorState, active: ActiveDetector, *others: Transition) -> MonitorState:
+    def changed_from(self, before: History, active: ActiveDetector, *others: Transition) -> History:
         """This state with what has changed since another one, in order of time, and other changes first."""
         newest = self.store.last.as_unit("ns").value
         found = [*event_changes(before.log.events, self.log.events, newest)]
@@ -140,7 +150,7 @@ class MonitorState(SavesFrames):
         found.sort(key=lambda one: one.time)
         return replace(self, transitions=(*before.transitions, *others, *found))
 
-    def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[MonitorState, pd.DataFrame]:
+    def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[History, pd.DataFrame]:
         """The state after new records, which are in the store already, and what it says of these and of later ones.
 
         It goes on from the beginning of the day of the first new record, and evaluates all records from that one on.
@@ -191,7 +201,7 @@ class MonitorState(SavesFrames):
         )
         return state._remembering(active, records), self._news(answers.iloc[len(known) :], fresh)
 
-    def _remembering(self, active: ActiveDetector, records: pd.DataFrame) -> MonitorState:
+    def _remembering(self, active: ActiveDetector, records: pd.DataFrame) -> History:
         """The state with those of some corrected records that are kept, or that records to come need."""
         first, since = self.checkpoints[0].day, self.store.last - self.store.retention
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(first), first.value)
@@ -203,7 +213,7 @@ class MonitorState(SavesFrames):
 
     def without(
         self, active: ActiveDetector, start: pd.Timestamp, end: pd.Timestamp | None = None
-    ) -> tuple[MonitorState, int]:
+    ) -> tuple[History, int]:
         """The state as if records from one stamp to another had never come, and the number of these.
 
         It is an error if how things stood before them is not known.
@@ -232,7 +242,7 @@ class MonitorState(SavesFrames):
 
     def _as_before(
         self, active: ActiveDetector, store: RecordStore, start: pd.Timestamp
-    ) -> tuple[MonitorState, pd.DatetimeIndex]:
+    ) -> tuple[History, pd.DatetimeIndex]:
         """A state that is not later than a stamp, with a store, and the stamps of records that follow it."""
         kept = store.kept.index
         places = [n for n, one in enumerate(self.checkpoints) if one.day <= start]
@@ -249,13 +259,13 @@ class MonitorState(SavesFrames):
             return replace(self.before, store=replace(store, kept=together)), new.index
         if len(self.days) and self.days.index[0] >= midnight(self.store.kept.index[0]):
             nothing = replace(store, kept=store.kept.iloc[:0])
-            return replace(MonitorState.of(active, nothing), store=store), kept
+            return replace(History.of(active, nothing), store=store), kept
         raise ValueError(
             f"records from {start} on cannot be discarded: how things stood then is known from "
             f"{self.checkpoints[0].day} on; expected a later start, or a monitor that was saved before"
         )
 
-    def handed_over(self, active: ActiveDetector, end: int | None = None) -> MonitorState:
+    def handed_over(self, active: ActiveDetector, end: int | None = None) -> History:
         """The state with another detector, which evaluates the records of the newest day anew.
 
         With an ``end``, events that are open have ended then, and sensors are watched from new.

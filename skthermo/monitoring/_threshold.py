@@ -1,24 +1,30 @@
-"""Events of a damage index, and the threshold by which a healthy structure has so many of them in a year."""
+"""The threshold of a damage index: how many false events a healthy structure has, and which changes it detects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, correlation_time
-from skthermo._tables.text import counted_number
+from skthermo._tables.text import counted_number, duration_text, percent
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, WeatherWarning
 from skthermo.monitoring._events import EventRule, find_events, levels
-from skthermo.monitoring._smallest import LARGE, SmallestChanges
 
+WEEK = pd.Timedelta("7D")
+STEPS = (0.0, 0.5, 2.0, 5.0)  # standard deviations of a response, by which it is lowered
+MOST_PROBED = 1000  # records of the baseline that are lowered, whole weeks of them
+LARGE = 0.025  # fall of all natural frequencies that a monitor should see: 5 % of the stiffness of the structure
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
 N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
@@ -33,6 +39,147 @@ DOUBTFUL = 0.01  # share of healthy baselines whose highest excursion is said to
 HEAVY = 0.2  # the same share, from which on probabilities are those of a heavier tail
 FAR = 0.4  # events asked for in the time of the baseline, below which the threshold is far beyond its excursions
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
+
+
+def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
+    """Number of the block of each record, counted without gaps."""
+    numbers = (times - times[0]) // length
+    return np.unique(numbers, return_inverse=True)[1]
+
+
+def whole_weeks(records: pd.DataFrame, most: int) -> pd.DataFrame:
+    """Whole weeks, evenly spread, of at most some number of records, or one week."""
+    if len(records) <= most:
+        return records
+    blocks = blocks_of(records.index)
+    n_blocks = blocks.max() + 1
+    chosen = np.unique(np.linspace(0, n_blocks - 1, max(n_blocks * most // len(records), 1)).astype(int))
+    return records[np.isin(blocks, chosen)]
+
+
+def lowered(records: pd.DataFrame, falls: Mapping[Any, Any]) -> pd.DataFrame:
+    """Records of which some responses are lower."""
+    changed = records.copy()
+    for name, fall in falls.items():
+        changed[name] -= fall
+    return changed
+
+
+def crossing(steps: Array, ratios: Array) -> float:
+    """The step at which a ratio exceeds 1; NaN if it does so without any.
+
+    Squared indices grow with squared steps, nearly on straight lines.
+    """
+    squares = ratios**2
+    above = np.flatnonzero(squares > 1)
+    if len(above) and above[0] == 0:
+        return np.nan
+    after = above[0] if len(above) else len(steps) - 1
+    slope = (squares[after] - squares[after - 1]) / (steps[after] ** 2 - steps[after - 1] ** 2)
+    return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
+
+
+@dataclass(frozen=True)
+class SmallestChanges:
+    """Falls of responses that a threshold sees: half of the records are above it, and an alarm follows ``within`` days.
+
+    ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of
+    each alone, a share where ``is_relative``, else in its unit. ``groups`` are losses of stiffness of damage groups, of
+    a detector that has their directions. NaN where no fall or loss is seen.
+    """
+
+    common: float
+    single: dict[Any, float]
+    is_relative: bool
+    within: pd.Timedelta
+    groups: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether a large fall of all responses is not detected, and a larger one is."""
+        return self.is_relative and self.common > LARGE
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: NaN is None, ``within`` in seconds."""
+        single, groups = (
+            {str(name): _known(value) for name, value in some.items()} for some in (self.single, self.groups)
+        )
+        within = self.within.total_seconds()
+        return {"common": _known(self.common), "single": single, "groups": groups, "within": within}
+
+    def __str__(self) -> str:
+        parts = [f"a fall of all responses by {percent(self.common, '.2g')}"] if np.isfinite(self.common) else []
+        if single := _range_text(self.single, "{:.2g} %" if self.is_relative else "{:.2g}"):
+            parts.append(f"{'of' if parts else 'a fall of'} one response alone {single}")
+        if groups := _range_text(self.groups, "{:.2g} %"):
+            parts.append(f"a loss of stiffness {groups}")
+        if not parts:
+            return "no fall of the responses raises an alarm"
+        text = f"{', or '.join(parts)} raises an alarm within {duration_text(self.within)}"
+        return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _range_text(changes: Mapping[Any, float], form: str) -> str:
+    """The smallest and the largest of some changes, with their names; "" where none is seen."""
+    seen = {name: value for name, value in changes.items() if np.isfinite(value)}
+    if not seen:
+        return ""
+    ends = dict.fromkeys((min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)))
+    factor = 100 if "%" in form else 1
+    return "by " + " to ".join(f"{form.format(factor * seen[name])} ({name})" for name in ends)
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+@answers_kept()  # of the weather, which is the same in all calls
+def smallest_by_threshold(
+    index_of: Callable[[pd.DataFrame], Array],
+    records: pd.DataFrame,
+    names: Sequence[Any],
+    deviations: Array,
+    within: pd.Timedelta,
+    losses: pd.DataFrame | None = None,
+) -> Callable[[float], SmallestChanges]:
+    """By a threshold, the falls of responses by which the median index of a baseline exceeds it.
+
+    ``index_of`` are a detector's indices of records in order of time; ``deviations`` are those of the responses.
+    ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
+    record by one standard deviation; their column ``"loss"`` is that loss.
+    """
+    some = whole_weeks(records, MOST_PROBED)
+    responses = some[list(names)]
+    is_relative = bool((records[list(names)].min() > 0).all())
+    shares = deviations / (responses.mean().to_numpy() if is_relative else 1.0)
+    changes = [
+        ("single", name, share, {name: size}) for name, share, size in zip(names, shares, deviations, strict=True)
+    ]
+    if is_relative:
+        share = float(np.median(shares))
+        changes.append(("common", "", share, dict((share * responses).items())))
+    for group, row in (pd.DataFrame() if losses is None else losses).iterrows():
+        falls = -row.drop("loss").to_numpy() * responses
+        changes.append(("groups", group, float(row["loss"]), dict(falls.items())))
+    start, medians = index_of(some), []
+    for *_, falls in changes:
+        by_step = ({name: step * size for name, size in falls.items()} for step in STEPS[1:])
+        medians.append(_medians(np.array([start, *(index_of(lowered(some, one)) for one in by_step)])))
+
+    def at(threshold: float) -> SmallestChanges:
+        found: dict[str, dict[Any, float]] = {"single": {}, "common": {}, "groups": {}}
+        for (kind, name, size, _), of_steps in zip(changes, medians, strict=True):
+            fall = crossing(size * np.array(STEPS), of_steps / threshold)
+            found[kind][name] = fall if fall < 1 or not (is_relative or kind == "groups") else np.nan
+        return SmallestChanges(found["common"].get("", np.nan), found["single"], is_relative, within, found["groups"])
+
+    return at
+
+
+def _medians(indices: Array) -> Array:
+    """Median over the records that have an index at each step."""
+    known = indices[:, ~np.isnan(indices).any(axis=0)]
+    return np.median(known, axis=1) if known.size else np.full(len(indices), np.nan)
 
 
 @dataclass(frozen=True)
