@@ -73,9 +73,6 @@ class Monitor(SavesFrames, Estimator):
         1 means that a single record opens an event.
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
-    max_jump : str or timedelta, optional
-        How far a stamp may be from the record before it. Beyond it, records are set aside until they are confirmed. By
-        default 28 days, twice the longest gap of the baseline, or ten usual steps, whichever is longest.
     retention : str or timedelta, default="400D"
         How long raw records are kept, for a new fit and to tell repeated records.
     sensors : bool, default=True
@@ -199,7 +196,6 @@ class Monitor(SavesFrames, Estimator):
         "persistence": [Interval(Integral, 1, None, closed="left")],
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
-        "max_jump": [str, timedelta, np.timedelta64, None],
         "retention": [str, timedelta, np.timedelta64],
         "sensors": ["boolean"],
         "units": [str, Mapping, None],
@@ -218,7 +214,6 @@ class Monitor(SavesFrames, Estimator):
         watch_per_year: float | None = None,
         persistence: int = 3,
         max_delay: str | timedelta = "7D",
-        max_jump: str | timedelta | None = None,
         retention: str | timedelta = "400D",
         sensors: bool = True,
         units: str | Mapping[Hashable, str] | None = None,
@@ -233,7 +228,6 @@ class Monitor(SavesFrames, Estimator):
         self.watch_per_year = watch_per_year
         self.persistence = persistence
         self.max_delay = max_delay
-        self.max_jump = max_jump
         self.retention = retention
         self.sensors = sensors
         self.units = units
@@ -328,7 +322,7 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        max_delay, max_jump, retention = self._checked_times()
+        max_delay, retention = self._checked_times()
         usable = UsableBaseline.of(self, _read_baseline(X))
         baseline, detector, columns = usable.records, usable.detector, usable.columns
         seed_parts(detector, seeded(self.random_state))
@@ -340,7 +334,7 @@ class Monitor(SavesFrames, Estimator):
         trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
         active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)
         active.check()
-        store = RecordStore.of(baseline, max_delay, max_jump, retention)
+        store = RecordStore.of(baseline, max_delay, retention)
         self.active_, self.history_ = active, History.of(active, store)
         self.versions_ = versions()
         return self
@@ -566,8 +560,8 @@ class Monitor(SavesFrames, Estimator):
         detector in charge, and the newest record is the newest of them. Records that were refused as too late because
         of wrong stamps can come again. What was acknowledged stays, and `transitions` lists what changes.
 
-        How things stood before is known for the last days (``max_delay``), before the latest jump by more than
-        ``max_jump``, and, while all records since the baseline are kept, for any time.
+        How things stood before is known for the last days (``max_delay``), before the latest jump of the stamps, and,
+        while all records since the baseline are kept, for any time.
         """
         check_is_fitted(self)
         stamps = self.baseline_.index
@@ -651,12 +645,9 @@ class Monitor(SavesFrames, Estimator):
         """Records in the columns of `fit`, without those that are left out."""
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
-    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta | None, pd.Timedelta]:
-        """``max_delay``, ``max_jump`` and ``retention``; an error for parameters that contradict each other."""
+    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta]:
+        """``max_delay`` and ``retention``; an error for parameters that contradict each other."""
         max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
-        if max_jump is not None and not max_jump:
-            raise ValueError(f"max_jump is {self.max_jump!r}; expected longer than zero, such as '28D'")
         if retention < max_delay + 2 * DAY:
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
@@ -667,7 +658,7 @@ class Monitor(SavesFrames, Estimator):
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
                 "expected more watches than alarms a year, such as 12 and 1"
             )
-        return max_delay, max_jump, retention
+        return max_delay, retention
 
     def _corrections(self, baseline: pd.DataFrame, reference: list[Any], fem: Any) -> Corrections:
         options = {"fem": fem, "sensors": self.sensors}

@@ -84,7 +84,7 @@ class Intake:
 class RecordStore(SavesFrames):
     """Raw records of the baseline, those that came since for the time of ``retention``, and those set aside.
 
-    A record is set ``ahead`` if it is stamped more than ``max_jump`` after the one before it, until it is of the
+    A record is set ``ahead`` if it is stamped more than a ``jump`` after the one before it, until it is of the
     present by the clock of this computer, or others confirm it.
     """
 
@@ -92,19 +92,16 @@ class RecordStore(SavesFrames):
     kept: pd.DataFrame
     ahead: pd.DataFrame
     max_delay: pd.Timedelta
-    max_jump: pd.Timedelta
+    jump: pd.Timedelta
     retention: pd.Timedelta
 
     @classmethod
-    def of(
-        cls, baseline: pd.DataFrame, max_delay: pd.Timedelta, max_jump: pd.Timedelta | None, retention: pd.Timedelta
-    ) -> RecordStore:
-        """With no record since the baseline; by default a jump is one that no outage of the baseline explains."""
-        if max_jump is None:
-            longest = pd.Timedelta(np.diff(baseline.index.asi8).max(initial=0), "ns")
-            max_jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual_step(baseline.index))
+    def of(cls, baseline: pd.DataFrame, max_delay: pd.Timedelta, retention: pd.Timedelta) -> RecordStore:
+        """With no record since the baseline; a jump is one that no outage of the baseline explains."""
+        longest = pd.Timedelta(np.diff(baseline.index.asi8).max(initial=0), "ns")
+        jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual_step(baseline.index))
         nothing = baseline.iloc[:0]
-        return cls(baseline, nothing, nothing, max_delay, max_jump, retention)
+        return cls(baseline, nothing, nothing, max_delay, jump, retention)
 
     @property
     def last(self) -> pd.Timestamp:
@@ -129,7 +126,7 @@ class RecordStore(SavesFrames):
         reasons = [self._why_too_late(stamp) for stamp in too_late.index]
         newest = max(self.last, fresh.index[-1]) if len(fresh) else self.last
         reasons += [
-            f"stamped more than {duration_text(self.max_jump)} after the newest record ({newest}): set aside"
+            f"stamped more than {duration_text(self.jump)} after the newest record ({newest}): set aside"
         ] * len(set_aside)
         n_late = int((fresh.index < self.last).sum())
         store = replace(self._with_records(fresh), ahead=ahead)
@@ -138,7 +135,7 @@ class RecordStore(SavesFrames):
     def jumps(self, stamps: pd.DatetimeIndex) -> bool:
         """Whether new records, in order of time, are farther apart than a clock that works would have them."""
         times = np.append(self.last.as_unit("ns").value, stamps.asi8)
-        return bool((np.diff(times) > self.max_jump.value).any())
+        return bool((np.diff(times) > self.jump.value).any())
 
     def trimmed(self) -> RecordStore:
         """The store without records that are too old to be kept."""
@@ -155,7 +152,7 @@ class RecordStore(SavesFrames):
         times, last = stamps.asi8, self.last.as_unit("ns").value
         now = pd.Timestamp.now("UTC").as_unit("ns").value + DAY_NS  # stamps without a time zone are local
         is_live = last <= now
-        jump = self.max_jump.value if is_live else max(self.max_jump.value, YEAR.value)
+        jump = self.jump.value if is_live else max(self.jump.value, YEAR.value)
         before = np.maximum.accumulate(np.append(last, times[:-1]))
         for start, stop in pairwise([*np.flatnonzero(times - before > jump), len(times)]):
             newest = times[stop - 1]
