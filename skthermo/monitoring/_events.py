@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from skthermo._tables.saved_frames import SavesFrames
 
 DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
 """Kinds of events; the second is that of responses set aside as implausible or stuck, the last of a raised index."""
+
+Shown = tuple[Array, Sequence[str], Sequence[dict[str, float]]]
+"""What records show of a kind of event: damage indices, modes that drive them, and effects of damage groups."""
 
 MATTERS = 2.0  # standard deviations from which a mode, or a damage group, drives an alarm
 MOST_NAMED = 3  # of them
@@ -115,6 +119,25 @@ class Event:
         means = {name: total / self.n_alarms for name, total in self.effects}
         return ", ".join(leading({name: size for name, size in means.items() if size > MATTERS}))
 
+    def grown(
+        self, level: Array, times: NDArray[np.int64], shown: Shown, inside: NDArray[np.intp], end: int | None
+    ) -> Event:
+        """The event with the records in which it was open."""
+        evaluated = inside[~np.isnan(level[inside])]
+        if not len(evaluated):
+            return replace(self, end=end)
+        _, modes, effects = shown
+        highest = evaluated[np.argmax(level[evaluated])]
+        peak, peak_time, of_peak = self.peak, self.peak_time, self.modes
+        if level[highest] > peak:
+            peak, peak_time, of_peak = float(level[highest]), int(times[highest]), modes[highest]
+        totals = dict(self.effects)
+        for row in evaluated:
+            for name, size in effects[row].items():
+                totals[name] = totals.get(name, 0.0) + size
+        n_alarms = self.n_alarms + len(evaluated)
+        return Event(self.kind, self.start, end, peak, peak_time, of_peak, tuple(sorted(totals.items())), n_alarms)
+
 
 @dataclass(frozen=True)
 class EventLog:
@@ -126,19 +149,19 @@ class EventLog:
     def follow(
         self,
         rules: dict[str, EventRule],
-        by_kind: dict[str, Array],
-        drivers: dict[str, tuple[Sequence[str], Sequence[dict[str, float]]]],
+        series: dict[str, Shown],
         times: NDArray[np.int64],
     ) -> tuple[dict[str, NDArray[np.int64]], EventLog]:
-        """Number of the event of each kind at records in order of time, 0 for none, and the log after them.
-
-        ``drivers`` are the modes that drive the index of each record, and the effects of damage groups, by kind.
-        """
-        is_open, levels, states = {}, {}, dict(self.states)
-        for kind, index in by_kind.items():
-            is_open[kind], levels[kind], states[kind] = rules[kind].follow(self.state(kind), index, times)
-        events, numbers = list(self.events), {kind: np.zeros(len(times), dtype=np.int64) for kind in by_kind}
-        for row, kind in self._openings(is_open):
+        """Number of the event of each kind at records in order of time, 0 for none, and the log after them."""
+        is_open, levels, states, numbers, openings = {}, {}, dict(self.states), {}, []
+        for kind, (index, *_) in series.items():
+            before = self.state(kind)
+            is_open[kind], levels[kind], states[kind] = rules[kind].follow(before, index, times)
+            opens = np.diff(is_open[kind].astype(int), prepend=int(before.is_open)) == 1
+            openings += zip(np.flatnonzero(opens).tolist(), repeat(kind))
+            numbers[kind] = np.zeros(len(times), dtype=np.int64)
+        events = list(self.events)
+        for row, kind in sorted(openings):
             events.append(Event(kind, int(times[row]), None, -np.inf, 0, "", (), 0))
         for kind, level in levels.items():
             own = [n for n, event in enumerate(events) if event.kind == kind and event.end is None]
@@ -148,21 +171,13 @@ class EventLog:
                 numbers[kind][inside] = n + 1
                 closing = np.flatnonzero(~is_open[kind][begin:end])
                 end_time = int(times[begin + closing[0]]) if len(closing) else None
-                events[n] = _grown(events[n], level, times, drivers[kind], inside, end_time)
+                events[n] = events[n].grown(level, times, series[kind], inside, end_time)
         return numbers, EventLog(states, tuple(events))
 
     def ended(self, end: int) -> EventLog:
         """The log in which open events ended at a time, or at their start if that is later."""
         events = tuple(e if e.end is not None else replace(e, end=max(e.start, end)) for e in self.events)
         return EventLog(events=events)
-
-    def _openings(self, is_open: dict[str, NDArray[np.bool_]]) -> list[tuple[int, str]]:
-        """Record and kind of each event that opens, in order of time."""
-        found = []
-        for kind, after in is_open.items():
-            before = int(self.is_open(kind))
-            found += [(int(row), kind) for row in np.flatnonzero(np.diff(after.astype(int), prepend=before) == 1)]
-        return sorted(found)
 
     def is_open(self, kind: str) -> bool:
         return self.state(kind).is_open
@@ -172,31 +187,9 @@ class EventLog:
         return self.states.get(kind, EventState())
 
 
-def _grown(
-    event: Event,
-    level: Array,
-    times: NDArray[np.int64],
-    drivers: tuple[Sequence[str], Sequence[dict[str, float]]],
-    inside: NDArray[np.intp],
-    end: int | None,
-) -> Event:
-    """The event with the records in which it was open."""
-    evaluated = inside[~np.isnan(level[inside])]
-    if len(evaluated):
-        modes, effects = drivers
-        peak = evaluated[np.argmax(level[evaluated])]
-        if level[peak] > event.peak:
-            event = replace(event, peak=float(level[peak]), peak_time=int(times[peak]), modes=modes[peak])
-        totals = dict(event.effects)
-        for row in evaluated:
-            totals |= {name: totals.get(name, 0.0) + size for name, size in effects[row].items()}
-        event = replace(event, effects=tuple(sorted(totals.items())))
-    return replace(event, end=end, n_alarms=event.n_alarms + len(evaluated))
-
-
 def leading(sizes: dict[str, float]) -> list[str]:
     """Names of the largest sizes, in standard deviations, and of others that matter."""
-    worst = sorted(sizes, key=lambda name: -sizes[name])[:MOST_NAMED]
+    worst = sorted(sizes, key=sizes.__getitem__, reverse=True)[:MOST_NAMED]
     return [name for n, name in enumerate(worst) if n == 0 or sizes[name] > MATTERS]
 
 
@@ -271,16 +264,12 @@ def event_changes(before: Sequence[Event], after: Sequence[Event], newest: int) 
         )
         was = known.pop(old, None)
         if was is None or (was.end is not None and event.end is None):
-            yield Transition("opened", event.start, newest, event.kind, number, detail=_drivers(event))
+            groups = f"; explained by a loss of stiffness of {event.groups}" if event.groups else ""
+            yield Transition("opened", event.start, newest, event.kind, number, detail=event.modes + groups)
         if event.end is not None and (was is None or was.end is None):
             yield Transition("closed", event.end, newest, event.kind, number, detail=f"peak {event.peak:.4g}")
     for number, event in known.items():
         yield Transition("withdrawn", event.start, newest, event.kind, number, detail="by records that came late")
-
-
-def _drivers(event: Event) -> str:
-    """Modes that drive an event, and the damage groups that explain it."""
-    return event.modes + (f"; explained by a loss of stiffness of {event.groups}" if event.groups else "")
 
 
 def _is_same(one: Event, other: Event) -> bool:

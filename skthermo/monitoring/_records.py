@@ -123,13 +123,17 @@ class RecordStore(SavesFrames):
         n_taken = len(timely) if are_confirmed else self._n_in_time(timely.index)
         fresh, ahead = timely.iloc[:n_taken], timely.iloc[n_taken:]
         set_aside = ahead[ahead.index.isin(batch.index)]
-        reasons = [self._why_too_late(stamp) for stamp in too_late.index]
+        end, late = self.baseline.index[-1], f"more than {duration_text(self.max_delay)} after newer records"
+        early = f"before the end of the baseline ({end})"
+        reasons = np.where(too_late.index <= end, early, f"came too late, {late}").tolist()
         newest = max(self.last, fresh.index[-1]) if len(fresh) else self.last
         reasons += [
             f"stamped more than {duration_text(self.jump)} after the newest record ({newest}): set aside"
         ] * len(set_aside)
         n_late = int((fresh.index < self.last).sum())
-        store = replace(self._with_records(fresh), ahead=ahead)
+        kept = pd.concat([self.kept, fresh]) if len(self.kept) and len(fresh) else fresh if len(fresh) else self.kept
+        kept = kept if kept.index.is_monotonic_increasing else kept.sort_index()
+        store = replace(self, kept=kept, ahead=ahead)
         return Intake(store, fresh, too_late, set_aside, reasons, n_given - len(batch), n_late)
 
     def jumps(self, stamps: pd.DatetimeIndex) -> bool:
@@ -160,18 +164,6 @@ class RecordStore(SavesFrames):
             if (is_live and newest > now) or (not is_present and stop - start < CONFIRMED):
                 return int(start)
         return len(times)
-
-    def _with_records(self, fresh: pd.DataFrame) -> RecordStore:
-        if not len(fresh):
-            return self
-        kept = pd.concat([self.kept, fresh]) if len(self.kept) else fresh
-        return replace(self, kept=kept if kept.index.is_monotonic_increasing else kept.sort_index())
-
-    def _why_too_late(self, stamp: pd.Timestamp) -> str:
-        end = self.baseline.index[-1]
-        if stamp <= end:
-            return f"before the end of the baseline ({end})"
-        return f"came too late, more than {duration_text(self.max_delay)} after newer records"
 
     def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows of a batch stand in a table; an error if some have other values there."""
@@ -209,7 +201,17 @@ class Memory:
 
     def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
         """Position of the earliest record that is needed for the one at a position, or at a time before it."""
-        return min(_back(path, times, place, time) for path in self.paths)
+        earliest = place
+        for path in self.paths:
+            at, moment = place, time
+            for rows, duration in path:
+                if rows:
+                    at = max(at - rows, 0)
+                else:
+                    at = int(np.searchsorted(times[:at], (times[at] if moment is None else moment) - duration))
+                moment = None
+            earliest = min(earliest, at)
+        return earliest
 
     def duration(self, step: pd.Timedelta) -> pd.Timedelta:
         """The longest of all ways in time, of records that are so far apart."""
@@ -223,16 +225,6 @@ class Memory:
         words = [f"{rows} records"] if rows else []
         words += [f"{time / 3.6e12:.3g} h"] if time else []
         return " and ".join(words) or "nothing"
-
-
-def _back(path: Path, times: NDArray[np.int64], place: int, time: int | None) -> int:
-    for rows, duration in path:
-        if rows:
-            place, time = max(place - rows, 0), None
-        else:
-            moment = (times[place] if time is None else time) - duration
-            place, time = int(np.searchsorted(times[:place], moment)), None
-    return place
 
 
 def _paths(part: Any, seen: set[int]) -> set[Path]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,7 +67,7 @@ class Departures(NamedTuple):
     beyond: Array
 
     def rows(self, rows: Any) -> Departures:
-        return Departures(*(part[rows] for part in self))
+        return Departures(*map(itemgetter(rows), self))
 
     def known(self) -> Departures:
         return self.rows(~np.isnan(self.values))
@@ -169,41 +171,26 @@ def local_days(stamps: pd.DatetimeIndex) -> Days:
     return stamps.tz_localize(None).as_unit("ns").asi8 // DAY_NS
 
 
-@dataclass(frozen=True)
-class UsualWeather:
-    """Usual temperature of each thermometer by season and time of day."""
-
-    coefficients: Array
-    has_season: bool
-    has_hours: bool
-
-    @classmethod
-    def of(cls, stamps: pd.DatetimeIndex, temperatures: Array, has_season: bool, has_hours: bool) -> UsualWeather:
-        """Learn from records; NaN is passed over."""
-        empty = cls(np.empty((0, 0)), has_season, has_hours)
-        inputs = empty.inputs(stamps)
-        found = np.zeros((inputs.shape[1], temperatures.shape[1]))
-        for sensor, column in enumerate(temperatures.T):
-            known = ~np.isnan(column)
-            found[:, sensor] = np.linalg.lstsq(inputs[known], column[known], rcond=1e-8)[0]
-        return cls(found, has_season, has_hours)
-
-    def inputs(self, stamps: pd.DatetimeIndex) -> Array:
-        """A constant and harmonics of the year and the day."""
-        at = stamps.tz_localize(None).as_unit("ns").asi8 / DAY_NS
-        periods = [YEAR / DAY] * self.has_season + [1.0] * self.has_hours
-        waves = [2 * np.pi * k * at / period for period in periods for k in range(1, SEASONS + 1)]
-        return np.column_stack([np.ones(len(at)), *(part for wave in waves for part in (np.sin(wave), np.cos(wave)))])
-
-    def anomalies(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
-        return temperatures - self.inputs(stamps) @ self.coefficients
+def harmonics(stamps: pd.DatetimeIndex, periods: Sequence[float]) -> Array:
+    """A constant, and harmonics of some periods in days."""
+    at = stamps.tz_localize(None).as_unit("ns").asi8 / DAY_NS
+    columns = [np.ones(len(at))]
+    for period in periods:
+        for k in range(1, SEASONS + 1):
+            wave = 2 * np.pi * k * at / period
+            columns += [np.sin(wave), np.cos(wave)]
+    return np.column_stack(columns)
 
 
 @dataclass(frozen=True)
 class Thermometers:
-    """Daily anomalies of thermometers, and how they go together in the baseline."""
+    """Daily anomalies of thermometers, and how they go together in the baseline.
 
-    climate: UsualWeather
+    ``usual`` are coefficients of the `harmonics` of some ``periods``: temperatures by season and time of day.
+    """
+
+    usual: Array
+    periods: tuple[float, ...]
     gaussian: Gaussian
     least: float
     n_days: int
@@ -222,54 +209,58 @@ class Thermometers:
             return None
         has_season = bool(days[-1] - days[0] >= WHOLE_YEAR)
         least = LEAST_OF_A_DAY * len(stamps) / len(days)
-        options = (has_season, len(stamps) / len(days) >= OFTEN)
+        periods = (YEAR / DAY,) * has_season + (1.0,) * (len(stamps) / len(days) >= OFTEN)
         found = np.full((4, len(days), n_sensors), np.nan)
         fold_of = days // BLOCK % N_FOLDS if has_season else np.arange(len(days)) * N_FOLDS // len(days)
         for fold in range(N_FOLDS):
             test = np.isin(every_day, days[fold_of == fold])
             if test.all() or not test.any() or np.isnan(temperatures[~test]).all(axis=0).any():
                 continue
-            part = cls._learned(stamps[~test], temperatures[~test], options, least)
+            part = cls._learned(stamps[~test], temperatures[~test], periods, least)
             means = part.daily_means(stamps[test], temperatures[test])
             found[:, fold_of == fold] = part.departures(means, np.ones(n_sensors, dtype=bool))
         noises = tuple(
             ThermometerNoise.of(Departures(days, *found[:, :, j]), per_year / n_sensors) for j in range(n_sensors)
         )
-        whole = cls._learned(stamps, temperatures, options, least)
+        whole = cls._learned(stamps, temperatures, periods, least)
         return replace(whole, noises=noises)
 
     @classmethod
     def _learned(
-        cls, stamps: pd.DatetimeIndex, temperatures: Array, options: tuple[bool, bool], least: float
+        cls, stamps: pd.DatetimeIndex, temperatures: Array, periods: tuple[float, ...], least: float
     ) -> Thermometers:
-        """Usual weather and covariance from some records."""
-        climate = UsualWeather.of(stamps, temperatures, *options)
+        """Usual weather and covariance from some records; NaN is passed over."""
+        inputs = harmonics(stamps, periods)
+        usual = np.zeros((inputs.shape[1], temperatures.shape[1]))
+        for sensor, column in enumerate(temperatures.T):
+            known = ~np.isnan(column)
+            usual[:, sensor] = np.linalg.lstsq(inputs[known], column[known], rcond=1e-8)[0]
         gaussian = Gaussian(np.empty(0), np.empty((0, 0)))
-        bare = cls(climate, gaussian, least, 0, np.empty(0), np.empty(0), (), gaussian)
+        bare = cls(usual, periods, gaussian, least, 0, np.empty(0), np.empty(0), (), gaussian)
         means = bare.daily_means(stamps, temperatures)
         found = Gaussian.of(means[~np.isnan(means).all(axis=1)])
         own = np.diag(JITTER * np.diag(found.covariance) + LEAST_DEVIATION**2)
         lowest, highest = np.fmin.reduce(means), np.fmax.reduce(means)
         gaussian = Gaussian(found.mean, found.covariance + own)
-        anomalies = climate.anomalies(stamps, temperatures)
+        anomalies = temperatures - inputs @ usual
         together = Gaussian.of(anomalies[~np.isnan(anomalies).all(axis=1)])
         together = Gaussian(together.mean, together.covariance + own)
-        return cls(climate, gaussian, least, len(means), lowest, highest, (), together)
+        return cls(usual, periods, gaussian, least, len(means), lowest, highest, (), together)
 
     def daily_means(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
         """Mean anomaly of each day that has records, in order; NaN where a thermometer has few of them."""
         day = np.unique(local_days(stamps), return_inverse=True)[1].ravel()
-        anomalies = self.climate.anomalies(stamps, temperatures)
+        anomalies = temperatures - harmonics(stamps, self.periods) @ self.usual
         known = ~np.isnan(anomalies)
-        counts, sums = (
-            np.column_stack([np.bincount(day, column, minlength=day.max() + 1) for column in table.T])
-            for table in (known.astype(float), np.where(known, anomalies, 0.0))
-        )
+        counts, sums = np.zeros((2, day.max() + 1, anomalies.shape[1]))
+        for sensor, own in enumerate(known.T):
+            counts[:, sensor] = np.bincount(day, own)
+            sums[:, sensor] = np.bincount(day, np.where(own, anomalies[:, sensor], 0.0))
         return np.where(counts >= max(self.least, 1.0), sums / np.maximum(counts, 1.0), np.nan)
 
     def filled(self, stamps: pd.DatetimeIndex, temperatures: Array) -> Array:
         """Temperatures whose gaps hold what the other thermometers of their record predict."""
-        usual = self.climate.inputs(stamps) @ self.climate.coefficients
+        usual = harmonics(stamps, self.periods) @ self.usual
         return usual + self.records.completed(temperatures - usual)[0]
 
     def departures(self, means: Array, trusted: NDArray[np.bool_]) -> Array:
@@ -278,14 +269,12 @@ class Thermometers:
         NaN where a thermometer, or each of the other trusted ones, has no value.
         """
         found = np.full((4, *means.shape), np.nan)
-        n_learned = self.climate.inputs(pd.DatetimeIndex([0])).shape[1]
         for sensor in range(means.shape[1]):
             others = np.where(trusted, means, np.nan)
             others[:, sensor] = np.nan
-            (expected, spread), (within, _) = (
-                (part[:, sensor] for part in self.gaussian.completed(table))
-                for table in (others, np.clip(others, self.lowest, self.highest))
-            )
-            unusual = (n_learned + self.gaussian.distances(others) ** 2) / self.n_days
-            found[:, :, sensor] = (means[:, sensor] - expected) / spread, spread, unusual, expected - within
+            expected, spread = self.gaussian.completed(others)
+            within = self.gaussian.completed(np.clip(others, self.lowest, self.highest))[0]
+            unusual = (len(self.usual) + self.gaussian.distances(others) ** 2) / self.n_days
+            values = (means - expected)[:, sensor] / spread[:, sensor]
+            found[:, :, sensor] = values, spread[:, sensor], unusual, (expected - within)[:, sensor]
         return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -139,29 +140,26 @@ class Runs:
 
     def after(self, stamps: Counts, values: Array, implausible: NDArray[np.bool_]) -> Runs:
         """Runs after more records; those without any value tell nothing of a single column."""
-        runs = self
+        last, before, since = self.last, self.counts, self.since
         for stamp, row, is_implausible in zip(stamps, values, implausible, strict=True):
-            runs = runs._next(stamp, row, is_implausible)
-        return runs
+            seen = ~np.isnan(row)
+            if not seen.any():
+                continue
+            counts = np.array(
+                [
+                    np.where(seen | np.isnan(last), 0, before[MISSING] + 1),
+                    np.where(seen, np.where(row == last, before[REPEATED] + 1, 1), before[REPEATED]),
+                    run_of(before[IMPLAUSIBLE], seen, is_implausible),
+                ]
+            )
+            is_fresh = (counts == 1) & ((before != 1) | np.array([~seen, seen, seen]))
+            last, before, since = np.where(seen, row, last), counts, np.where(is_fresh, stamp, since)
+        return Runs(last, before, since)
 
-    def _next(self, stamp: np.int64, row: Array, implausible: NDArray[np.bool_]) -> Runs:
-        seen = ~np.isnan(row)
-        if not seen.any():
-            return self
-        begun = ~np.isnan(self.last)
-        counts = np.array(
-            [
-                np.where(seen | ~begun, 0, self.counts[MISSING] + 1),
-                np.where(seen, np.where(row == self.last, self.counts[REPEATED] + 1, 1), self.counts[REPEATED]),
-                self.implausible(seen, implausible),
-            ]
-        )
-        fresh = (counts == 1) & ((self.counts != 1) | np.array([~seen, seen, seen]))
-        return Runs(np.where(seen, row, self.last), counts, np.where(fresh, stamp, self.since))
 
-    def implausible(self, seen: NDArray[np.bool_], implausible: NDArray[np.bool_]) -> Counts:
-        """Length of the run of implausible values of each column after one more record."""
-        return np.where(seen, np.where(implausible, self.counts[IMPLAUSIBLE] + 1, 0), self.counts[IMPLAUSIBLE])
+def run_of(before: Counts, seen: NDArray[np.bool_], implausible: NDArray[np.bool_]) -> Counts:
+    """Length of the run of implausible values of each column after one more record."""
+    return np.where(seen, np.where(implausible, before + 1, 0), before)
 
 
 @dataclass(frozen=True)
@@ -317,7 +315,7 @@ class SensorWatch:
 
         What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
         """
-        n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
+        n_sensors, own = len(self.sensors), list(map(itemgetter(0), self.columns))
         temperatures, responses = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
         impossible, far, _, expected = self._evaluated(temperatures[:, own], responses)
         given = np.hstack([temperatures[:, own], responses])
@@ -344,19 +342,15 @@ class SensorWatch:
         moments: Counts,
         acknowledged: Sequence[int],
     ) -> NDArray[np.bool_]:
-        n_sensors, faults = len(self.sensors), state.faults
-        of_mode = {
-            column - n_sensors: fault
-            for column, fault in faults.left_out().items()
-            if column >= n_sensors and fault.kind in HELD
-        }
+        n_sensors, of_mode = len(self.sensors), {}
+        for column, fault in state.faults.left_out().items():
+            if column >= n_sensors and fault.kind in HELD:
+                of_mode[column - n_sensors] = fault
         is_fault = np.isin(np.arange(len(self.modes)), list(of_mode))
-        runs = replace(state.runs, counts=state.runs.counts[:, n_sensors:])
-        lengths = np.zeros(far.shape, dtype=np.int64)
-        if far.any() or runs.counts[IMPLAUSIBLE].any():
+        run, lengths = state.runs.counts[IMPLAUSIBLE, n_sensors:], np.zeros(far.shape, dtype=np.int64)
+        if far.any() or run.any():
             for row in range(len(far)):
-                lengths[row] = runs.implausible(seen[row], far[row])
-                runs = replace(runs, counts=np.array([*runs.counts[:IMPLAUSIBLE], lengths[row]]))
+                run = lengths[row] = run_of(run, seen[row], far[row])
         held = (lengths > 0) | is_fault
         for mode, fault in of_mode.items():
             said = [time for time in acknowledged if time >= fault.since]
@@ -373,7 +367,7 @@ class SensorWatch:
         expected: Array,
     ) -> list[str]:
         """What was left out of each record, and why."""
-        names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
+        names, n_sensors = list(map(str, (*self.sensors, *self.modes))), len(self.sensors)
         out = self._left_out(faults)
         lasting = faults.notes(names, self.zone)
         notes = ["; ".join(lasting)] * len(given)
@@ -403,7 +397,7 @@ class SensorWatch:
         stamps = T_day.index
         day = int(local_days(stamps[:1])[0])
         moments = stamps.as_unit("ns").asi8
-        temperatures = as_floats(T_day)[:, [own[0] for own in self.columns]]
+        temperatures = as_floats(T_day)[:, list(map(itemgetter(0), self.columns))]
         midnight, before = int(self._midnight(day)), state.faults
         impossible, _, rest, expected = self._evaluated(temperatures, self._in_place(before, as_floats(F_day)))
         state = self._with_exchanges(state, rest, expected, midnight)
