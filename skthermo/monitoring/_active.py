@@ -68,8 +68,10 @@ class Branch:
                 yield from cls.all_of(inner)
             return
         *steps, _ = _steps(detector)
-        compensators = (step for step in steps if isinstance(step, TemperatureCompensator))
-        yield cls(steps, next(compensators, None), last)
+        compensator = None
+        for step in reversed(steps):
+            compensator = step if isinstance(step, TemperatureCompensator) else compensator
+        yield cls(steps, compensator, last)
 
     @property
     def directional(self) -> DirectionalDetector | None:

@@ -93,8 +93,8 @@ class History(SavesFrames):
         by_peak = {}
         for one in self.acknowledgements:
             if one.kind == MEASUREMENT:
-                by_peak[one.peak_time] = one
-        return [one.time for one in by_peak.values() if one.harmless]
+                by_peak[one.peak_time] = one.time if one.harmless else None
+        return list(filter(None, by_peak.values()))
 
     @property
     def has_set_aside(self) -> bool:
@@ -201,7 +201,7 @@ class History(SavesFrames):
                 reasons[row] = f"{reasons[row]}; {text}" if reasons[row] else text
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         shown = np.where((modes == "") & seen.is_held, seen.held, modes)
-        answers = _answers(raw.index, index, active.threshold, (shown, effects), reasons, numbers, is_held)
+        answers = _answers(raw.index, index, active.threshold, shown, effects, reasons, numbers, is_held)
         points = [*self.checkpoints[:place], *points]
         state = replace(
             self,
@@ -399,15 +399,16 @@ def _last_before(points: Sequence[Checkpoint], time: pd.Timestamp) -> int:
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
     """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
-    drivers, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
-    return _answers(stamps, nothing, threshold, drivers, list(reasons), {DAMAGE: number}, is_held)
+    shown, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
+    return _answers(stamps, nothing, threshold, *shown, list(reasons), {DAMAGE: number}, is_held)
 
 
 def _answers(
     stamps: pd.DatetimeIndex,
     index: Array,
     threshold: float,
-    drivers: tuple[Sequence[str], Sequence[dict[str, float]]],
+    modes: Sequence[str],
+    effects: Sequence[dict[str, float]],
     reasons: list[str],
     numbers: dict[str, NDArray[np.int64]],
     is_held: NDArray[np.bool_],
@@ -418,15 +419,17 @@ def _answers(
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
     for kind in (MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))
-    groups, is_shown = [", ".join(leading(sizes)) for sizes in drivers[1]], is_alarm | is_watch
+    is_shown, groups = is_alarm | is_watch, [""] * len(index)
+    for row in np.flatnonzero(is_shown):
+        groups[row] = ", ".join(leading(effects[row]))
     quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")
     state = np.where(is_alarm, "alarm", np.where(is_watch, "watch", quiet))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(np.where(is_shown, drivers[0], "").tolist(), stamps, dtype=object),
-        "groups": pd.Series(np.where(is_shown, groups, "").tolist(), stamps, dtype=object),
+        "modes": pd.Series(np.where(is_shown, modes, "").tolist(), stamps, dtype=object),
+        "groups": pd.Series(groups, stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
         "event": np.where(has_index | is_held, number, 0),
     }
@@ -441,7 +444,7 @@ def _days_of(answers: pd.DataFrame, n_left_out: NDArray[np.int64]) -> pd.DataFra
     """
     days = midnights(answers.index).rename("day")
     begins = np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[:1] - 1))
-    state, index = (answers[name].to_numpy() for name in ("state", "index"))
+    state, index = answers["state"].to_numpy(), answers["index"].to_numpy()
     counted = np.column_stack([np.ones(len(state)), state != "not evaluated", state == "alarm", n_left_out])
     totals, levels = np.zeros((len(begins), 4), dtype=np.int64), np.full((len(begins), 2), np.nan)
     if len(begins):

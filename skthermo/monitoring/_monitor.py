@@ -29,15 +29,15 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._columns import UsableBaseline, without_what_cannot_be
+from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._events import DAMAGE, Acknowledgement, Transition
 from skthermo.monitoring._files import versions, write_monitor
 from skthermo.monitoring._history import History
 from skthermo.monitoring._records import OF_TRAINING, Memory, RecordStore, read_records
+from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
 from skthermo.monitoring._threshold import FalseAlarmEstimate, SmallestChanges
-from skthermo.monitoring.retraining import Retraining, begun_again, retrained
 
 MOST_CAUSES = 3  # in a warning
 
@@ -323,13 +323,12 @@ class Monitor(SavesFrames, Estimator):
             even large changes of a response.
         """
         max_delay, retention = self._checked_times()
-        usable = UsableBaseline.of(self, _read_baseline(X))
-        baseline, detector, columns = usable.records, usable.detector, usable.columns
+        given = _read_baseline(X)
+        baseline, detector, columns, found = usable_baseline(self, given)
         seed_parts(detector, seeded(self.random_state))
         self.targets_, self.units_ = columns.targets, columns.units
-        self.columns_, self.left_out_ = usable.given, usable.found.left_out
-        found = usable.found.table
-        self.set_aside_ = found[~found["column"].isin(list(self.left_out_))].reset_index(drop=True)
+        self.columns_, self.left_out_, aside = list(given.columns), found.left_out, found.table
+        self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
         corrections = self._corrections(baseline, columns.reference, self.fem)
         trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
         active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)

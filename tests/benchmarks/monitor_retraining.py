@@ -29,7 +29,7 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._records import Memory
-from skthermo.monitoring.retraining import begun_again, retrained
+from skthermo.monitoring._retraining import begun_again, retrained
 from skthermo.preprocessing import HingeFeatures
 from skthermo.surrogate import TemperatureMapper
 

@@ -13,7 +13,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._records import Memory
-from skthermo.monitoring.retraining._retraining import Harvest, margin_of
+from skthermo.monitoring._retraining import Harvest, margin_of
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.03}, "repaired": {"diagonal": -0.15}}

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from skthermo._tables.arrays import Array, as_floats
 from skthermo._tables.frames import DAY_NS, as_index, columns_by_sensor, frame_like
 from skthermo.monitoring._events import Transition
-from skthermo.monitoring.sensors._responses import CERTAIN, Responses
-from skthermo.monitoring.sensors._thermometers import (
+from skthermo.monitoring.sensors._expected import (
+    CERTAIN,
     LEAST_DAYS,
     LONGEST,
     Change,
     Days,
     Departures,
+    Responses,
     Thermometers,
     local_days,
 )

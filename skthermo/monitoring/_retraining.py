@@ -19,8 +19,8 @@ from skthermo._tables.text import capital, counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._records import Memory
+from skthermo.monitoring._shift import ShiftsTried, WeatherFree, block_mean
 from skthermo.monitoring._threshold import WEEK, blocks_of, crossing, levels, lowered, whole_weeks
-from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree, block_mean
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
@@ -151,15 +151,15 @@ def retrained(
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * free.scale
-    found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
+    table = comparison(old, new, harvest.records, targets, spread, _past_events(monitor))
     reasons = [
         *changes.objections(),
-        *(f"the new detector is significantly worse in {name!r}" for name in found.worse()),
+        *(f"the new detector is significantly worse in {name!r}" for name in worse_measures(table)),
     ]
     notes, shift = changes.notes(), changes.table((baseline.index[-1] - baseline.index[0]) / YEAR)
     accepted = force or not reasons
     learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector, "shift": shift}
-    return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
+    return Retraining("refit", accepted, tuple(reasons), tuple(notes), table, harvest.excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
@@ -384,54 +384,41 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
     return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2
 
 
-@dataclass(frozen=True)
-class DetectorComparison:
+def comparison(
+    old: ActiveDetector,
+    new: ActiveDetector,
+    overlap: pd.DataFrame,
+    targets: list[Any],
+    spread: pd.Series,
+    events: dict[Any, pd.DataFrame],
+) -> pd.DataFrame:
     """The old detector and the one that may follow it, on the records that the old one has not learned from.
 
-    ``table`` has a row for each measure: ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its
-    ``standard_error`` from blocks of time, and ``worse``: whether the new one is significantly worse in it.
+    False alarms, scatter, the smallest changes found, weather, and records of past events. A row for each measure:
+    ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its ``standard_error`` from blocks of
+    time, and ``worse``: whether the new one is significantly worse in it. ``spread`` holds standard deviations of the
+    responses, weather taken out, in their units.
     """
+    blocks = blocks_of(overlap.index)
+    rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
+    persistence = old.estimate.rule.persistence
+    rows = {
+        FALSE: _compared(*(_above(levels(one, persistence)[0]) for one in rates), blocks),
+        "median index over threshold": _medians(*rates),
+        **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
+        "records in unknown weather": _unknown(old, new, overlap, targets),
+        **dict(_found(old, new, events)),
+    }
+    table = pd.DataFrame(rows, index=["old", "new", "difference", "standard_error", "worse"]).T
+    return table.astype(dict.fromkeys(table.columns[:4], float) | {"worse": bool})
 
-    table: pd.DataFrame
 
-    @classmethod
-    def of(
-        cls,
-        old: ActiveDetector,
-        new: ActiveDetector,
-        overlap: pd.DataFrame,
-        targets: list[Any],
-        spread: pd.Series,
-        events: dict[Any, pd.DataFrame],
-    ) -> DetectorComparison:
-        """On the overlap: false alarms, scatter, the smallest changes found, weather, and records of past events.
-
-        ``spread`` holds standard deviations of the responses, weather taken out, in their units.
-        """
-        blocks = blocks_of(overlap.index)
-        rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
-        persistence = old.estimate.rule.persistence
-        rows = {
-            FALSE: _compared(*(_above(levels(one, persistence)[0]) for one in rates), blocks),
-            "median index over threshold": _medians(*rates),
-            **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
-            "records in unknown weather": _unknown(old, new, overlap, targets),
-            **dict(_found(old, new, events)),
-        }
-        table = pd.DataFrame(rows, index=["old", "new", "difference", "standard_error", "worse"]).T
-        return cls(table.astype(dict.fromkeys(table.columns[:4], float) | {"worse": bool}))
-
-    @property
-    def fewer_false(self) -> bool:
-        """Whether the new detector has clearly fewer records in alarm."""
-        row = self.table.loc[FALSE]
-        return bool(row["difference"] < -CLEAR * row["standard_error"])
-
-    def worse(self) -> list[str]:
-        """Measures in which the new detector is significantly worse, and which count."""
-        found = list(self.table.index[self.table["worse"]])
-        # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
-        return [name for name in found if not (name == SMALLEST and self.fewer_false)]
+def worse_measures(table: pd.DataFrame) -> list[str]:
+    """Measures in which the new detector is significantly worse, and which count."""
+    false = table.loc[FALSE]
+    has_fewer_false = bool(false["difference"] < -CLEAR * false["standard_error"])
+    # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
+    return [name for name in table.index[table["worse"]] if not (name == SMALLEST and has_fewer_false)]
 
 
 def _above(ratio: Array) -> Array:
