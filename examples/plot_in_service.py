@@ -71,7 +71,7 @@ print(monitor.false_alarm_estimate_)
 for day, new in later.groupby(later.index.normalize()):
     answers = monitor.update(new)
     if day.is_month_end:
-        print(f"{day:%Y-%m-%d}: {monitor.state()}, {len(monitor.events_)} events")
+        print(f"{day:%Y-%m-%d}: {monitor.status(day).state}, {len(monitor.events_)} events")
 
 # %%
 # The last day, again: what was known already is counted and ignored. A saved monitor goes on where it stopped.

@@ -48,12 +48,10 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fleet.prior": set(),
     "monitoring": {
         "monitoring.drift",
-        "monitoring.retraining",
         "monitoring.sensors",
         "preprocessing.checks",
     },  # the monitor joins them
     "monitoring.drift": set(),
-    "monitoring.retraining": set(),
     "monitoring.sensors": {"preprocessing.checks"},
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},

@@ -69,20 +69,27 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.covariances_of_fills(weather), 0 * self.covariances_of_fills(weather)",
         ),
     ],
-    ("monitoring/_memory.py", "monitoring/test_monitor.py"): [
+    ("monitoring/_records.py", "monitoring/test_monitor.py"): [
         ("lags and windows that do not add up", "{way + more for way", "{way or more for way"),
     ],
     ("monitoring/_active.py", "monitoring/test_monitor.py"): [
         ("indices at an edge that are not computed alone", "flatnonzero(from_edge <=", "flatnonzero(from_edge < -"),
     ],
-    ("monitoring/_state.py", "monitoring/test_monitor.py"): [
-        ("late records that do not go back to their day", "n == 0 or one.day <= first)", "True)"),
+    ("monitoring/_events.py", "monitoring/test_false_alarms.py"): [
+        ("end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
     ],
-    ("monitoring/retraining/_retraining.py", "monitoring/test_retraining.py"): [
+    ("monitoring/_history.py", "monitoring/test_monitor.py"): [
+        (
+            "late records that do not go back to their day",
+            "place = _last_before(self.checkpoints, first)",
+            "place = len(self.checkpoints) - 1",
+        ),
+    ],
+    ("monitoring/_retraining.py", "monitoring/test_retraining.py"): [
         ("records of an event train", "kept &= ~inside", "kept &= True"),
         ("old weeks that never fade", "moved[kept]", "moved"),
     ],
-    ("monitoring/retraining/_shift.py", "monitoring/test_retraining.py"): [
+    ("monitoring/_shift.py", "monitoring/test_retraining.py"): [
         ("a change that is never real", "self.is_real and self.size > MATTERS", "self.is_real and self.size > 100"),
     ],
     ("monitoring/drift/_follower.py", "monitoring/test_drift_follower.py"): [
@@ -97,11 +104,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
-    ("monitoring/sensors/_changes.py", "monitoring/sensors/test_changes.py"): [
+    ("monitoring/sensors/_expected.py", "monitoring/sensors/test_changes.py"): [
         ("weather that the baseline does not have", "1 / BEYOND**2", "1e12"),
         ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
     ],
-    ("monitoring/sensors/_responses.py", "monitoring/sensors/test_sensor_watch.py"): [
+    ("monitoring/sensors/_expected.py", "monitoring/sensors/test_sensor_watch.py"): [
         ("damage taken for exchanged modes", "if is_near else", "if True else"),
     ],
     ("monitoring/sensors/_watch.py", "monitoring/sensors/test_sensor_watch.py"): [
@@ -141,7 +148,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fleet/_workers.py", "fleet/test_fit_fleet.py"): [
         ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
     ],
-    ("monitoring/_false_alarms.py", "fleet/test_discoveries.py"): [
+    ("monitoring/_threshold.py", "fleet/test_discoveries.py"): [
         ("p values allow for how few peaks there are", "-(self.k + 1) * np.log1p(ratio", "-self.k * np.log1p(ratio"),
     ],
     ("fem/_evaluate.py", "fem/test_progress.py"): [
@@ -464,13 +471,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("measured rates outside their bands", 'is_open=rates["inside"] == 0', 'is_open=rates["inside"] == 2'),
         ("measured records not evaluated", "if measured > 0:", "if measured > 1:"),
     ],
+    ("monitoring/_status.py", "reporting/test_service.py"): [
+        ("silence called healthy", "self.max_age is not None and self.age > self.max_age", "False"),
+    ],
     ("reporting/service/_standing.py", "reporting/test_service.py"): [
-        ("silence called healthy", "return self.now - self.last > self.step + LATE", "return False"),
-        ("much lost stiffness called healthy", "return ATTENTION if said == HEALTHY and self.worn else", "return"),
+        ("much lost stiffness called healthy", 'return "attention" if said == "healthy" and self.worn else', "return"),
     ],
     ("reporting/fleet/_bridge.py", "reporting/test_fleet.py"): [
-        ("significant alarms among the others", "SIGNIFICANT if is_significant else OPEN", "OPEN"),
-        ("silent bridges below healthy ones", "place, size = SILENT,", "place, size = WELL,"),
+        ("significant alarms among the others", '("significant" if is_significant else "open")', '"open"'),
+        ("silent bridges below healthy ones", 'place, size = "silent",', 'place, size = "well",'),
     ],
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
         (
@@ -485,14 +494,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/_structures.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
-    ("monitoring/_false_alarms.py", "monitoring/test_false_alarms.py"): [
-        ("tail of squared peaks", 'excursions["peak"].to_numpy() ** 2', 'excursions["peak"].to_numpy()'),
-        ("end of an event", "at - since >= self.hold.value", "at - since > self.hold.value"),
+    ("monitoring/_threshold.py", "monitoring/test_false_alarms.py"): [
+        ("tail of squared peaks", 'self.table["peak"].to_numpy() ** 2', 'self.table["peak"].to_numpy()'),
         ("numbers of a year", "nbinom.cdf(number, self.k + 1,", "nbinom.cdf(number, 5 * self.k + 5,"),
-    ],
-    ("monitoring/_direction.py", "monitoring/test_direction.py"): [
-        ("direction found from lowered frequencies", "and left < nnls(effects", "and left > nnls(effects"),
-        ("a mixed change called stiffening", "-1 if explained and left", "-1 if left"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [
         ("functions read from files", "isinstance(found, type) and found", "found"),

@@ -293,7 +293,7 @@ def standing_of(monitor: Monitor) -> dict[str, Any]:
     damage = events[events["kind"] == "damage"]
     n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
     standing = NOT_WATCHED | {
-        "state": monitor.state(),
+        "state": monitor.status(monitor.last_).state,
         "last": monitor.last_ if len(monitor.records_) else pd.NaT,
         "n_evaluated": n_evaluated,
         "not_evaluated": 1 - n_evaluated / n_records if n_records else np.nan,

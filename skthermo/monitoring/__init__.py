@@ -1,13 +1,13 @@
 """Detectors in service: records that come in batches, sensors that fail, structures that age.
 
-It uses ``detection``, and takes a chain where there is an FE model. Start with ``_monitor.py``; ``_state.py`` is
+It uses ``detection``, and takes a chain where there is an FE model. Start with ``_monitor.py``; ``_history.py`` is
 what happens to a batch.
 """
 
 from skthermo.monitoring._files import load_monitor
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring._retraining import Retraining
 from skthermo.monitoring._status import MonitorStatus
 from skthermo.monitoring.drift import ParameterHistory, track_parameters
-from skthermo.monitoring.retraining import Retraining
 
 __all__ = ["Monitor", "MonitorStatus", "ParameterHistory", "Retraining", "load_monitor", "track_parameters"]

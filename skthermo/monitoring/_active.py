@@ -28,10 +28,15 @@ from skthermo.detection import (
 )
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, leading
-from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate, estimate_false_alarms
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._smallest import LoweredIndices, SmallestChanges, lowered
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH, EventRule, leading
+from skthermo.monitoring._records import Memory
+from skthermo.monitoring._threshold import (
+    FalseAlarmEstimate,
+    SmallestChanges,
+    estimate_false_alarms,
+    lowered,
+    smallest_by_threshold,
+)
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
@@ -63,8 +68,10 @@ class Branch:
                 yield from cls.all_of(inner)
             return
         *steps, _ = _steps(detector)
-        compensators = (step for step in steps if isinstance(step, TemperatureCompensator))
-        yield cls(steps, next(compensators, None), last)
+        compensator = None
+        for step in reversed(steps):
+            compensator = step if isinstance(step, TemperatureCompensator) else compensator
+        yield cls(steps, compensator, last)
 
     @property
     def directional(self) -> DirectionalDetector | None:
@@ -120,8 +127,9 @@ class ActiveDetector(SavesFrames):
     """A fitted detector, and all by which it evaluates. It does not change: another one takes its place.
 
     ``trained`` is what it was fitted on, ``columns`` are those that it sees, ``usual`` means and standard deviations of
-    the responses; records go through ``corrections`` before. There is an estimate of false alarms for each kind of
-    event that has a damage index. After a new baseline, ``prior`` are records from before the intervention, which was
+    the responses; records go through ``corrections`` before. ``smallest`` are the falls of the responses that raise an
+    alarm in the weather of the baseline; there is an estimate of false alarms for each kind of event that has a damage
+    index. After a new baseline, ``prior`` are records from before the intervention, which was
     complete ``since`` then.
     """
 
@@ -134,7 +142,7 @@ class ActiveDetector(SavesFrames):
     usual: tuple[Array, Array]
     weather: TrainingRange
     corrections: Corrections
-    lowered: LoweredIndices
+    smallest: SmallestChanges
     estimates: dict[str, FalseAlarmEstimate]
     prior: pd.DataFrame | None = None
     since: pd.Timestamp | None = None
@@ -157,9 +165,9 @@ class ActiveDetector(SavesFrames):
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step
         index_of = partial(_index_of, detector, columns)
-        changes = LoweredIndices.of(index_of, trained, targets, usual[1], within, _losses_of(detector))
+        smallest_at = smallest_by_threshold(index_of, trained, targets, usual[1], within, _losses_of(detector))
         options = {"hold": DAY, "persistence": persistence}
-        damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=changes.smallest, **options)
+        damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=smallest_at, **options)
         estimates = {DAMAGE: damage}
         if monitor.watch_per_year is not None:
             with reported_by_caller(KINDS_OF_ESTIMATE):  # for the higher threshold
@@ -169,14 +177,17 @@ class ActiveDetector(SavesFrames):
             estimates[WATCH] = replace(
                 watch, rule=replace(watch.rule, threshold=lower, release=min(lower, watch.rule.release))
             )
-        parts = (memory, columns, temperatures, targets, usual, weather, corrections, changes, estimates)
+        smallest = smallest_at(damage.rule.threshold)
+        parts = (memory, columns, temperatures, targets, usual, weather, corrections, smallest, estimates)
         return cls(detector, trained, *parts)
 
     @property
     def rules(self) -> dict[str, EventRule]:
         """By which events of each kind open and close."""
-        set_aside = EventRule(threshold=0.5, release=0.5, hold=DAY, persistence=SET_ASIDE)
-        return {kind: estimate.rule for kind, estimate in self.estimates.items()} | {MEASUREMENT: set_aside}
+        rules = {MEASUREMENT: EventRule(threshold=0.5, release=0.5, hold=DAY, persistence=SET_ASIDE)}
+        for kind, estimate in self.estimates.items():
+            rules[kind] = estimate.rule
+        return rules
 
     @property
     def estimate(self) -> FalseAlarmEstimate:
@@ -185,17 +196,12 @@ class ActiveDetector(SavesFrames):
 
     @property
     def threshold(self) -> float:
-        return self.estimate.rule.threshold
+        return self.estimates[DAMAGE].rule.threshold
 
     @property
     def watch_threshold(self) -> float | None:
         """An event of a raised index opens above it; None if these are not asked for."""
         return self.estimates[WATCH].rule.threshold if WATCH in self.estimates else None
-
-    @property
-    def smallest(self) -> SmallestChanges:
-        """Falls of the responses that raise an alarm in the weather of the baseline."""
-        return self.lowered.smallest(self.threshold)
 
     @property
     def baseline_index(self) -> pd.Series:
@@ -281,45 +287,38 @@ class ActiveDetector(SavesFrames):
     def _exact(self, records: pd.DataFrame) -> Array:
         return _index_of(self.detector, self.columns, records)
 
-    def drivers(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
-        """Names of the modes that drive the damage index of some records, the worst first."""
+    def explained(
+        self, records: pd.DataFrame, first: int, rows: NDArray[np.intp]
+    ) -> tuple[NDArray[np.object_], list[dict[str, float]]]:
+        """Names of the modes that drive the index of some records from a position on, the worst first, and groups.
+
+        Groups are those whose losses explain most of the departure, by how many standard deviations, those that cannot
+        be distinguished together; none where no losses explain it, and nothing of the other records.
+        """
+        modes, effects = np.full(len(records) - first, "", dtype=object), [{}] * (len(records) - first)
         if not len(rows):
-            return []
-        times = records.index.asi8
-        start = self.memory.start(times, rows[0])
-        part = records.iloc[start : rows[-1] + 1]
-        places = rows - start
-        sizes = []
+            return modes, effects
+        start = self.memory.start(records.index.asi8, first + rows[0])
+        part, places = records.iloc[start : first + rows[-1] + 1][self.columns], first + rows - start
+        sizes, found = [], None
         for branch in Branch.all_of(self.detector):
             with without_warnings():
-                standard = branch.standard(part[self.columns], self.usual, self.targets)
+                standard = branch.standard(part, self.usual, self.targets)
+                found = branch.explanations(part) if found is None else found
             if isinstance(branch.last, WindowedAlarm):
-                standard = _window_means(standard, branch.last, times[start : rows[-1] + 1], places)
+                standard = _window_means(standard, branch.last, part.index.asi8, places)
             else:
                 standard = standard[places]
             sizes.append(np.nan_to_num(np.abs(standard)))
-        size = np.round(np.mean(sizes, axis=0), 2)
-        return [", ".join(leading(dict(zip(map(str, self.targets), row, strict=True)))) for row in size]
-
-    def groups(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[dict[str, float]]:
-        """Damage groups whose losses explain most of the departure of some records, by how many standard deviations.
-
-        Groups that cannot be distinguished count together. Nothing where no losses explain it.
-        """
-        if not len(rows):
-            return []
-        start = self.memory.start(records.index.asi8, rows[0])
-        part = records.iloc[start : rows[-1] + 1]
-        for branch in Branch.all_of(self.detector):
-            with without_warnings():
-                found = branch.explanations(part[self.columns])
-            if found is not None:
-                effects, shares = np.round(found[0].iloc[rows - start], 2), np.round(found[1][rows - start], 4)
-                return [
-                    {name: size for name, size in one.items() if size > 0} if share >= EXPLAINED else {}
-                    for one, share in zip(effects.to_dict("records"), shares, strict=True)
-                ]
-        return [{} for _ in rows]
+        names = list(map(str, self.targets))
+        for row, size in zip(rows, np.round(np.mean(sizes, axis=0), 2), strict=True):
+            modes[row] = ", ".join(leading(dict(zip(names, size, strict=True))))
+        if found is not None:
+            table, shares = np.round(found[0].iloc[places], 2), np.round(found[1][places], 4)
+            for row, one, share in zip(rows, table.to_dict("records"), shares, strict=True):
+                if share >= EXPLAINED:
+                    effects[row] = {name: size for name, size in one.items() if size > 0}
+        return modes, effects
 
     def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
         if not len(rows):
@@ -359,11 +358,11 @@ class ActiveDetector(SavesFrames):
         """
         unknown = np.flatnonzero(np.isnan(index))
         causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
-        phrases = (
-            [causes.get(n, ""), mark, "extrapolated: temperatures outside those of the baseline" if far else ""]
-            for n, (mark, far) in enumerate(zip(marks, outside, strict=True))
-        )
-        return ["; ".join(filter(None, parts)) for parts in phrases]
+        said = []
+        for n, (mark, is_far) in enumerate(zip(marks, outside, strict=True)):
+            far = "extrapolated: temperatures outside those of the baseline" if is_far else ""
+            said.append("; ".join(filter(None, [causes.get(n, ""), mark, far])))
+        return said
 
     @property
     def fall_to_detect(self) -> float:

@@ -92,42 +92,29 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     return wanted
 
 
-@dataclass(frozen=True)
-class UsableBaseline:
-    """What can be used of a baseline, by which detector and columns; ``given`` are the columns that came."""
-
-    records: pd.DataFrame
-    detector: BaseEstimator
-    columns: Columns
-    given: list[Any]
-    found: SetAside
-
-    @classmethod
-    def of(cls, monitor: Any, baseline: pd.DataFrame) -> UsableBaseline:
-        """Without values that cannot be, and without columns that are left out."""
-        given = list(baseline.columns)
-        detector = default_detector(monitor, given) if monitor.detector is None else clone(monitor.detector)
-        columns = Columns.of(monitor, detector, given)
-        records, found = without_what_cannot_be(baseline, columns.targets, columns.units)
-        if not found.left_out:
-            return cls(records, detector, columns, given, found)
-        records = records.drop(columns=list(found.left_out))
-        if monitor.fem is not None:
-            raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
-        wanted = SimpleNamespace(
-            fem=None,
-            reference=[name for name in columns.reference if name in records],
-            targets=[name for name in columns.targets if name in records],
-            units={name: unit for name, unit in columns.units.items() if name in records},
-        )
-        if monitor.detector is None:
-            detector = default_detector(wanted, list(records.columns))
-        for part in detector.get_params(deep=True).values() if monitor.detector is not None else ():
-            if isinstance(part, TemperatureCompensator):
-                part.set_params(targets=wanted.targets)
-        if isinstance(detector, TemperatureCompensator):
-            detector.set_params(targets=wanted.targets)
-        return cls(records, detector, Columns.of(wanted, detector, list(records.columns)), given, found)
+def usable_baseline(monitor: Any, baseline: pd.DataFrame) -> tuple[pd.DataFrame, BaseEstimator, Columns, SetAside]:
+    """What can be used of a baseline, by which unfitted detector and columns, and what was set aside."""
+    given, is_default = list(baseline.columns), monitor.detector is None
+    detector = default_detector(monitor, given) if is_default else clone(monitor.detector)
+    columns = Columns.of(monitor, detector, given)
+    records, found = without_what_cannot_be(baseline, columns.targets, columns.units)
+    if not found.left_out:
+        return records, detector, columns, found
+    if monitor.fem is not None:
+        raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
+    records = records.drop(columns=list(found.left_out))
+    wanted = SimpleNamespace(
+        fem=None,
+        reference=[name for name in columns.reference if name in records],
+        targets=[name for name in columns.targets if name in records],
+        units={name: unit for name, unit in columns.units.items() if name in records},
+    )
+    if is_default:
+        detector = default_detector(wanted, list(records.columns))
+    for part in (detector, *detector.get_params(deep=True).values()):
+        if isinstance(part, TemperatureCompensator):
+            part.set_params(targets=wanted.targets)
+    return records, detector, Columns.of(wanted, detector, list(records.columns)), found
 
 
 def without_what_cannot_be(

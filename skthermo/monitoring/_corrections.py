@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import MARKERS
-from skthermo.monitoring._transitions import Transition, fault_changes
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible
@@ -128,7 +127,11 @@ class Corrections:
         day = raw.mask(wrong) if wrong.any() else raw
         T, F = day[self.temperatures], day[self.targets]
         held = np.zeros(F.shape, dtype=bool)
-        notes, n_left_out = self._said_of(raw, wrong), wrong.sum(axis=1)
+        notes, names, n_left_out = [""] * len(raw), [""] * len(raw), wrong.sum(axis=1)
+        for row in np.flatnonzero(wrong.any(axis=1)):
+            columns = raw.columns[wrong[row]]
+            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
+            notes[row] = f"{', '.join(parts)}: taken as missing"
         dispute = None if self.sensors is None else self.sensors.dispute(state.sensors, list(T.columns))
         if self.sensors is None:
             T = T.drop(columns=self.reference)
@@ -138,30 +141,15 @@ class Corrections:
             notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
         if self.drift is not None:
             F = self.drift.corrected(state.drift, F)
-        names = [", ".join(str(self.targets[k]) for k in np.flatnonzero(row)) if row.any() else "" for row in held]
+        for row in np.flatnonzero(held.any(axis=1)):
+            names[row] = ", ".join(str(self.targets[k]) for k in np.flatnonzero(held[row]))
         records = pd.concat([T, F], axis=1)[[name for name in raw.columns if name not in self.reference]]
         return Corrected(records, held.sum(axis=1).astype(float), names, notes, n_left_out, [dispute] * len(raw))
-
-    def _said_of(self, raw: pd.DataFrame, wrong: NDArray[np.bool_]) -> list[str]:
-        """A phrase about each record that has values which no sensor measures."""
-        notes = [""] * len(raw)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            columns = [raw.columns[k] for k in np.flatnonzero(wrong[row])]
-            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
-            notes[row] = f"{', '.join(parts)}: taken as missing"
-        return notes
 
     def faults(self, state: CorrectionState) -> pd.DataFrame:
         if self.sensors is None:
             return pd.DataFrame({name: [] for name in ("column", "kind", "since", "detected", "until", "detail")})
         return self.sensors.faults(state.sensors)
-
-    def fault_changes(self, before: CorrectionState, after: CorrectionState, newest: int) -> Iterator[Transition]:
-        """Sensors that have failed between two states, and those that are used again."""
-        if self.sensors is not None:
-            names = [*self.sensors.sensors, *self.sensors.modes]
-            lists = (state.sensors.faults.faults for state in (before, after))
-            yield from fault_changes(*lists, names, self.sensors.units, newest)
 
     def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
         return None if self.drift is None else self.drift.report(state.drift)

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from numbers import Integral, Real
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,18 +29,15 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._columns import UsableBaseline, without_what_cannot_be
+from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, WATCH, Acknowledgement
-from skthermo.monitoring._false_alarms import FalseAlarmEstimate
+from skthermo.monitoring._events import DAMAGE, Acknowledgement, Transition
 from skthermo.monitoring._files import versions, write_monitor
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._records import OF_TRAINING, RecordStore, read_records
-from skthermo.monitoring._smallest import SmallestChanges
-from skthermo.monitoring._state import MonitorState
-from skthermo.monitoring._status import MonitorStatus, facts_of, summary_lines
-from skthermo.monitoring._transitions import Transition
-from skthermo.monitoring.retraining import Retraining, begun_again, retrained
+from skthermo.monitoring._history import History
+from skthermo.monitoring._records import OF_TRAINING, Memory, RecordStore, read_records
+from skthermo.monitoring._retraining import Retraining, begun_again, retrained
+from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
+from skthermo.monitoring._threshold import FalseAlarmEstimate, SmallestChanges
 
 MOST_CAUSES = 3  # in a warning
 
@@ -76,9 +73,6 @@ class Monitor(SavesFrames, Estimator):
         1 means that a single record opens an event.
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
-    max_jump : str or timedelta, optional
-        How far a stamp may be from the record before it. Beyond it, records are set aside until they are confirmed. By
-        default 28 days, twice the longest gap of the baseline, or ten usual steps, whichever is longest.
     retention : str or timedelta, default="400D"
         How long raw records are kept, for a new fit and to tell repeated records.
     sensors : bool, default=True
@@ -155,7 +149,7 @@ class Monitor(SavesFrames, Estimator):
         After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
-    active_, status_ : object
+    active_, history_ : object
         The detector in charge with all by which it evaluates, and all that was evaluated so far. Both are immutable:
         `update`, `refit` and `rebaseline` put others in their place.
 
@@ -189,7 +183,7 @@ class Monitor(SavesFrames, Estimator):
     >>> compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
     >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
     >>> answers = monitor.update(records[730:737])
-    >>> monitor.state()
+    >>> monitor.status(monitor.last_).state
     'healthy'
     """
 
@@ -202,7 +196,6 @@ class Monitor(SavesFrames, Estimator):
         "persistence": [Interval(Integral, 1, None, closed="left")],
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
-        "max_jump": [str, timedelta, np.timedelta64, None],
         "retention": [str, timedelta, np.timedelta64],
         "sensors": ["boolean"],
         "units": [str, Mapping, None],
@@ -221,7 +214,6 @@ class Monitor(SavesFrames, Estimator):
         watch_per_year: float | None = None,
         persistence: int = 3,
         max_delay: str | timedelta = "7D",
-        max_jump: str | timedelta | None = None,
         retention: str | timedelta = "400D",
         sensors: bool = True,
         units: str | Mapping[Hashable, str] | None = None,
@@ -236,7 +228,6 @@ class Monitor(SavesFrames, Estimator):
         self.watch_per_year = watch_per_year
         self.persistence = persistence
         self.max_delay = max_delay
-        self.max_jump = max_jump
         self.retention = retention
         self.sensors = sensors
         self.units = units
@@ -253,23 +244,23 @@ class Monitor(SavesFrames, Estimator):
     trained_: pd.DataFrame = held("active_.trained", is_copied=True)
     prior_: pd.DataFrame | None = held("active_.prior")
     since_: pd.Timestamp | None = held("active_.since")
-    baseline_: pd.DataFrame = held("status_.store.baseline", is_copied=True)
-    records_: pd.DataFrame = held("status_.store.kept", is_copied=True)
-    last_: pd.Timestamp = held("status_.store.last")
-    evaluations_: pd.DataFrame = held("status_.evaluations", is_copied=True)
-    days_: pd.DataFrame = held("status_.days", is_copied=True)
-    counts_: dict[str, int] = held("status_.counts")
-    events_: pd.DataFrame = held("status_.event_table")
+    baseline_: pd.DataFrame = held("history_.store.baseline", is_copied=True)
+    records_: pd.DataFrame = held("history_.store.kept", is_copied=True)
+    last_: pd.Timestamp = held("history_.store.last")
+    evaluations_: pd.DataFrame = held("history_.evaluations", is_copied=True)
+    days_: pd.DataFrame = held("history_.days", is_copied=True)
+    counts_: dict[str, int] = held("history_.counts")
+    events_: pd.DataFrame = held("history_.event_table")
 
     @property
     def corrected_(self) -> pd.DataFrame:
         """Records kept since the baseline as the detector sees them."""
-        return self.status_.corrected.loc[self.status_.store.kept.index]
+        return self.history_.corrected.loc[self.history_.store.kept.index]
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed, those of columns that are left out first."""
-        found = self.active_.corrections.faults(self.status_.corrections)
+        found = self.active_.corrections.faults(self.history_.corrections)
         if not self.left_out_:
             return found
         first, last = self.baseline_.index[[0, -1]]
@@ -282,7 +273,7 @@ class Monitor(SavesFrames, Estimator):
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        return self.active_.corrections.drifts(self.status_.corrections)
+        return self.active_.corrections.drifts(self.history_.corrections)
 
     def __sklearn_clone__(self) -> Monitor:
         return type(self)(
@@ -291,14 +282,14 @@ class Monitor(SavesFrames, Estimator):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        if "active_" in state and self.active_.trained is self.status_.store.baseline:  # most often: saved once
+        if "active_" in state and self.active_.trained is self.history_.store.baseline:  # most often: saved once
             state["active_"] = replace(self.active_, trained=None)
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         super().__setstate__(state)
         if "active_" in state and self.active_.trained is None:
-            self.active_ = replace(self.active_, trained=self.status_.store.baseline)
+            self.active_ = replace(self.active_, trained=self.history_.store.baseline)
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
@@ -331,20 +322,19 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        max_delay, max_jump, retention = self._checked_times()
-        usable = UsableBaseline.of(self, _read_baseline(X))
-        baseline, detector, columns = usable.records, usable.detector, usable.columns
+        max_delay, retention = self._checked_times()
+        given = _read_baseline(X)
+        baseline, detector, columns, found = usable_baseline(self, given)
         seed_parts(detector, seeded(self.random_state))
         self.targets_, self.units_ = columns.targets, columns.units
-        self.columns_, self.left_out_ = usable.given, usable.found.left_out
-        found = usable.found.table
-        self.set_aside_ = found[~found["column"].isin(list(self.left_out_))].reset_index(drop=True)
+        self.columns_, self.left_out_, aside = list(given.columns), found.left_out, found.table
+        self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
         corrections = self._corrections(baseline, columns.reference, self.fem)
         trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
         active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)
         active.check()
-        store = RecordStore.of(baseline, max_delay, max_jump, retention)
-        self.active_, self.status_ = active, MonitorState.of(active, store)
+        store = RecordStore.of(baseline, max_delay, retention)
+        self.active_, self.history_ = active, History.of(active, store)
         self.versions_ = versions()
         return self
 
@@ -381,29 +371,11 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         records = self._read(new)
-        intake = self.status_.store.sort_in(records, check_flag(confirm, "confirm"))
-        state, answers = self.status_.taken_in(self.active_, intake)
+        intake = self.history_.store.sort_in(records, check_flag(confirm, "confirm"))
+        state, answers = self.history_.taken_in(self.active_, intake)
         _warn_of_not_evaluated(answers)
-        self.status_ = state
+        self.history_ = state
         return answers
-
-    def state(self) -> Literal["healthy", "watch", "alarm", "not evaluated"]:
-        """How the structure is, by the newest record.
-
-        Returns
-        -------
-        str
-            "alarm" while an event of damage, or of "measurement or structure", is open, else "watch" while an event of
-            that kind is, else "healthy" or "not evaluated", as the newest record was.
-        """
-        check_is_fitted(self)
-        if self.status_.log.is_open(DAMAGE) or self.status_.has_set_aside:
-            return "alarm"
-        if self.status_.log.is_open(WATCH):
-            return "watch"
-        evaluations = self.status_.evaluations
-        newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
-        return "not evaluated" if newest == "alarm" else newest  # what was set aside has been acknowledged
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
         """The state at a time, and the facts behind it, for machines.
@@ -411,7 +383,8 @@ class Monitor(SavesFrames, Estimator):
         Parameters
         ----------
         now : str or datetime, optional
-            The time. By default that of the computer's clock; if the records have no time zone, the local time.
+            The time, such as that of the newest record, ``last_``. By default that of the computer's clock; if the
+            records have no time zone, the local time.
         max_age : str or timedelta, optional
             Age of the newest record beyond which nothing is healthy. By default the usual time between records, and
             two days more.
@@ -419,8 +392,7 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         MonitorStatus
-            State, newest record and its age, damage index and thresholds, open events, failed sensors and counts;
-            ``as_dict()`` gives plain values.
+            State, records, damage index and levels, open events, failed sensors; ``as_dict()`` gives plain values.
 
         Raises
         ------
@@ -428,7 +400,7 @@ class Monitor(SavesFrames, Estimator):
             If ``now`` is no time, or has a time zone where the records have none; if ``max_age`` is no duration.
         """
         check_is_fitted(self)
-        return facts_of(self).at(now, max_age=max_age)
+        return status_of(self).at(now, max_age=max_age)
 
     def transitions(self, after: int = 0) -> list[dict[str, Any]]:
         """What has changed: events that open and close, sensors that fail, detectors that take over.
@@ -458,7 +430,7 @@ class Monitor(SavesFrames, Estimator):
         none twice, also if it was stopped in between.
         """
         check_is_fitted(self)
-        found = self.status_.transitions
+        found = self.history_.transitions
         if isinstance(after, bool) or not isinstance(after, Integral) or not 0 <= after <= len(found):
             raise ValueError(f"after is {after!r}; expected a number of a transition from 0 to {len(found)}")
         return [one.as_dict(number, self.last_.tz) for number, one in enumerate(found, 1) if number > after]
@@ -520,7 +492,7 @@ class Monitor(SavesFrames, Estimator):
             since = min([begin, *events.loc[events["end"].isna(), "start"]])
         n_years = self.years_watched(since)
         p_values = [
-            [estimate for taken, estimate in self.status_.estimates if taken <= event["start"]][-1].p_value(
+            [estimate for taken, estimate in self.history_.estimates if taken <= event["start"]][-1].p_value(
                 event["peak"], n_years, tail_shape
             )
             for _, event in events.iterrows()
@@ -547,7 +519,7 @@ class Monitor(SavesFrames, Estimator):
             If there is no such event.
         """
         check_is_fitted(self)
-        events = self.status_.log.events
+        events = self.history_.log.events
         if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
@@ -555,10 +527,10 @@ class Monitor(SavesFrames, Estimator):
         of, now = events[event - 1], self.last_.as_unit("ns").value
         one = Acknowledgement(of.kind, of.peak_time, now, check_flag(harmless, "harmless"), note)
         said = Transition("acknowledged", now, now, of.kind, int(event), detail=note)
-        self.status_ = replace(
-            self.status_,
-            acknowledgements=(*self.status_.acknowledgements, one),
-            transitions=(*self.status_.transitions, said),
+        self.history_ = replace(
+            self.history_,
+            acknowledgements=(*self.history_.acknowledgements, one),
+            transitions=(*self.history_.transitions, said),
         )
 
     def discard(self, start: Any, end: Any = None) -> int:
@@ -587,13 +559,13 @@ class Monitor(SavesFrames, Estimator):
         detector in charge, and the newest record is the newest of them. Records that were refused as too late because
         of wrong stamps can come again. What was acknowledged stays, and `transitions` lists what changes.
 
-        How things stood before is known for the last days (``max_delay``), before the latest jump by more than
-        ``max_jump``, and, while all records since the baseline are kept, for any time.
+        How things stood before is known for the last days (``max_delay``), before the latest jump of the stamps, and,
+        while all records since the baseline are kept, for any time.
         """
         check_is_fitted(self)
         stamps = self.baseline_.index
         first, last = check_stamp(start, stamps, "start"), None if end is None else check_stamp(end, stamps, "end")
-        self.status_, number = self.status_.without(self.active_, first, last)
+        self.history_, number = self.history_.without(self.active_, first, last)
         return number
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
@@ -672,12 +644,9 @@ class Monitor(SavesFrames, Estimator):
         """Records in the columns of `fit`, without those that are left out."""
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
-    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta | None, pd.Timedelta]:
-        """``max_delay``, ``max_jump`` and ``retention``; an error for parameters that contradict each other."""
+    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta]:
+        """``max_delay`` and ``retention``; an error for parameters that contradict each other."""
         max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        max_jump = None if self.max_jump is None else check_duration(self.max_jump, "max_jump")
-        if max_jump is not None and not max_jump:
-            raise ValueError(f"max_jump is {self.max_jump!r}; expected longer than zero, such as '28D'")
         if retention < max_delay + 2 * DAY:
             raise ValueError(
                 f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
@@ -688,7 +657,7 @@ class Monitor(SavesFrames, Estimator):
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
                 "expected more watches than alarms a year, such as 12 and 1"
             )
-        return max_delay, max_jump, retention
+        return max_delay, retention
 
     def _corrections(self, baseline: pd.DataFrame, reference: list[Any], fem: Any) -> Corrections:
         options = {"fem": fem, "sensors": self.sensors}
@@ -708,7 +677,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, corrections, state = retraining.baseline, None, self.active_.corrections, self.status_
+        trained, end, corrections, state = retraining.baseline, None, self.active_.corrections, self.history_
         if retraining.kind == "new baseline":
             now = self.last_.as_unit("ns").value
             end, note = now + 10**9, f"ended by the new baseline since {retraining.since}"
@@ -728,7 +697,7 @@ class Monitor(SavesFrames, Estimator):
         self.active_ = replace(active, prior=retraining.prior, since=retraining.since)
         now = self.last_.as_unit("ns").value
         taken_over = Transition("refit" if end is None else "rebaseline", now, now, retraining.kind)
-        self.status_ = state.handed_over(self.active_, end).changed_from(state, self.active_, taken_over)
+        self.history_ = state.handed_over(self.active_, end).changed_from(state, self.active_, taken_over)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
 
@@ -21,21 +21,11 @@ FAULT = ("column", "kind", "since", "detail")
 
 
 @dataclass(frozen=True)
-class MonitorStatus:
-    """The state of a monitored structure, and the facts behind it.
-
-    `Monitor.status` and `~skthermo.fleet.Fleet.status` give it; `as_dict` makes it plain values, as JSON has them.
+class RecordTimes:
+    """When records came, and how many.
 
     Parameters
     ----------
-    state : {"healthy", "watch", "alarm", "not evaluated"}
-        "alarm" while an event of damage, or of "measurement or structure", is open, "watch" while the index is raised
-        and none is open. Nothing is healthy if
-        the newest record is too old, of a time to come, or was not evaluated.
-    reason : str
-        Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
-    now : Timestamp or None
-        Time of which the status is.
     baseline_end : Timestamp or None
         Stamp of the last record of the baseline.
     newest : Timestamp or None
@@ -43,13 +33,50 @@ class MonitorStatus:
     evaluated : Timestamp or None
         Stamp of the newest record that was evaluated.
     age : Timedelta or None
-        From the newest record, or from the last one of the baseline if none has come since, to ``now``.
+        From the newest record, or from the last one of the baseline if none has come since, to the time of the status.
     max_age : Timedelta or None
         Age beyond which nothing is healthy.
     step : Timedelta or None
         Usual time between records.
-    index : float or None
-        Damage index of the newest record that was evaluated.
+    counts : dict or None
+        As ``counts_`` of a monitor.
+    """
+
+    baseline_end: pd.Timestamp | None = None
+    newest: pd.Timestamp | None = None
+    evaluated: pd.Timestamp | None = None
+    age: pd.Timedelta | None = None
+    max_age: pd.Timedelta | None = None
+    step: pd.Timedelta | None = None
+    counts: dict | None = None
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the newest record is older than ``max_age``."""
+        return self.age is not None and self.max_age is not None and self.age > self.max_age
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether the newest record is of a time to come, by more than a day."""
+        return self.age is not None and self.age < -AHEAD
+
+    def __str__(self) -> str:
+        if self.counts is None:
+            return "not known"
+        n = {"n_late": 0, "n_too_late": 0, "n_ahead": 0, "n_left_out": 0} | self.counts
+        return (
+            f"{n['n_records']} since the baseline, {n['n_not_evaluated']} not evaluated, {n['n_late']} late, "
+            f"{n['n_too_late']} too late, {n['n_ahead']} set aside as stamped too far ahead, {n['n_repeated']} "
+            f"repeated; {n['n_left_out']} values left out"
+        )
+
+
+@dataclass(frozen=True)
+class AlarmLevels:
+    """Damage indices at which events open and close, and what they were chosen for.
+
+    Parameters
+    ----------
     threshold, clear_threshold : float or None
         A damage event opens with indices above the first, and closes at or below the second.
     watch_threshold : float or None
@@ -60,13 +87,49 @@ class MonitorStatus:
         Falls of the responses that raise an alarm in the weather of the baseline: ``common`` (of all by one share),
         ``single`` (of each alone, by name), ``groups`` (losses of stiffness by damage group), and ``within`` how many
         seconds. Shares of the mean, or in the unit of the response where not all are positive; None where none is seen.
+    """
+
+    threshold: float | None = None
+    clear_threshold: float | None = None
+    watch_threshold: float | None = None
+    false_alarms_per_year: float | None = None
+    watch_per_year: float | None = None
+    smallest_change: dict | None = None
+
+    def __str__(self) -> str:
+        if self.threshold is None:
+            return "not known"
+        return f"open above {self.threshold:.4g}, close at or below {self.clear_threshold:.4g}"
+
+
+@dataclass(frozen=True)
+class MonitorStatus:
+    """The state of a monitored structure, and the facts behind it.
+
+    `Monitor.status` and `~skthermo.fleet.Fleet.status` give it; `as_dict` makes it plain values, as JSON has them.
+
+    Parameters
+    ----------
+    state : {"healthy", "watch", "alarm", "not evaluated"}
+        "alarm" while an event of damage, or of "measurement or structure", is open, else "watch" while an event of that
+        kind is. Nothing is healthy if the newest record is too old, of a time to come, or was not evaluated.
+    reason : str
+        Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
+    now : Timestamp or None
+        Time of which the status is.
+    records : RecordTimes
+        When records came: ``baseline_end``, ``newest``, ``evaluated`` (the newest that was), ``age``, ``max_age``,
+        ``step`` and ``counts``; ``is_late`` and ``is_ahead``.
+    index : float or None
+        Damage index of the newest record that was evaluated.
+    levels : AlarmLevels
+        Levels of events: ``threshold``, ``clear_threshold``, ``watch_threshold``, ``false_alarms_per_year``,
+        ``watch_per_year`` and ``smallest_change``.
     events : tuple of dict
         Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes``,
         ``groups`` and ``acknowledged``.
     faults : tuple of dict
         Sensors that have failed and still do: ``column``, ``kind``, ``since`` and ``detail``.
-    counts : dict
-        As ``counts_`` of a monitor.
     transition : int
         Number of the newest entry in `Monitor.transitions`; 0 if there is none.
 
@@ -76,9 +139,10 @@ class MonitorStatus:
 
     Notes
     -----
-    Keys of `as_dict` are the names above. Times are texts of ISO 8601, in the time zone of the records; ``age``,
-    ``max_age`` and ``step`` are in seconds; what is not known is None. Of a bridge without a monitor, ``state`` is "not
-    evaluated", with the reason, and the numbers are None.
+    Keys of `as_dict` are the names above, those of ``records`` and ``levels`` side by side with the others. Times are
+    texts of ISO 8601, in the time zone of the records; ``age``, ``max_age`` and ``step`` are in seconds; what is not
+    known is None. Of a bridge without a monitor, ``state`` is "not evaluated", with the reason, and the numbers are
+    None.
 
     Examples
     --------
@@ -91,33 +155,12 @@ class MonitorStatus:
     state: str
     reason: str = ""
     now: pd.Timestamp | None = None
-    baseline_end: pd.Timestamp | None = None
-    newest: pd.Timestamp | None = None
-    evaluated: pd.Timestamp | None = None
-    age: pd.Timedelta | None = None
-    max_age: pd.Timedelta | None = None
-    step: pd.Timedelta | None = None
+    records: RecordTimes = RecordTimes()
     index: float | None = None
-    threshold: float | None = None
-    clear_threshold: float | None = None
-    watch_threshold: float | None = None
-    false_alarms_per_year: float | None = None
-    watch_per_year: float | None = None
-    smallest_change: dict | None = None
+    levels: AlarmLevels = AlarmLevels()
     events: tuple = ()
     faults: tuple = ()
-    counts: dict | None = None
     transition: int = 0
-
-    @property
-    def is_late(self) -> bool:
-        """Whether the newest record is older than ``max_age``."""
-        return self.age is not None and self.max_age is not None and self.age > self.max_age
-
-    @property
-    def is_ahead(self) -> bool:
-        """Whether the newest record is of a time to come, by more than a day."""
-        return self.age is not None and self.age < -AHEAD
 
     def at(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
         """The status at a later time, with no record since.
@@ -141,16 +184,32 @@ class MonitorStatus:
         ValueError
             If ``now`` is no time, or has a time zone where the records have none; if ``max_age`` is no duration.
         """
-        last = self.newest or self.baseline_end
+        records = self.records
+        last = records.newest or records.baseline_end
         if last is None:
             return replace(self, now=as_moment(now, None))
         now = as_moment(now, last.tz)
-        limit = (self.step or DAY) + LATE if max_age is None else check_duration(max_age, "max_age")
-        status = replace(self, now=now, age=now - last, max_age=limit)
-        doubt = _doubt(status, last)
-        if not doubt:
+        limit = (records.step or DAY) + LATE if max_age is None else check_duration(max_age, "max_age")
+        records = replace(records, age=now - last, max_age=limit)
+        status = replace(self, now=now, records=records)
+        if records.newest is None:
+            doubt = f"no record has come since the baseline, which ends on {last}"
+        elif records.is_ahead:
+            doubt = f"the newest record is of {last}, a time after {now.floor('s')}"
+        elif records.is_late:
+            age, longest = duration_text(records.age), duration_text(limit)
+            doubt = f"the newest record, of {last}, is {age} old; expected one of the last {longest}"
+        else:
             return status
         return replace(status, state="alarm" if self.state == "alarm" else "not evaluated", reason=doubt)
+
+    def __str__(self) -> str:
+        lines = [f"{self.state} ({self.reason})" if self.reason else self.state]
+        lines += [f"records: {self.records}", f"damage events: {self.levels}"]
+        lines += [f"event {one['event']}: {one['kind']} since {one['since']}" for one in self.events]
+        return "\n".join(
+            [*lines, *(f"sensor: {one['column']} {one['kind']} since {one['since']}" for one in self.faults)]
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values by name, as a JSON file holds them.
@@ -160,48 +219,41 @@ class MonitorStatus:
         dict
             Texts, numbers, lists and dicts; None for what is not known.
         """
-        return {one.name: plain(getattr(self, one.name)) for one in fields(self)}
+        flat = vars(self) | vars(self.records) | vars(self.levels)
+        return {name: plain(value) for name, value in flat.items() if name not in ("records", "levels")}
 
 
-def facts_of(monitor: Any) -> MonitorStatus:
+def status_of(monitor: Any) -> MonitorStatus:
     """The status of a fitted monitor by its records alone, whatever the time is."""
     evaluations, baseline = monitor.evaluations_, monitor.baseline_.index
     known = evaluations[evaluations["state"] != "not evaluated"]
     return MonitorStatus(
-        state=monitor.state(),
+        state=monitor.history_.state,
         reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
-        baseline_end=baseline[-1],
-        newest=monitor.last_ if len(monitor.days_) else None,
-        evaluated=known.index[-1] if len(known) else None,
-        step=usual_step(baseline.append(evaluations.index)) or DAY,
+        records=RecordTimes(
+            baseline_end=baseline[-1],
+            newest=monitor.last_ if len(monitor.days_) else None,
+            evaluated=known.index[-1] if len(known) else None,
+            step=usual_step(baseline.append(evaluations.index)) or DAY,
+            counts=dict(monitor.counts_),
+        ),
         index=float(known["index"].iloc[-1]) if len(known) else None,
-        threshold=float(monitor.threshold_),
-        clear_threshold=float(monitor.clear_threshold_),
-        watch_threshold=_number(monitor.watch_threshold_),
-        false_alarms_per_year=float(monitor.false_alarms_per_year),
-        watch_per_year=_number(monitor.watch_per_year),
-        smallest_change=monitor.smallest_changes_.as_dict(),
+        levels=AlarmLevels(
+            threshold=float(monitor.threshold_),
+            clear_threshold=float(monitor.clear_threshold_),
+            watch_threshold=_number(monitor.watch_threshold_),
+            false_alarms_per_year=float(monitor.false_alarms_per_year),
+            watch_per_year=_number(monitor.watch_per_year),
+            smallest_change=monitor.smallest_changes_.as_dict(),
+        ),
         events=tuple(_open_events(monitor.events_)),
         faults=tuple(_lasting_faults(monitor.faults_)),
-        counts=dict(monitor.counts_),
         transition=len(monitor.transitions()),
     )
 
 
 def _number(value: Any) -> float | None:
     return None if value is None else float(value)
-
-
-def _doubt(status: MonitorStatus, last: pd.Timestamp) -> str:
-    """Why nothing is known of the structure now; "" if its newest record is new enough."""
-    if status.newest is None:
-        return f"no record has come since the baseline, which ends on {last}"
-    if status.is_ahead:
-        return f"the newest record is of {last}, a time after {status.now.floor('s')}"
-    if status.is_late:
-        age, limit = duration_text(status.age), duration_text(status.max_age)
-        return f"the newest record, of {last}, is {age} old; expected one of the last {limit}"
-    return ""
 
 
 def _open_events(events: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -224,14 +276,10 @@ def _lasting_faults(faults: pd.DataFrame) -> Iterator[dict[str, Any]]:
 
 def summary_lines(monitor: Any) -> Iterator[str]:
     """State, records, events, sensors and drift of a fitted monitor."""
-    counts, evaluations, events = monitor.counts_, monitor.evaluations_, monitor.events_
-    newest = [f"newest record {monitor.last_}", evaluations["reason"].iloc[-1]] if len(evaluations) else []
-    yield f"state: {monitor.state()} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})"
-    yield (
-        f"records: {counts['n_records']} since the baseline, {counts['n_not_evaluated']} not evaluated, "
-        f"{counts['n_late']} late, {counts['n_too_late']} too late, {counts['n_ahead']} set aside as stamped too far "
-        f"ahead, {counts['n_repeated']} repeated; {counts['n_left_out']} values left out"
-    )
+    evaluations, events, status = monitor.evaluations_, monitor.events_, status_of(monitor)
+    newest = [f"newest record {monitor.last_}", status.reason] if len(evaluations) else []
+    yield f"state: {status.state} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})"
+    yield f"records: {status.records}"
     yield (
         f"damage events: open when {monitor.persistence} of {2 * monitor.persistence - 1} damage indices exceed "
         f"{monitor.threshold_:.4g}, close at or below {monitor.clear_threshold_:.4g}"
@@ -250,7 +298,7 @@ def summary_lines(monitor: Any) -> Iterator[str]:
     for _, fault in faults[faults["until"].isna()].iterrows():
         yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
     if monitor.drift_ is not None:
-        yield from _of_drift(monitor.drift_, monitor.status_.corrections.drift.n_left_out)
+        yield from _of_drift(monitor.drift_, monitor.history_.corrections.drift.n_left_out)
 
 
 def _of_watch(monitor: Any, events: pd.DataFrame) -> Iterator[str]:

@@ -63,7 +63,6 @@ use(
     watch_per_year=(12.0, number(0, -1, 1.0, but=("None",))),
     persistence=(3, number(0, -1, 1.5)),
     max_delay=("7D", durations("zero")),
-    max_jump=("28D", durations("None")),
     retention=("400D", durations()),
     sensors=(True, flag()),
     units=("Hz", bad(3, True, ["Hz"], {"f1": 3}, {"no such name": "Hz"}, b"Hz", str)),

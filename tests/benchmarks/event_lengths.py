@@ -19,7 +19,8 @@ import pandas as pd
 from directions_in_service import structures
 
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._false_alarms import estimate_false_alarms, find_events
+from skthermo.monitoring._events import find_events
+from skthermo.monitoring._threshold import estimate_false_alarms
 
 DAY = pd.Timedelta("1D")
 ABOVE = 1.2  # times the smallest change

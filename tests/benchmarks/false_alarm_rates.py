@@ -35,7 +35,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_fleet, make_truss_campaign
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._false_alarms import estimate_false_alarms, find_events
+from skthermo.monitoring._events import find_events
+from skthermo.monitoring._threshold import estimate_false_alarms
 from skthermo.preprocessing import HampelFilter
 from skthermo.surrogate import TemperatureMapper
 

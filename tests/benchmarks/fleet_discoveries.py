@@ -26,7 +26,8 @@ from scipy.stats import false_discovery_control
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.fleet._discoveries import discover
-from skthermo.monitoring._false_alarms import estimate_false_alarms, find_events
+from skthermo.monitoring._events import find_events
+from skthermo.monitoring._threshold import estimate_false_alarms
 
 FDR, MOST, N_BRIDGES, SHIFTS = 0.1, 0.15, 40, (1.0, 2.0, 3.0, 4.0)
 SETS_IN, PATTERN = YEAR + 250, np.array([0.8, 0.5, 0.3, 0.1, 0.0, 0.0])

@@ -41,7 +41,7 @@ from skthermo.datasets import make_fleet
 from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._false_alarms import find_events
+from skthermo.monitoring._events import find_events
 from skthermo.preprocessing import BiasAligner, HingeFeatures, LagFeatures, SensorMeans
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 

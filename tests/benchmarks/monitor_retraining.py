@@ -28,8 +28,8 @@ from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring.retraining import begun_again, retrained
+from skthermo.monitoring._records import Memory
+from skthermo.monitoring._retraining import begun_again, retrained
 from skthermo.preprocessing import HingeFeatures
 from skthermo.surrogate import TemperatureMapper
 

@@ -36,8 +36,7 @@ from scipy import stats
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import track_parameters
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.drift._daily import calendar
-from skthermo.monitoring.drift._observations import GroupEffects, observation
+from skthermo.monitoring.drift._observations import GroupEffects, calendar, observation
 from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
 

@@ -84,8 +84,8 @@ def test_the_file_makes_what_python_makes(read):
     )
     others = read('# whiten = "auto"', 'whiten = "none"').monitor()
     assert others.detector[0].whiten is None
-    softening = read("# persistence = 3", 'persistence = 5\nmax_jump = "30D"').monitor()
-    expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), persistence=5, max_jump="30D")
+    softening = read("# persistence = 3", 'persistence = 5\nmax_delay = "3D"').monitor()
+    expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), persistence=5, max_delay="3D")
     assert repr(softening) == repr(expected)
     assert clone(softening).get_params(deep=False).keys() == softening.get_params(deep=False).keys()
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import genpareto, kstest, norm
 
 from skthermo.fleet._discoveries import discover, significant_bridges, tail_shape
-from skthermo.monitoring._false_alarms import Tail
+from skthermo.monitoring._threshold import Tail
 
 N_PEAKS, RATIO = 60, 0.7
 

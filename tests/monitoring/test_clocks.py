@@ -77,4 +77,4 @@ def assert_same_in_batches(records, cuts):
     np.testing.assert_array_equal(pd.concat(said)["index"], expected["index"])
     assert whole.days_["n_records"].sum() == len(records) - N_BASELINE
     assert (whole.days_.index == parts.days_.index).all()
-    assert whole.status(now=records.index[-1]).state == whole.state()
+    assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state

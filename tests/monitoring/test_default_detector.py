@@ -82,7 +82,7 @@ def test_a_chain_gives_the_directions_of_its_groups(fem):
     assert last.directions is fem
     assert list(last.directions_.index) == ["bottom", "top", "diagonal", "vertical"]
     monitor.update(records({"bottom": 0.08}, 1, "2026-01-01")[:14])
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
 
 
 def test_without_temperatures_the_detector_sees_the_responses_alone():

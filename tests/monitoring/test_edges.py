@@ -99,7 +99,7 @@ def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, alarm, st
     answers = monitor.update(changed(factors, n_days, start))[SETTLED:]
     assert set(answers["state"]) <= {"alarm", "not evaluated"}
     assert answers.loc[answers["state"] == "not evaluated", "reason"].ne("").all()
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
     opened = monitor.events_[monitor.events_["end"].isna()]
     assert set(opened["kind"]) & KINDS
 
@@ -146,7 +146,7 @@ def test_responses_of_any_sign_that_move_by_up_to_a_thousand_times_their_range_a
         new[name] += shift * usual[name]
     answers = monitor.update(new)[SETTLED:]
     assert set(answers["state"]) <= {"alarm", "not evaluated"}
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
 
 
 @pytest.mark.one_case
@@ -162,7 +162,7 @@ def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
 def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
     monitor = fitted()
     monitor.update(changed({"f3": 0.8}, 5))
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
     answers = monitor.update(changed({"f3": 0.6}, 30, start=5))
     assert set(answers["state"]) == {"alarm"}
     answers = monitor.update(changed({}, 5, start=35))
@@ -176,12 +176,12 @@ def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back
     assert answers["state"].tolist() == 2 * ["not evaluated"] + (len(answers) - 2) * ["alarm"]
     assert answers["modes"].iloc[2:].eq("f3").all()
     assert answers["reason"].str.contains("f3").all()
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
     event = monitor.events_.loc[1]
     assert (event["kind"], event["modes"], event["peak"]) == ("measurement or structure", "f3", 1.0)
     other = pickle.loads(pickle.dumps(monitor))
     monitor.acknowledge(1, harmless=True, note="loose cable")
-    assert monitor.state() != "alarm"
+    assert monitor.status(monitor.last_).state != "alarm"
     parts = [monitor.update(changed({"f3": 0.6}, 1, start=day)) for day in range(10, 14)]
     assert set(pd.concat(parts)["state"]) == {"healthy"}
     assert pd.concat(parts)["reason"].str.contains("f3 is left out").all()
@@ -267,7 +267,7 @@ def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
     monitor = Monitor(detector(targets), sensors=False).fit(records[:N_BASELINE])
     new = records[N_BASELINE : N_BASELINE + 60 * PER_DAY]
     monitor.update(new.assign(d=new["d"] + 3.0))
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
     retraining = monitor.rebaseline(new.index[0])
     assert retraining.table.loc["d", "change"] == pytest.approx(3.0, abs=0.2)
     assert retraining.table.loc[MODES, "change"].abs().max() < 0.002

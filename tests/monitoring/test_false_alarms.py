@@ -9,14 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo.monitoring._false_alarms import (
-    EventRule,
-    EventState,
-    estimate_false_alarms,
-    find_events,
-    quiet_levels,
-    seasonal_scale,
-)
+from skthermo.monitoring._events import EventRule, EventState, find_events
+from skthermo.monitoring._threshold import estimate_false_alarms, quiet_levels, seasonal_scale
 
 DAY = pd.Timedelta("1D")
 

@@ -51,7 +51,7 @@ def path(tmp_path, ending):
 def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):
     late = [stop + 1, stop - 2]  # both come after the monitor was loaded
     monitor.update(records[FIRST:stop].drop(records.index[late], errors="ignore"))
-    assert (monitor.state() == "alarm") is (stop > DAMAGED)
+    assert (monitor.status(monitor.last_).state == "alarm") is (stop > DAMAGED)
     monitor.save(path)
     loaded = load_monitor(path)
     assert_same_history(loaded, monitor)
@@ -167,9 +167,9 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
 def test_a_baseline_that_has_trained_the_detector_is_saved_once(monitor, path):
     monitor.save(path)
     loaded = load_monitor(path)
-    assert loaded.active_.trained is loaded.status_.store.baseline
+    assert loaded.active_.trained is loaded.history_.store.baseline
     pd.testing.assert_frame_equal(loaded.trained_, monitor.trained_)
-    assert monitor.active_.trained is monitor.status_.store.baseline
+    assert monitor.active_.trained is monitor.history_.store.baseline
 
 
 def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):

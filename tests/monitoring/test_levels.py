@@ -83,15 +83,14 @@ def test_an_alarm_is_also_a_watch(whole):
 @given(shares=st.lists(st.floats(0, 0.05), min_size=2, max_size=3, unique=True))
 def test_more_change_never_lowers_the_level(two_levels, records, shares):
     ends = [served(two_levels, lowered(records, share))[0] for share in sorted([*shares, 0.01, 0.1])]
-    levels = [LEVELS[monitor.state()] for monitor in ends]
+    levels = [LEVELS[monitor.status(monitor.last_).state] for monitor in ends]
     assert levels == sorted(levels)
     assert levels[-1] == 2
 
 
 def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(two_levels, records):
-    some = (served(two_levels, lowered(records, share))[0] for share in np.arange(0.002, 0.02, 0.001))
-    monitor = next(one for one in some if one.state() == "watch")
-    assert monitor.status(monitor.last_).state == "watch"
+    tried = (served(two_levels, lowered(records, share))[0] for share in np.arange(0.002, 0.02, 0.001))
+    monitor = next(one for one in tried if one.status(one.last_).state == "watch")
     assert monitor.status(monitor.last_ + pd.Timedelta("30D")).state == "not evaluated"
     assert "watch: opens above" in monitor.summary()
     with pytest.raises(ValueError, match="watch_per_year"):
@@ -104,7 +103,7 @@ def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(t
 def assert_as_if_never_come(monitor, other):
     for name in ("evaluations_", "events_", "days_", "faults_", "records_", "corrected_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(other, name), check_exact=True, check_freq=False)
-    assert (monitor.state(), monitor.last_) == (other.state(), other.last_)
+    assert (monitor.status(monitor.last_).state, monitor.last_) == (other.status(other.last_).state, other.last_)
     assert monitor.counts_["n_records"] == other.counts_["n_records"]
 
 
@@ -126,7 +125,7 @@ def test_discarded_records_are_as_if_they_had_never_come(truss_monitor, records,
     for start, stop in ((30, 36), (36, 60)):
         monitor.update(new[start:stop])
     other, _ = served(truss_monitor, new)
-    monitor.status_ = replace(monitor.status_, n_too_late=0)  # true records that came meanwhile were refused
+    monitor.history_ = replace(monitor.history_, n_too_late=0)  # true records that came meanwhile were refused
     assert_as_if_never_come(monitor, other)
     assert len(monitor.transitions()) >= n_known
     events, _ = replayed(monitor.transitions())
@@ -138,7 +137,7 @@ def test_all_records_since_the_baseline_may_be_discarded_and_those_of_the_baseli
     assert monitor.discard(records.index[FIRST + 10]) == 90
     assert_as_if_never_come(monitor, served(truss_monitor, records[FIRST : FIRST + 10])[0])
     assert monitor.discard(records.index[FIRST]) == 10
-    assert monitor.state() == "not evaluated"
+    assert monitor.status(monitor.last_).state == "not evaluated"
     assert monitor.last_ == records.index[FIRST - 1]
     for wrong in ({"start": records.index[5], "end": records.index[9]}, {"start": "2100-01-01"}, {"start": "soon"}):
         with pytest.raises(ValueError, match="expected"):

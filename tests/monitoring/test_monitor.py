@@ -24,7 +24,7 @@ from skthermo.detection import (
 )
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._false_alarms import find_events
+from skthermo.monitoring._events import find_events
 from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
@@ -133,7 +133,7 @@ def assert_same_history(monitor, answers, after, parts):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
     for count in ("n_records", "n_not_evaluated", "n_left_out"):
         assert monitor.counts_[count] == after.counts_[count]
-    assert monitor.state() == after.state()
+    assert monitor.status(monitor.last_).state == after.status(after.last_).state
 
 
 @pytest.mark.nightly
@@ -352,7 +352,7 @@ def test_a_batch_without_records_changes_nothing():
         got = monitor.update(empty)
         assert len(got) == 0
         assert list(got) == [*ANSWER, "revised"]
-    assert monitor.state() == "not evaluated"
+    assert monitor.status(monitor.last_).state == "not evaluated"
     assert monitor.last_ == BASELINE.index[-1]
 
 
@@ -404,7 +404,7 @@ def test_state_does_not_grow_with_history():
         sizes.append((len(monitor.records_), len(monitor.evaluations_), len(monitor.corrected_)))
     assert sizes[-1] == sizes[-2] == (81, 81, 81)
     assert len(monitor.days_) == 25
-    assert len(monitor.status_.checkpoints) <= 9
+    assert len(monitor.history_.checkpoints) <= 9
     other = Monitor(DETECTORS["lags"][0], retention="20D").fit(BASELINE)
     assert len(other.update(ALL[N_BASELINE:])) == N_SERVICE  # also what is not kept is evaluated
     pd.testing.assert_frame_equal(other.days_, monitor.days_)
@@ -414,7 +414,7 @@ def test_what_the_owner_says_of_an_event_stays_with_it():
     monitor, _, _ = fitted("lags")
     held = SERVICE.index[64:68]
     monitor.update(SERVICE[:80].drop(held))
-    assert monitor.state() == "alarm"
+    assert monitor.status(monitor.last_).state == "alarm"
     number = len(monitor.events_)
     monitor.acknowledge(number, harmless=True, note="crane on the deck")
     monitor.update(SERVICE.loc[held])

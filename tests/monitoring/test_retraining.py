@@ -12,8 +12,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring.retraining._retraining import Harvest, margin_of
+from skthermo.monitoring._records import Memory
+from skthermo.monitoring._retraining import Harvest, margin_of
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.03}, "repaired": {"diagonal": -0.15}}
@@ -171,7 +171,7 @@ def test_given_records_need_all_columns(monitor, records):
 def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
     monitor, found = renewed
     assert found.accepted
-    assert monitor.state() == "healthy"
+    assert monitor.status(monitor.last_).state == "healthy"
     assert monitor.events_["end"].notna().all()
     assert monitor.events_["note"].str.contains("new baseline").any()
     later = slice(YEAR + 21, 2 * YEAR)
@@ -186,7 +186,7 @@ def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
 def test_late_records_after_a_new_baseline(renewed, records):
     monitor, late = deepcopy(renewed[0]), records["repaired"].iloc[[YEAR + 17]]
     assert set(quietly(monitor.update, late)["state"]) == {"healthy"}
-    assert monitor.state() == "healthy"
+    assert monitor.status(monitor.last_).state == "healthy"
 
 
 @pytest.mark.nightly
@@ -212,7 +212,7 @@ def test_a_second_intervention_begins_from_the_first(renewed, records):
     found = quietly(monitor.rebaseline, both.index[YEAR + 21])
     truth = both.mean() / records["repaired"].mean() - 1
     assert (np.abs(found.table["change"] - truth[found.table.index]) < 4 * found.table["standard_error"]).all()
-    assert monitor.state() == "healthy"
+    assert monitor.status(monitor.last_).state == "healthy"
     assert (found.baseline.index >= found.since).sum() == 30
 
 

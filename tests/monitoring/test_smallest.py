@@ -14,7 +14,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.exceptions import FewRecordsWarning, ResultWarning
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._smallest import LARGE, LoweredIndices
+from skthermo.monitoring._threshold import LARGE, smallest_by_threshold
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 ANSWER = ["state", "index", "reason", "event"]
@@ -71,13 +71,17 @@ def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_r
 
 
 def test_falls_are_shares_whatever_the_unit_and_grow_with_the_threshold():
-    monitor, lowered = of_a_year(), of_a_year().active_.lowered
+    monitor = of_a_year()
     scaled = bridge()[:"2025"].copy()
     scaled[MODES] *= 1000
     one, other = monitor.smallest_changes_, fitted(scaled).smallest_changes_
     np.testing.assert_allclose(list(other.single.values()), list(one.single.values()), rtol=1e-6)
     assert other.common == pytest.approx(one.common, rel=1e-6)
-    common = [lowered.smallest(level * monitor.threshold_).common for level in (0.5, 1.0, 2.0, 8.0)]
+    active, year = monitor.active_, monitor.trained_
+    smallest_at = smallest_by_threshold(
+        lambda records: active.index(records, 0), year, MODES, year[MODES].std().to_numpy(), pd.Timedelta("2D")
+    )
+    common = [smallest_at(level * monitor.threshold_).common for level in (0.5, 1.0, 2.0, 8.0)]
     assert sorted(common) == common
     assert one.common < min(one.single.values())  # in all modes more evidence adds up
 
@@ -95,8 +99,8 @@ def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
 
 def test_an_index_that_no_fall_moves_sees_none():
     records = bridge()[:400]
-    flat = LoweredIndices.of(lambda table: np.ones(len(table)), records, MODES, np.ones(3), pd.Timedelta("1D"))
-    changes = flat.smallest(2.0)
+    ones = smallest_by_threshold(lambda table: np.ones(len(table)), records, MODES, np.ones(3), pd.Timedelta("1D"))
+    changes = ones(2.0)
     assert np.isnan([changes.common, *changes.single.values()]).all()
     assert "no fall" in str(changes)
 

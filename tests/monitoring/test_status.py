@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skthermo.monitoring import MonitorStatus, load_monitor
-from skthermo.monitoring._events import Event
-from skthermo.monitoring._transitions import event_changes
+from skthermo.monitoring import load_monitor
+from skthermo.monitoring._events import Event, event_changes
 from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 
 SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value
@@ -48,12 +47,17 @@ def test_a_status_is_plain_and_says_what_the_tables_say(after):
     status = after.status(after.last_)
     plain = status.as_dict()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
-    assert list(plain) == [one.name for one in fields(MonitorStatus)]
-    assert status.state == after.state() == "alarm"
+    parts = {"records": status.records, "levels": status.levels}
+    names = [one.name for part in (status, *parts.values()) for one in fields(part) if one.name not in parts]
+    assert sorted(plain) == sorted(names)
+    assert status.state == "alarm"
+    for part in (str(status.records), str(status.levels), *(f"event {one['event']}:" for one in status.events)):
+        assert part in str(status)
+    assert f"records: {status.records}" in after.summary()
     assert plain["newest"] == after.last_.isoformat()
-    assert status.age == pd.Timedelta(0)
+    assert status.records.age == pd.Timedelta(0)
     known = after.evaluations_[after.evaluations_["state"] != "not evaluated"]
-    assert (status.evaluated, status.index) == (known.index[-1], known["index"].iloc[-1])
+    assert (status.records.evaluated, status.index) == (known.index[-1], known["index"].iloc[-1])
     is_open = after.events_["end"].isna()
     assert [one["event"] for one in plain["events"]] == after.events_.index[is_open].tolist()
     assert [one["since"] for one in plain["events"]] == [t.isoformat() for t in after.events_.loc[is_open, "start"]]
@@ -66,17 +70,17 @@ def test_silence_is_never_healthy_and_never_ends_an_alarm(monitor, records, dama
     assert monitor.status(monitor.last_).state == "not evaluated"  # no record yet
     monitor.update(records[FIRST : DAMAGED + 8 if damaged else FIRST + 3])
     said = "alarm" if damaged else "healthy"
-    limit = monitor.status().max_age
+    limit = monitor.status().records.max_age
     for age in (pd.Timedelta("1h"), limit, limit + pd.Timedelta("1s"), pd.Timedelta("700D")):
         status = monitor.status(monitor.last_ + age)
-        assert (status.age, status.is_late) == (age, age > limit)
-        assert status.state == ("not evaluated" if status.is_late and not damaged else said)
-        assert (status.reason != "") or not status.is_late
+        assert (status.records.age, status.records.is_late) == (age, age > limit)
+        assert status.state == ("not evaluated" if status.records.is_late and not damaged else said)
+        assert (status.reason != "") or not status.records.is_late
         assert status.at(monitor.last_ + pd.Timedelta("900D")) == monitor.status(monitor.last_ + pd.Timedelta("900D"))
     early = monitor.status(monitor.last_ - pd.Timedelta("3D"))
-    assert early.is_ahead
+    assert early.records.is_ahead
     assert early.state == ("alarm" if damaged else "not evaluated")
-    assert monitor.status(monitor.last_ + pd.Timedelta("2h"), max_age="1h").is_late
+    assert monitor.status(monitor.last_ + pd.Timedelta("2h"), max_age="1h").records.is_late
     for wrong in ({"now": "yesterday"}, {"now": "2026-01-01T00:00+01:00"}, {"max_age": "-1D"}):
         with pytest.raises(ValueError, match="expected"):
             monitor.status(**wrong)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from skthermo.monitoring._smallest import SmallestChanges
-from skthermo.monitoring._status import facts_of
+from skthermo.monitoring._status import status_of
+from skthermo.monitoring._threshold import SmallestChanges
 
 NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "detected", "until", "detail"])
 
@@ -107,16 +107,17 @@ class FakeMonitor:
         self.smallest_changes_ = SmallestChanges(0.01, {"f1": 0.02, "f2": 0.03}, True, pd.Timedelta("3D"))
         self.detector_ = SimpleNamespace()
 
-    def state(self):
+    @property
+    def history_(self):
         opened = set(self.events_.loc[self.events_["end"].isna(), "kind"])
         newest = "watch" if "watch" in opened else str(self.evaluations_["state"].iloc[-1])
-        return "alarm" if opened & {"damage", "measurement or structure"} else newest
+        return SimpleNamespace(state="alarm" if opened & {"damage", "measurement or structure"} else newest)
 
     def transitions(self, after=0):
         return []
 
     def status(self, now=None):
-        return facts_of(self).at(now)
+        return status_of(self).at(now)
 
     def update(self, new):
         raise NotImplementedError

@@ -14,7 +14,7 @@ from skthermo._tables.text import share_text
 from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._smallest import SmallestChanges
+from skthermo.monitoring._threshold import SmallestChanges
 from skthermo.reporting import owner_report
 from skthermo.reporting.service import Standing, monitor_facts
 from tests.reporting.monitors import FakeMonitor, event_row
@@ -106,7 +106,7 @@ def test_drawings_have_their_tables(page, real):
 
 def test_it_says_what_the_real_monitor_says(page, real):
     monitor, _ = real
-    assert monitor.state() == state_of(page) == "alarm"
+    assert monitor.status(monitor.last_).state == state_of(page) == "alarm"
     event = monitor.events_.iloc[-1]
     start = event["start"]
     assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"

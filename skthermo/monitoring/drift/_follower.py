@@ -17,15 +17,15 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, as_index, days_later, midnights_between
 from skthermo._tables.saved_frames import SavesFrames
 from skthermo._validation import check_is_fitted
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring.drift._daily import DailyMeans, calendar
+from skthermo.monitoring._records import Memory
 from skthermo.monitoring.drift._explanations import SIGNIFICANT, Explanations, ModeTrends
-from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State, absorb
-from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State, absorb
 from skthermo.monitoring.drift._observations import (
     MISLEARNED,
+    DailyMeans,
     DailyRecords,
     GroupEffects,
+    calendar,
     checked_records,
     observation,
     with_time,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from skthermo._tables.arrays import Array, as_floats, is_real
 from skthermo._tables.frames import YEAR, frame_like, has_stamps
 from skthermo._tables.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
 from skthermo.monitoring._records import OF_TRAINING
+from skthermo.monitoring.drift._explanations import SIGNIFICANT
 from skthermo.preprocessing import set_aside
 
 CONFIDENCE = 0.95  # of the bands
@@ -46,6 +47,80 @@ class GroupTrajectory(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class DriftResolution:
+    """Which drifts the modes and the length of the records would show, and of which groups.
+
+    Parameters
+    ----------
+    detectable_rates : Series
+        Change a year, by group, from which a steady drift is detected with probability 90 %.
+    unobservable : list of str
+        Groups of which a loss of 5 % over the records would not be detected.
+    confounded : mapping of str to list of str
+        Groups of which a drift of 5 % is confounded with a drift of others, with these.
+    indistinguishable : list of tuple of str
+        Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes.
+    """
+
+    detectable_rates: pd.Series
+    unobservable: list[str]
+    confounded: Mapping[str, list[str]]
+    indistinguishable: list[tuple[str, ...]]
+
+    def sentences(self, *, has_drift: bool = False, found: Collection[str] = ()) -> Iterator[str]:
+        """What is not known, of groups other than those found to drift."""
+        known = [one for one in self.detectable_rates.index if one not in self.unobservable]
+        if not has_drift and known:
+            each = ", ".join(f"{group} {_share(self.detectable_rates[group])}" for group in known)
+            yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
+        if self.unobservable:
+            yield f"A loss of 5{SPACE}% of stiffness in {listed(self.unobservable)} is unobservable in these modes."
+        for group, others in self.confounded.items():
+            if group not in found:
+                yield f"A drift of {group} cannot be distinguished from one of {' or '.join(others)}."
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences())
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShifts:
+    """How the modes went, and how well the best explanation fits.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a mode: relative shift over the records, ``measured`` (apart from the weather) and ``explained`` by the
+        drift, and ``standard_error`` of the measured one.
+    by_day : DataFrame
+        Shift of ln frequency of each mode by day that the drift causes; 0 without drift.
+    misfit_p_value : float
+        Probability of trends that differ so much from what the best explanation gives, before errors were widened.
+    widening : float
+        Factor of the variances because of that difference (Birge's ratio squared).
+    """
+
+    table: pd.DataFrame
+    by_day: pd.DataFrame
+    misfit_p_value: float
+    widening: float
+
+    def sentences(self, significance: float = SIGNIFICANT) -> Iterator[str]:
+        """What does not fit, and modes that were hardly measured."""
+        if self.misfit_p_value < significance:
+            yield (
+                "One or two groups do not explain all changes of the frequencies, as with added mass: standard errors "
+                f"were multiplied by {significant(np.sqrt(self.widening))}."
+            )
+        missing = self.table.index[self.table["measured"].isna()]
+        if len(missing):
+            yield f"Measured on too few days to be used: {listed(list(missing))}."
+
+    def __str__(self) -> str:
+        return "\n".join([self.table.to_string(), *self.sentences()])
+
+
+@dataclass(frozen=True, eq=False)
 class ParameterHistory(Sentences):
     """Stiffness of groups over years, with bands.
 
@@ -58,8 +133,6 @@ class ParameterHistory(Sentences):
     trajectories : mapping of str to GroupTrajectory
         Ln stiffness of each group, and of each set of indistinguishable groups if all of them change alike; 0 on the
         first day.
-    years : float
-        Length of the records in years.
     p_value : float
         Probability that records without any drift give one group as much evidence.
     significance : float
@@ -67,25 +140,16 @@ class ParameterHistory(Sentences):
     explanations : DataFrame
         Sets of one or two groups that may drift, the best first: ``groups``; ``probability``, if any of the sets
         drifts; ``log_evidence`` against no drift.
-    indistinguishable : list of tuple of str
-        Groups that cannot be distinguished: in the drift that was found, or by their effects on the modes.
     alternatives : mapping of str to list of str
         Groups that may drift in the place of each of the best explanation, itself among them; empty without drift.
-    confounded : mapping of str to list of str
-        Groups of which a drift of 5 % is confounded with a drift of others, with these.
-    unobservable : list of str
-        Groups of which a loss of 5 % over the records would not be detected.
-    detectable_rates : Series
-        Change a year, by group, from which a steady drift is detected with probability 90 %.
-    modes : DataFrame
-        One row a mode: relative shift over the records, ``measured`` (apart from the weather) and ``explained`` by the
-        drift, and ``standard_error`` of the measured one.
-    misfit_p_value : float
-        Probability of trends that differ so much from what the best explanation gives, before errors were widened.
-    widening : float
-        Factor of the variances because of that difference (Birge's ratio squared).
-    shifts : DataFrame
-        Shift of ln frequency of each mode by day that the drift causes; 0 without drift.
+    resolution : DriftResolution
+        Which drifts would be seen: ``detectable_rates`` (Series by group: change a year that is detected with
+        probability 90 %), ``unobservable`` groups, ``confounded`` ones (each with the others), and sets of
+        ``indistinguishable`` ones.
+    modes : ModeShifts
+        ``table`` (one row a mode: relative shift over the records, ``measured`` apart from the weather, ``explained``
+        by the drift, and ``standard_error``), ``by_day`` (shift of ln frequency that the drift causes),
+        ``misfit_p_value`` and ``widening`` (factor of the variances because of the misfit).
     seed : int
         Of the draws of `reaches`.
 
@@ -106,19 +170,12 @@ class ParameterHistory(Sentences):
 
     days: pd.DatetimeIndex
     trajectories: Mapping[str, GroupTrajectory] = field(repr=False)
-    years: float
     p_value: float
     significance: float
     explanations: pd.DataFrame = field(repr=False)
-    indistinguishable: list[tuple[str, ...]]
     alternatives: Mapping[str, list[str]]
-    confounded: Mapping[str, list[str]]
-    unobservable: list[str]
-    detectable_rates: pd.Series = field(repr=False)
-    modes: pd.DataFrame = field(repr=False)
-    misfit_p_value: float
-    widening: float
-    shifts: pd.DataFrame = field(repr=False)
+    resolution: DriftResolution = field(repr=False)
+    modes: ModeShifts = field(repr=False)
     seed: int = field(repr=False)
 
     @property
@@ -129,7 +186,12 @@ class ParameterHistory(Sentences):
     @property
     def groups(self) -> list[str]:
         """Names of the groups."""
-        return list(self.detectable_rates.index)
+        return list(self.resolution.detectable_rates.index)
+
+    @property
+    def years(self) -> float:
+        """Length of the records."""
+        return (self.days[-1] - self.days[0]) / YEAR
 
     @property
     def table(self) -> pd.DataFrame:
@@ -165,7 +227,7 @@ class ParameterHistory(Sentences):
             "p_value": 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, np.finfo(float).tiny)),
             "probability": shares,
             "drifts": [self._drifts(name) for name in names],
-            "detectable_rates": self.detectable_rates.reindex(names).to_numpy(),
+            "detectable_rates": self.resolution.detectable_rates.reindex(names).to_numpy(),
         }
         return pd.DataFrame(columns, index=pd.Index(names, name="group"))
 
@@ -194,7 +256,7 @@ class ParameterHistory(Sentences):
         random, rows = np.random.RandomState(self.seed), {}
         for name, trajectory in self.trajectories.items():
             years = self._first_passages(trajectory, float(np.log1p(limit)), random)
-            if name in self.unobservable:
+            if name in self.resolution.unobservable:
                 rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
                 continue
             dates = [self._date(years, share) for share in (0.5, (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)]
@@ -221,16 +283,17 @@ class ParameterHistory(Sentences):
         ValueError
             If F is no frame with times, or has other modes; if values are no frequencies, all of which it lists.
         """
-        if not has_stamps(F) or list(getattr(F, "columns", [])) != list(self.shifts.columns):
+        shifts = self.modes.by_day
+        if not has_stamps(F) or list(getattr(F, "columns", [])) != list(shifts.columns):
             raise ValueError(
                 f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
-                f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
+                f"DataFrame on a DatetimeIndex with {list(shifts.columns)}"
             )
         found = set_aside(frequencies=F, exclude=OF_TRAINING, needs_all=True, is_baseline=False)
         warn_each(found.others.warnings())
         F = found.frequencies
         of_day = np.clip(self.days.searchsorted(F.index, side="right") - 1, 0, len(self.days) - 1)
-        return frame_like(F, as_floats(F) * np.exp(-self.shifts.to_numpy()[of_day]))
+        return frame_like(F, as_floats(F) * np.exp(-shifts.to_numpy()[of_day]))
 
     def __repr__(self) -> str:
         rates = self.rates
@@ -241,7 +304,7 @@ class ParameterHistory(Sentences):
         return f"ParameterHistory({found or 'no drift'})"
 
     def _drifts(self, name: str) -> str:
-        if name in self.unobservable:
+        if name in self.resolution.unobservable:
             return "unobservable"
         members = [others for others in self.alternatives.values() if name in others]
         if members:
@@ -288,33 +351,18 @@ class ParameterHistory(Sentences):
                 yield f"A drift of {listed(others)} ({each}) explains these frequencies equally well."
 
     def _limits(self) -> Iterator[str]:
-        known = [one for one in self.groups if one not in self.unobservable]
-        if not self.has_drift and known:
-            each = ", ".join(f"{group} {_share(self.detectable_rates[group])}" for group in known)
-            yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
-        if self.unobservable:
-            yield f"A loss of 5{SPACE}% of stiffness in {listed(self.unobservable)} is unobservable in these modes."
-        n_groups = sum(group != ALL_GROUPS for group in self.groups)
-        if n_groups > len(self.modes):
+        yield from self.resolution.sentences(has_drift=self.has_drift, found=self.alternatives)
+        n_groups, n_modes = sum(group != ALL_GROUPS for group in self.groups), len(self.modes.table)
+        if n_groups > n_modes:
             yield (
-                f"{n_groups} groups and {counted(len(self.modes), 'mode')} do not determine which group drifts: the "
-                "named group may be wrong, such as the mirror image of the right one."
+                f"{n_groups} groups and {counted(n_modes, 'mode')} do not determine which group drifts: the named "
+                "group may be wrong, such as the mirror image of the right one."
             )
-        for group, others in self.confounded.items():
-            if group not in self.alternatives:
-                yield f"A drift of {group} cannot be distinguished from one of {' or '.join(others)}."
         if self.years < SHORT:
             yield (
                 f"Records of {self.years:.1f} years hardly distinguish season and drift: confidence intervals are wide."
             )
-        if self.misfit_p_value < self.significance:
-            yield (
-                "One or two groups do not explain all changes of the frequencies, as with added mass: standard errors "
-                f"were multiplied by {significant(np.sqrt(self.widening))}."
-            )
-        missing = self.modes.index[self.modes["measured"].isna()]
-        if len(missing):
-            yield f"Measured on too few days to be used: {listed(list(missing))}."
+        yield from self.modes.sentences(self.significance)
 
 
 def _share(value: float) -> str:

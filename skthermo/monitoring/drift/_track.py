@@ -13,15 +13,15 @@ from scipy import stats
 
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_random_state, check_probability
-from skthermo.monitoring.drift._daily import DailyMeans, calendar
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
-from skthermo.monitoring.drift._history import GroupTrajectory, ParameterHistory
-from skthermo.monitoring.drift._kalman import DailySteps, State
-from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._history import DriftResolution, GroupTrajectory, ModeShifts, ParameterHistory
+from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, State
 from skthermo.monitoring.drift._observations import (
     MISLEARNED,
+    DailyMeans,
     DailyRecords,
     GroupEffects,
+    calendar,
     checked_records,
     length_of,
     observation,
@@ -236,7 +236,6 @@ def history_of(
     return ParameterHistory(
         days=days,
         trajectories={name: one.with_error_of_effects(EFFECT_ERROR) for name, one in named.items()},
-        years=trends.years,
         p_value=found.p_value,
         significance=significance,
         explanations=pd.DataFrame(
@@ -246,14 +245,18 @@ def history_of(
                 "log_evidence": found.evidence,
             }
         ),
-        indistinguishable=[tuple(names[group] for group in one) for one in sets],
         alternatives={names[group]: [names[other] for other in others] for group, others in alternatives.items()},
-        confounded={names[one]: [names[other] for other in others] for one, others in found.confounded.items()},
-        unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
-        detectable_rates=pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
-        modes=mode_table(fem.mode_names_, followed, shifts[-1], is_measured),
-        misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
-        widening=found.widening,
-        shifts=pd.DataFrame(shifts, days, fem.mode_names_),
+        resolution=DriftResolution(
+            pd.Series((stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone, index=names),
+            unobservable=[names[group] for group in np.flatnonzero(found.unobservable)],
+            confounded={names[one]: [names[other] for other in others] for one, others in found.confounded.items()},
+            indistinguishable=[tuple(names[group] for group in one) for one in sets],
+        ),
+        modes=ModeShifts(
+            mode_table(fem.mode_names_, followed, shifts[-1], is_measured),
+            pd.DataFrame(shifts, days, fem.mode_names_),
+            misfit_p_value=float(stats.chi2.sf(misfit, freedom)) if freedom > 0 else float("nan"),
+            widening=found.widening,
+        ),
         seed=int(random.randint(2**31 - 1)),
     )

@@ -1,6 +1,5 @@
 """Faults of sensors in service, distinguished from damage where the data can."""
 
-from skthermo.monitoring.sensors._faults import Fault
 from skthermo.monitoring.sensors._watch import Dispute, SensorWatch, Watched, WatchState
 
-__all__ = ["Dispute", "Fault", "SensorWatch", "WatchState", "Watched"]
+__all__ = ["Dispute", "SensorWatch", "WatchState", "Watched"]

@@ -1,9 +1,11 @@
-"""The watch on sensors: from day to day, which are at fault."""
+"""The watch on sensors: from day to day, which are at fault, since when, and until when."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -11,13 +13,26 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY_NS, columns_by_sensor, frame_like
-from skthermo.monitoring.sensors._changes import LEAST_DAYS, LONGEST, Change, Days, Departures
-from skthermo.monitoring.sensors._faults import DEPARTURES, Fault, SensorFaults
-from skthermo.monitoring.sensors._responses import CERTAIN, Responses
-from skthermo.monitoring.sensors._thermometers import Thermometers, local_days
+from skthermo._tables.frames import DAY_NS, as_index, columns_by_sensor, frame_like
+from skthermo.monitoring._events import Transition
+from skthermo.monitoring.sensors._expected import (
+    CERTAIN,
+    LEAST_DAYS,
+    LONGEST,
+    Change,
+    Days,
+    Departures,
+    Responses,
+    Thermometers,
+    local_days,
+)
 from skthermo.preprocessing.checks import Plausible, equal_runs
 
+SOON = 7 * DAY_NS  # nanoseconds after its end in which a fault that comes again is the same
+COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
+LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
+DEPARTURES = ("offset", "drift", "disagree")
+MONTH = 30.4  # days
 A_DEGREE = 1.0  # below which thermometers may depart without a fault
 LEAST_OTHERS = 2  # thermometers that tell which one is at fault
 CLEAR = 4.6  # logarithm of the odds that one thermometer is at fault, against each other one
@@ -36,6 +51,83 @@ REFERENCE = 2.0  # times `CLEAR`, the logarithm of the odds that a thermometer i
 
 
 @dataclass(frozen=True)
+class Fault:
+    """Position of its column, the other one where two are concerned (else -1), times in nanoseconds, None as it lasts.
+
+    ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
+    """
+
+    kind: str
+    column: int
+    since: int
+    detected: int
+    other: int = -1
+    size: float = 0.0
+    rate: float = 0.0
+    until: int | None = None
+
+    def detail(self, other: Hashable, unit: str) -> str:
+        value = f"{self.size:.6g} {unit}".rstrip()
+        return {
+            "dead": "has had no value for longer than gaps of the baseline",
+            "stuck": f"repeats {value}; left out",
+            "implausible": f"shows implausible values, such as {value}; left out",
+            "offset": f"{self.size:+.1f} degrees beside what the other thermometers predict; left out",
+            "drift": f"{self.rate * MONTH:+.2f} degrees a month, {self.size:+.1f} so far, beside what the other "
+            "thermometers predict; left out",
+            "disagree": f"{abs(self.size):.1f} degrees between what it, {other!r} and any others predict: which is "
+            "wrong is not known; records are healthy only if they are so without either",
+            "swapped": f"its values are in the column of {other!r}; put back in place",
+        }[self.kind]
+
+
+@dataclass(frozen=True)
+class SensorFaults:
+    """All faults in the order in which they were detected."""
+
+    faults: tuple[Fault, ...] = ()
+
+    def lasting(self, *kinds: str) -> list[Fault]:
+        return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
+
+    def left_out(self) -> dict[int, Fault]:
+        """By position of each column that is left out, the fault for which it is."""
+        return {fault.column: fault for fault in self.lasting(*LEFT_OUT)}
+
+    def opened(self, fault: Fault) -> SensorFaults:
+        """With one more fault, or with that one again which has just ended."""
+        same = (fault.column, fault.other, fault.kind)
+        for known in reversed(self.faults):
+            lasts = known.until is None or known.until > fault.since - SOON
+            if (known.column, known.other, known.kind) == same and lasts:
+                return self.changed(known, until=None)
+        return SensorFaults((*self.faults, fault))
+
+    def changed(self, fault: Fault, **values: Any) -> SensorFaults:
+        return SensorFaults(tuple(replace(one, **values) if one is fault else one for one in self.faults))
+
+    def notes(self, names: Sequence[Hashable], zone: str) -> list[str]:
+        """What is left out or put back in place for the faults that last."""
+        return [
+            f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
+            if fault.kind == "swapped"
+            else f"{names[fault.column]} is left out ({fault.kind} since {as_index([fault.since], zone)[0]:%Y-%m-%d})"
+            for fault in self.lasting(*LEFT_OUT, "swapped")
+        ]
+
+    def table(self, names: Sequence[Hashable], zone: str, units: Sequence[str]) -> pd.DataFrame:
+        """One row a fault, two where two columns are concerned."""
+        rows = [
+            [names[own], fault.kind, fault.since, fault.detected, fault.until, fault.detail(names[other], units[own])]
+            for fault in self.faults
+            for own, other in [(fault.column, fault.other), (fault.other, fault.column)][: 1 if fault.other < 0 else 2]
+        ]
+        columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
+        table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
+        return pd.DataFrame(table | {name: as_index(columns[name], zone) for name in ("since", "detected", "until")})
+
+
+@dataclass(frozen=True)
 class Runs:
     """Last value of each column, and number of records and first stamp (ns) of its current run of each kind."""
 
@@ -49,29 +141,26 @@ class Runs:
 
     def after(self, stamps: Counts, values: Array, implausible: NDArray[np.bool_]) -> Runs:
         """Runs after more records; those without any value tell nothing of a single column."""
-        runs = self
+        last, before, since = self.last, self.counts, self.since
         for stamp, row, is_implausible in zip(stamps, values, implausible, strict=True):
-            runs = runs._next(stamp, row, is_implausible)
-        return runs
+            seen = ~np.isnan(row)
+            if not seen.any():
+                continue
+            counts = np.array(
+                [
+                    np.where(seen | np.isnan(last), 0, before[MISSING] + 1),
+                    np.where(seen, np.where(row == last, before[REPEATED] + 1, 1), before[REPEATED]),
+                    run_of(before[IMPLAUSIBLE], seen, is_implausible),
+                ]
+            )
+            is_fresh = (counts == 1) & ((before != 1) | np.array([~seen, seen, seen]))
+            last, before, since = np.where(seen, row, last), counts, np.where(is_fresh, stamp, since)
+        return Runs(last, before, since)
 
-    def _next(self, stamp: np.int64, row: Array, implausible: NDArray[np.bool_]) -> Runs:
-        seen = ~np.isnan(row)
-        if not seen.any():
-            return self
-        begun = ~np.isnan(self.last)
-        counts = np.array(
-            [
-                np.where(seen | ~begun, 0, self.counts[MISSING] + 1),
-                np.where(seen, np.where(row == self.last, self.counts[REPEATED] + 1, 1), self.counts[REPEATED]),
-                self.implausible(seen, implausible),
-            ]
-        )
-        fresh = (counts == 1) & ((self.counts != 1) | np.array([~seen, seen, seen]))
-        return Runs(np.where(seen, row, self.last), counts, np.where(fresh, stamp, self.since))
 
-    def implausible(self, seen: NDArray[np.bool_], implausible: NDArray[np.bool_]) -> Counts:
-        """Length of the run of implausible values of each column after one more record."""
-        return np.where(seen, np.where(implausible, self.counts[IMPLAUSIBLE] + 1, 0), self.counts[IMPLAUSIBLE])
+def run_of(before: Counts, seen: NDArray[np.bool_], implausible: NDArray[np.bool_]) -> Counts:
+    """Length of the run of implausible values of each column after one more record."""
+    return np.where(seen, np.where(implausible, before + 1, 0), before)
 
 
 @dataclass(frozen=True)
@@ -227,7 +316,7 @@ class SensorWatch:
 
         What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
         """
-        n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
+        n_sensors, own = len(self.sensors), list(map(itemgetter(0), self.columns))
         temperatures, responses = as_floats(T).copy(), self._in_place(state.faults, as_floats(F))
         impossible, far, _, expected = self._evaluated(temperatures[:, own], responses)
         given = np.hstack([temperatures[:, own], responses])
@@ -254,19 +343,15 @@ class SensorWatch:
         moments: Counts,
         acknowledged: Sequence[int],
     ) -> NDArray[np.bool_]:
-        n_sensors, faults = len(self.sensors), state.faults
-        of_mode = {
-            column - n_sensors: fault
-            for column, fault in faults.left_out().items()
-            if column >= n_sensors and fault.kind in HELD
-        }
+        n_sensors, of_mode = len(self.sensors), {}
+        for column, fault in state.faults.left_out().items():
+            if column >= n_sensors and fault.kind in HELD:
+                of_mode[column - n_sensors] = fault
         is_fault = np.isin(np.arange(len(self.modes)), list(of_mode))
-        runs = replace(state.runs, counts=state.runs.counts[:, n_sensors:])
-        lengths = np.zeros(far.shape, dtype=np.int64)
-        if far.any() or runs.counts[IMPLAUSIBLE].any():
+        run, lengths = state.runs.counts[IMPLAUSIBLE, n_sensors:], np.zeros(far.shape, dtype=np.int64)
+        if far.any() or run.any():
             for row in range(len(far)):
-                lengths[row] = runs.implausible(seen[row], far[row])
-                runs = replace(runs, counts=np.array([*runs.counts[:IMPLAUSIBLE], lengths[row]]))
+                run = lengths[row] = run_of(run, seen[row], far[row])
         held = (lengths > 0) | is_fault
         for mode, fault in of_mode.items():
             said = [time for time in acknowledged if time >= fault.since]
@@ -283,7 +368,7 @@ class SensorWatch:
         expected: Array,
     ) -> list[str]:
         """What was left out of each record, and why."""
-        names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
+        names, n_sensors = list(map(str, (*self.sensors, *self.modes))), len(self.sensors)
         out = self._left_out(faults)
         lasting = faults.notes(names, self.zone)
         notes = ["; ".join(lasting)] * len(given)
@@ -313,7 +398,7 @@ class SensorWatch:
         stamps = T_day.index
         day = int(local_days(stamps[:1])[0])
         moments = stamps.as_unit("ns").asi8
-        temperatures = as_floats(T_day)[:, [own[0] for own in self.columns]]
+        temperatures = as_floats(T_day)[:, list(map(itemgetter(0), self.columns))]
         midnight, before = int(self._midnight(day)), state.faults
         impossible, _, rest, expected = self._evaluated(temperatures, self._in_place(before, as_floats(F_day)))
         state = self._with_exchanges(state, rest, expected, midnight)
@@ -335,6 +420,28 @@ class SensorWatch:
         if not np.array_equal(self._trusted(state.faults), self._trusted(before)):
             state = self._departing(state)
         return self._with_departures(self._without_ended(state, midnight), midnight)
+
+    def changes(self, before: WatchState, after: WatchState, newest: int) -> Iterator[Transition]:
+        """Sensors that have failed, in another way than before perhaps, and those that are used again."""
+        for old, new in zip_longest(before.faults.faults, after.faults.faults):
+            if old == new:
+                continue
+            is_other = old is None or new is None or (old.column, old.other) != (new.column, new.other)
+            is_again = not is_other and old.until is not None and new.until is None
+            failed = new is not None and (is_other or old.kind != new.kind or is_again)
+            ended = new if new is not None and new.until is not None and (failed or old.until is None) else None
+            if is_other and old is not None and old.until is None:
+                yield self._transition("put back", old, newest, newest)
+            if failed:
+                yield self._transition("fault", new, new.since, newest)
+            if ended is not None:
+                yield self._transition("put back", ended, ended.until, newest)
+
+    def _transition(self, what: str, fault: Fault, time: int, newest: int) -> Transition:
+        names = [*self.sensors, *self.modes]
+        columns = ", ".join(str(names[place]) for place in (fault.column, fault.other) if place >= 0)
+        detail = fault.detail(names[fault.other], self.units[fault.column]) if what == "fault" else ""
+        return Transition(what, time, newest, fault.kind, column=columns, detail=detail)
 
     def _midnight(self, day: int) -> np.int64:
         stamp = pd.Timestamp(day * DAY_NS)

@@ -83,7 +83,7 @@ class Standing:
 
     @property
     def has_records(self) -> bool:
-        return self.status.newest is not None
+        return self.status.records.newest is not None
 
     @property
     def last(self) -> pd.Timestamp:
@@ -129,12 +129,12 @@ class Standing:
             kind = "error"
         elif not self.has_records:
             kind = "no records"
-        elif self.status.is_ahead or self.status.is_late:
-            kind = "ahead" if self.status.is_ahead else "late"
+        elif self.status.records.is_ahead or self.status.records.is_late:
+            kind = "ahead" if self.status.records.is_ahead else "late"
         else:
             kind, since = "reason", self.not_evaluated_since
             reason = str(self.evaluations["reason"].iloc[-1]) if len(self.evaluations) else ""
-        return Doubt(kind, since, self.last, self.now, self.status.step, self.errors, reason)
+        return Doubt(kind, since, self.last, self.now, self.status.records.step, self.errors, reason)
 
     @property
     def not_evaluated_since(self) -> pd.Timestamp:

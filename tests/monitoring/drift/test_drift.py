@@ -15,8 +15,7 @@ from skthermo.fem import AffineModel, add_noise
 from skthermo.monitoring import track_parameters
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
-from skthermo.monitoring.drift._kalman import DailySteps, DayShown, State
-from skthermo.monitoring.drift._noise import DailyNoise
+from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State
 from skthermo.monitoring.drift._observations import observation, shapes_of_time
 from skthermo.surrogate import DataInformedFEM
 
@@ -139,7 +138,7 @@ def test_a_known_drift_is_recovered(history):
     }
     assert "bottom loses" in history.summary()
     assert "bottom" in repr(history)
-    assert_allclose(history.modes["measured"], history.modes["explained"], atol=0.02)
+    assert_allclose(history.modes.table["measured"], history.modes.table["explained"], atol=0.02)
 
 
 def test_without_drift_none_is_claimed(healthy):
@@ -147,7 +146,7 @@ def test_without_drift_none_is_claimed(healthy):
     found = track_parameters(fem, campaign.temperatures, campaign.frequencies, GROUPS, WEEK, random_state=0)
     assert not found.has_drift
     assert set(found.rates["drifts"]) == {"no sign"}
-    assert (found.detectable_rates > 0).all()
+    assert (found.resolution.detectable_rates > 0).all()
     assert found.summary().startswith("No significant drift")
     pd.testing.assert_frame_equal(found.remove_drift(campaign.frequencies), campaign.frequencies)
     bands = found.table.iloc[-1].unstack()
@@ -334,7 +333,7 @@ def test_wrong_input_is_refused(healthy):
 
 def test_more_groups_than_modes_are_said_to_be_a_limit(history):
     assert "modes do not determine" not in history.summary()
-    fewer = replace(history, modes=history.modes[:1])
+    fewer = replace(history, modes=replace(history.modes, table=history.modes.table[:1]))
     assert "do not determine which group drifts" in fewer.summary()
 
 
@@ -385,7 +384,7 @@ def test_mirror_images_are_named_together():
         warnings.simplefilter("ignore", UserWarning)  # four modes do not determine six parameters
         fem = DataInformedFEM(model, random_state=0).fit(T[:365], F[:365])
         history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
-    assert history.indistinguishable == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
+    assert history.resolution.indistinguishable == [("k1", "k6"), ("k2", "k5"), ("k3", "k4")]
     assert_allclose(*history.rates.loc[["k1", "k6"], "probability"])
     assert (history.rates.loc[["k1", "k6"], "drifts"] == "perhaps").all()
     assert_allclose(history.rates.loc["k1", "per_year"], -0.02, atol=3 * history.rates.loc["k1", "standard_error"])

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from skthermo.monitoring.sensors._changes import BEYOND, LONGEST, SEASONAL, Departures, ThermometerNoise
+from skthermo.monitoring.sensors._expected import BEYOND, LONGEST, SEASONAL, Departures, ThermometerNoise
 
 
 def departures(random, n, correlation):

@@ -1,4 +1,4 @@
-"""A detector in service that learns anew: from more records, or after an intervention."""
+"""A detector in service that learns anew: from more records, or after an intervention; compared with the old one."""
 
 from __future__ import annotations
 
@@ -11,22 +11,28 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
 from skthermo._tables.text import capital, counted
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
-from skthermo.monitoring._memory import Memory
-from skthermo.monitoring._smallest import WEEK, blocks_of
-from skthermo.monitoring.retraining._comparison import DetectorComparison, smallest_changes
-from skthermo.monitoring.retraining._shift import ShiftsTried, WeatherFree
+from skthermo.monitoring._records import Memory
+from skthermo.monitoring._shift import ShiftsTried, WeatherFree, block_mean
+from skthermo.monitoring._threshold import WEEK, blocks_of, crossing, levels, lowered, whole_weeks
+from skthermo.residuals.weather import BEYOND, TrainingRange
 
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
 FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors
 
 Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
 """A detector that was fitted on some records, with the threshold of its monitor."""
+MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
+STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
+CLEAR = 3.0  # standard errors from which a difference is one
+WORSE = np.log(1.1)  # of the smallest detected change, from which it counts
+FALSE, SMALLEST = "records in alarm", "smallest detected change"  # rows that decide
 
 
 @dataclass(frozen=True)
@@ -145,15 +151,15 @@ def retrained(
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * free.scale
-    found = DetectorComparison.of(old, new, harvest.records, targets, spread, _past_events(monitor))
+    table = comparison(old, new, harvest.records, targets, spread, _past_events(monitor))
     reasons = [
         *changes.objections(),
-        *(f"the new detector is significantly worse in {name!r}" for name in found.worse()),
+        *(f"the new detector is significantly worse in {name!r}" for name in worse_measures(table)),
     ]
     notes, shift = changes.notes(), changes.table((baseline.index[-1] - baseline.index[0]) / YEAR)
     accepted = force or not reasons
     learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector, "shift": shift}
-    return Retraining("refit", accepted, tuple(reasons), tuple(notes), found.table, harvest.excluded, **learned)
+    return Retraining("refit", accepted, tuple(reasons), tuple(notes), table, harvest.excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
@@ -376,3 +382,117 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
     covered = np.unique(new.day_of_year)
     distance = np.abs(middle.dt.day_of_year.to_numpy()[:, np.newaxis] - covered)
     return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2
+
+
+def comparison(
+    old: ActiveDetector,
+    new: ActiveDetector,
+    overlap: pd.DataFrame,
+    targets: list[Any],
+    spread: pd.Series,
+    events: dict[Any, pd.DataFrame],
+) -> pd.DataFrame:
+    """The old detector and the one that may follow it, on the records that the old one has not learned from.
+
+    False alarms, scatter, the smallest changes found, weather, and records of past events. A row for each measure:
+    ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its ``standard_error`` from blocks of
+    time, and ``worse``: whether the new one is significantly worse in it. ``spread`` holds standard deviations of the
+    responses, weather taken out, in their units.
+    """
+    blocks = blocks_of(overlap.index)
+    rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
+    persistence = old.estimate.rule.persistence
+    rows = {
+        FALSE: _compared(*(_above(levels(one, persistence)[0]) for one in rates), blocks),
+        "median index over threshold": _medians(*rates),
+        **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
+        "records in unknown weather": _unknown(old, new, overlap, targets),
+        **dict(_found(old, new, events)),
+    }
+    table = pd.DataFrame(rows, index=["old", "new", "difference", "standard_error", "worse"]).T
+    return table.astype(dict.fromkeys(table.columns[:4], float) | {"worse": bool})
+
+
+def worse_measures(table: pd.DataFrame) -> list[str]:
+    """Measures in which the new detector is significantly worse, and which count."""
+    false = table.loc[FALSE]
+    has_fewer_false = bool(false["difference"] < -CLEAR * false["standard_error"])
+    # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
+    return [name for name in table.index[table["worse"]] if not (name == SMALLEST and has_fewer_false)]
+
+
+def _above(ratio: Array) -> Array:
+    return np.where(np.isnan(ratio), np.nan, (ratio > 1).astype(float))
+
+
+def _compared(old: Array, new: Array, blocks: Array) -> list[Any]:
+    """Means of both, of their difference where both evaluate, and whether it is clearly positive."""
+    difference, error = block_mean(new - old, blocks)
+    return [np.nanmean(old), np.nanmean(new), difference, error, bool(difference > CLEAR * error)]
+
+
+def _medians(old: Array, new: Array) -> list[Any]:
+    medians = [float(np.nanmedian(one)) for one in (old, new)]
+    return [*medians, medians[1] - medians[0], np.nan, False]
+
+
+@answers_kept()
+def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
+    """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
+
+    For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
+    """
+    records = whole_weeks(records, MOST_PROBED)
+    blocks = blocks_of(records.index)
+    found, start = np.full((len(targets), blocks.max() + 2), np.nan), active.ratio(records)
+    for mode, target in enumerate(targets):
+        fallen = (lowered(records, {target: step * spread[target]}) for step in STEPS[1:])
+        steps = np.array(STEPS) * (spread[target] / (records[target].mean() if records[target].min() > 0 else 1.0))
+        ratios = [active.ratio(one) for one in fallen]
+        curve = np.array([start, *ratios])
+        found[mode, -1] = _crossing(steps, curve)
+        for block in range(blocks.max() + 1):
+            found[mode, block] = _crossing(steps, curve[:, blocks == block])
+    return found
+
+
+def _rows_of_changes(old: Array, new: Array, targets: list[Any]) -> Iterator[tuple[str, list[Any]]]:
+    """A row for their geometric mean over the modes, which decides, and one for each mode."""
+    logs = np.log(np.array([old, new]))
+    known = np.isfinite(logs).all(axis=0)
+    together = np.where(known, logs, 0.0).sum(axis=1) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    for name, values in [(SMALLEST, together), *zip(targets, logs.transpose(1, 0, 2), strict=True)]:
+        change = values[1] - values[0]
+        error = block_mean(change[:-1], np.arange(len(change) - 1))[1]
+        row = [*np.exp(values[:, -1]), change[-1], error]
+        if name == SMALLEST:
+            yield name, [*row, bool(change[-1] - CLEAR * error > WORSE)]
+        else:
+            yield f"{SMALLEST}, {name}", [*row, False]
+
+
+def _crossing(steps: Array, curve: Array) -> float:
+    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any."""
+    curve = curve[:, ~np.isnan(curve).any(axis=0)]
+    return crossing(steps, np.median(curve, axis=1)) if curve.size else np.nan
+
+
+def _unknown(old: ActiveDetector, new: ActiveDetector, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
+    """Shares of records outside the weather of each baseline."""
+    weather = [name for name in overlap.columns if name not in targets]
+    if not weather:
+        return [0.0, 0.0, 0.0, np.nan, False]
+    shares = []
+    for active in (old, new):
+        known = TrainingRange.of(active.trained[weather], np.ones(len(active.trained), dtype=bool))
+        shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
+    return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
+
+
+def _found(
+    old: ActiveDetector, new: ActiveDetector, events: dict[Any, pd.DataFrame]
+) -> Iterator[tuple[str, list[Any]]]:
+    """Peaks of past events over the threshold: what was found has to be found again."""
+    for number, records in events.items():
+        peaks = [float(np.nanmax(active.ratio(records), initial=0.0)) for active in (old, new)]
+        yield f"event {number}, peak over threshold", [*peaks, peaks[1] - peaks[0], np.nan, peaks[1] <= 1 < peaks[0]]

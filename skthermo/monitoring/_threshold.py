@@ -1,26 +1,30 @@
-"""Events of a damage index, and the threshold by which a healthy structure has so many of them in a year."""
+"""The threshold of a damage index: how many false events a healthy structure has, and which changes it detects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
+from skthermo._estimators.answers import answers_kept
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import Array
 from skthermo._tables.frames import DAY, YEAR, correlation_time
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import counted_number
+from skthermo._tables.text import counted_number, duration_text, percent
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, WeatherWarning
-from skthermo.monitoring._smallest import LARGE, SmallestChanges
+from skthermo.monitoring._events import EventRule, find_events, levels
 
+WEEK = pd.Timedelta("7D")
+STEPS = (0.0, 0.5, 2.0, 5.0)  # standard deviations of a response, by which it is lowered
+MOST_PROBED = 1000  # records of the baseline that are lowered, whole weeks of them
+LARGE = 0.025  # fall of all natural frequencies that a monitor should see: 5 % of the stiffness of the structure
 N_PEAKS = 16  # highest excursions of the baseline from which the tail is learned
 N_SCALES = 50  # quantiles of the seasonal scale over which the tail is averaged
 COVERAGE = 0.9  # share of the numbers of false alarms in a year that lie between `lowest` and `highest`
@@ -37,75 +41,145 @@ FAR = 0.4  # events asked for in the time of the baseline, below which the thres
 N_NODES = 400  # at which that distribution is averaged over what the baseline leaves open
 
 
-@dataclass(frozen=True)
-class EventState:
-    """Whether an event is open, since when all levels have stayed within the clear threshold, and the last indices.
+def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
+    """Number of the block of each record, counted without gaps."""
+    numbers = (times - times[0]) // length
+    return np.unique(numbers, return_inverse=True)[1]
 
-    ``quiet_since`` is in nanoseconds, None if the last level was above it, or there was none.
+
+def whole_weeks(records: pd.DataFrame, most: int) -> pd.DataFrame:
+    """Whole weeks, evenly spread, of at most some number of records, or one week."""
+    if len(records) <= most:
+        return records
+    blocks = blocks_of(records.index)
+    n_blocks = blocks.max() + 1
+    chosen = np.unique(np.linspace(0, n_blocks - 1, max(n_blocks * most // len(records), 1)).astype(int))
+    return records[np.isin(blocks, chosen)]
+
+
+def lowered(records: pd.DataFrame, falls: Mapping[Any, Any]) -> pd.DataFrame:
+    """Records of which some responses are lower."""
+    changed = records.copy()
+    for name, fall in falls.items():
+        changed[name] -= fall
+    return changed
+
+
+def crossing(steps: Array, ratios: Array) -> float:
+    """The step at which a ratio exceeds 1; NaN if it does so without any.
+
+    Squared indices grow with squared steps, nearly on straight lines.
+    """
+    squares = ratios**2
+    above = np.flatnonzero(squares > 1)
+    if len(above) and above[0] == 0:
+        return np.nan
+    after = above[0] if len(above) else len(steps) - 1
+    slope = (squares[after] - squares[after - 1]) / (steps[after] ** 2 - steps[after - 1] ** 2)
+    return float(np.sqrt(steps[after - 1] ** 2 + (1 - squares[after - 1]) / slope)) if slope > 0 else np.nan
+
+
+@dataclass(frozen=True)
+class SmallestChanges:
+    """Falls of responses that a threshold sees: half of the records are above it, and an alarm follows ``within`` days.
+
+    ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of
+    each alone, a share where ``is_relative``, else in its unit. ``groups`` are losses of stiffness of damage groups, of
+    a detector that has their directions. NaN where no fall or loss is seen.
     """
 
-    is_open: bool = False
-    quiet_since: int | None = None
-    recent: tuple[float, ...] = ()
+    common: float
+    single: dict[Any, float]
+    is_relative: bool
+    within: pd.Timedelta
+    groups: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether a large fall of all responses is not detected, and a larger one is."""
+        return self.is_relative and self.common > LARGE
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: NaN is None, ``within`` in seconds."""
+        single, groups = (
+            {str(name): _known(value) for name, value in some.items()} for some in (self.single, self.groups)
+        )
+        within = self.within.total_seconds()
+        return {"common": _known(self.common), "single": single, "groups": groups, "within": within}
+
+    def __str__(self) -> str:
+        parts = [f"a fall of all responses by {percent(self.common, '.2g')}"] if np.isfinite(self.common) else []
+        if single := _range_text(self.single, "{:.2g} %" if self.is_relative else "{:.2g}"):
+            parts.append(f"{'of' if parts else 'a fall of'} one response alone {single}")
+        if groups := _range_text(self.groups, "{:.2g} %"):
+            parts.append(f"a loss of stiffness {groups}")
+        if not parts:
+            return "no fall of the responses raises an alarm"
+        text = f"{', or '.join(parts)} raises an alarm within {duration_text(self.within)}"
+        return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
-@dataclass(frozen=True)
-class EventRule(SavesFrames):
-    """An event opens when ``persistence`` of the last ``2 persistence - 1`` evaluated records exceed ``threshold``.
+def _range_text(changes: Mapping[Any, float], form: str) -> str:
+    """The smallest and the largest of some changes, with their names; "" where none is seen."""
+    seen = {name: value for name, value in changes.items() if np.isfinite(value)}
+    if not seen:
+        return ""
+    ends = dict.fromkeys((min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)))
+    factor = 100 if "%" in form else 1
+    return "by " + " to ".join(f"{form.format(factor * seen[name])} ({name})" for name in ends)
 
-    That is when their level, the median index of these records, exceeds it; those before the first count as 0. An
-    event closes when the levels of ``hold`` have stayed within ``release``. Records that are not evaluated (NaN)
-    neither open nor close it: the time of quiet counts only between evaluated records.
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+@answers_kept()  # of the weather, which is the same in all calls
+def smallest_by_threshold(
+    index_of: Callable[[pd.DataFrame], Array],
+    records: pd.DataFrame,
+    names: Sequence[Any],
+    deviations: Array,
+    within: pd.Timedelta,
+    losses: pd.DataFrame | None = None,
+) -> Callable[[float], SmallestChanges]:
+    """By a threshold, the falls of responses by which the median index of a baseline exceeds it.
+
+    ``index_of`` are a detector's indices of records in order of time; ``deviations`` are those of the responses.
+    ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
+    record by one standard deviation; their column ``"loss"`` is that loss.
     """
+    some = whole_weeks(records, MOST_PROBED)
+    responses = some[list(names)]
+    is_relative = bool((records[list(names)].min() > 0).all())
+    shares = deviations / (responses.mean().to_numpy() if is_relative else 1.0)
+    changes = [
+        ("single", name, share, {name: size}) for name, share, size in zip(names, shares, deviations, strict=True)
+    ]
+    if is_relative:
+        share = float(np.median(shares))
+        changes.append(("common", "", share, dict((share * responses).items())))
+    for group, row in (pd.DataFrame() if losses is None else losses).iterrows():
+        falls = -row.drop("loss").to_numpy() * responses
+        changes.append(("groups", group, float(row["loss"]), dict(falls.items())))
+    start, medians = index_of(some), []
+    for *_, falls in changes:
+        by_step = ({name: step * size for name, size in falls.items()} for step in STEPS[1:])
+        medians.append(_medians(np.array([start, *(index_of(lowered(some, one)) for one in by_step)])))
 
-    threshold: float
-    release: float
-    hold: pd.Timedelta
-    persistence: int = 1
+    def at(threshold: float) -> SmallestChanges:
+        found: dict[str, dict[Any, float]] = {"single": {}, "common": {}, "groups": {}}
+        for (kind, name, size, _), of_steps in zip(changes, medians, strict=True):
+            fall = crossing(size * np.array(STEPS), of_steps / threshold)
+            found[kind][name] = fall if fall < 1 or not (is_relative or kind == "groups") else np.nan
+        return SmallestChanges(found["common"].get("", np.nan), found["single"], is_relative, within, found["groups"])
 
-    def follow(
-        self, state: EventState, index: Array, times: NDArray[np.int64]
-    ) -> tuple[NDArray[np.bool_], Array, EventState]:
-        """Whether an event is open after each record, in order of time (nanoseconds), levels, and the last state."""
-        after, level, recent = np.full(len(index), state.is_open), *levels(index, self.persistence, state.recent)
-        places = np.flatnonzero(~np.isnan(index))
-        if not len(places):
-            return after, level, state
-        values, at, order = level[places], times[places], np.arange(len(places))
-        quiet = values <= self.release
-        begins = quiet & ~np.append(state.quiet_since is not None, quiet[:-1])
-        last_begin = np.maximum.accumulate(np.where(begins, order, -1))
-        since = np.where(last_begin >= 0, at[last_begin], 0 if state.quiet_since is None else state.quiet_since)
-        closes = quiet & (at - since >= self.hold.value)
-        opens = values > self.threshold
-        last_change = np.maximum.accumulate(np.where(opens | closes, order, -1))
-        is_open = np.where(last_change >= 0, opens[last_change], state.is_open)
-        last_evaluated = np.searchsorted(places, np.arange(len(index)), side="right") - 1
-        after = np.where(last_evaluated >= 0, is_open[last_evaluated], state.is_open)
-        return after, level, EventState(bool(is_open[-1]), int(since[-1]) if quiet[-1] else None, recent)
-
-
-def levels(index: Array, persistence: int, recent: tuple[float, ...] = ()) -> tuple[Array, tuple[float, ...]]:
-    """The median index of the last evaluated records at each of them, and the indices that the next ones need."""
-    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), 2 * (persistence - 1)
-    values = np.append([*np.zeros(n), *recent][len(recent) :], index[known])
-    if known.any():
-        level[known] = np.median(sliding_window_view(values, n + 1), axis=1)
-    return level, tuple(values[len(values) - n :].tolist())
+    return at
 
 
-def find_events(index: Array, times: pd.DatetimeIndex, rule: EventRule) -> pd.DataFrame:
-    """Events in a series of damage indices: ``start``, ``end`` (NaT while open), ``peak`` (level), ``peak_time``."""
-    is_open, values, _ = rule.follow(EventState(), np.asarray(index, dtype=float), times.as_unit("ns").asi8)
-    change = np.diff(is_open.astype(np.int8), prepend=0)
-    starts, stops = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
-    bounds = np.append(stops, len(values))[: len(starts)]
-    peaks = np.array(
-        [start + np.nanargmax(values[start:stop]) for start, stop in zip(starts, bounds, strict=True)], int
-    )
-    ends = times[stops].append(pd.DatetimeIndex([pd.NaT] * (len(starts) - len(stops))).tz_localize(times.tz))
-    table = {"start": times[starts], "end": ends, "peak": values[peaks], "peak_time": times[peaks]}
-    return pd.DataFrame(table, index=pd.RangeIndex(1, len(starts) + 1, name="event"))
+def _medians(indices: Array) -> Array:
+    """Median over the records that have an index at each step."""
+    known = indices[:, ~np.isnan(indices).any(axis=0)]
+    return np.median(known, axis=1) if known.size else np.full(len(indices), np.nan)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from skthermo._tables.arrays import Array
 from skthermo._tables.frames import correlation_time
 from skthermo._tables.text import probability_text
 from skthermo.detection import TemperatureCompensator
-from skthermo.monitoring._smallest import WEEK, blocks_of
+from skthermo.monitoring._threshold import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian
 
 CHANCE = 0.01  # probability under an unchanged structure below which a change counts as real

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
@@ -21,12 +23,15 @@ from skthermo.monitoring._events import (
     WATCH,
     Acknowledgement,
     EventLog,
+    EventRule,
+    Shown,
+    Transition,
+    event_changes,
     event_table,
     leading,
 )
-from skthermo.monitoring._false_alarms import EventRule, FalseAlarmEstimate
 from skthermo.monitoring._records import Intake, RecordStore
-from skthermo.monitoring._transitions import Transition, event_changes
+from skthermo.monitoring._threshold import FalseAlarmEstimate
 
 ANSWER = ("state", "index", "threshold", "modes", "groups", "reason", "event")
 
@@ -41,7 +46,7 @@ class Checkpoint(SavesFrames):
 
 
 @dataclass(frozen=True)
-class MonitorState(SavesFrames):
+class History(SavesFrames):
     """Records, evaluations by record and by day, checkpoints of the last days, and what the owner has said of events.
 
     ``corrected`` are the records as the detector sees them, those kept and the memory before the first checkpoint. It
@@ -60,10 +65,10 @@ class MonitorState(SavesFrames):
     n_late: int = 0
     n_too_late: int = 0
     transitions: tuple[Transition, ...] = ()
-    before: MonitorState | None = None  # the latest jump of the stamps
+    before: History | None = None  # the latest jump of the stamps
 
     @classmethod
-    def of(cls, active: ActiveDetector, store: RecordStore) -> MonitorState:
+    def of(cls, active: ActiveDetector, store: RecordStore) -> History:
         """The state after the baseline, whose last records are the first memory."""
         times, end = store.baseline.index.asi8, store.last
         start = active.memory.start(times, len(times), int(times[-1]) + 1)
@@ -85,14 +90,27 @@ class MonitorState(SavesFrames):
     @property
     def acknowledged(self) -> list[int]:
         """Times (nanoseconds) at which what was set aside was said to be the fault of a sensor."""
-        by_peak = {one.peak_time: one for one in self.acknowledgements if one.kind == MEASUREMENT}
-        return [one.time for one in by_peak.values() if one.harmless]
+        by_peak = {}
+        for one in self.acknowledgements:
+            if one.kind == MEASUREMENT:
+                by_peak[one.peak_time] = one.time if one.harmless else None
+        return list(filter(None, by_peak.values()))
 
     @property
     def has_set_aside(self) -> bool:
         """Whether an event of responses set aside is open that nobody has acknowledged as harmless."""
         opened = [one.start for one in self.log.events if one.kind == MEASUREMENT and one.end is None]
         return any(all(time < start for time in self.acknowledged) for start in opened)
+
+    @property
+    def state(self) -> str:
+        """How the structure is by the newest record, as `MonitorStatus` has it."""
+        if self.log.is_open(DAMAGE) or self.has_set_aside:
+            return "alarm"
+        if self.log.is_open(WATCH):
+            return "watch"
+        newest = self.evaluations["state"].iloc[-1] if len(self.evaluations) else "not evaluated"
+        return "not evaluated" if newest == "alarm" else newest  # what was set aside has been acknowledged
 
     @property
     def counts(self) -> dict[str, int]:
@@ -110,7 +128,7 @@ class MonitorState(SavesFrames):
             "n_left_out": n_left_out,
         }
 
-    def taken_in(self, active: ActiveDetector, intake: Intake) -> tuple[MonitorState, pd.DataFrame]:
+    def taken_in(self, active: ActiveDetector, intake: Intake) -> tuple[History, pd.DataFrame]:
         """The state after a batch, and what it says of its records and of others that are evaluated anew."""
         state = replace(
             self,
@@ -130,21 +148,23 @@ class MonitorState(SavesFrames):
             answers = pd.concat([answers, refused.assign(revised=False)]).sort_index(kind="stable")
         return replace(state, store=intake.store.trimmed()).changed_from(self, active), answers
 
-    def changed_from(self, before: MonitorState, active: ActiveDetector, *others: Transition) -> MonitorState:
+    def changed_from(self, before: History, active: ActiveDetector, *others: Transition) -> History:
         """This state with what has changed since another one, in order of time, and other changes first."""
         newest = self.store.last.as_unit("ns").value
         found = [*event_changes(before.log.events, self.log.events, newest)]
-        found += active.corrections.fault_changes(before.corrections, self.corrections, newest)
-        found.sort(key=lambda one: one.time)
+        watch = active.corrections.sensors
+        if watch is not None:
+            found += watch.changes(before.corrections.sensors, self.corrections.sensors, newest)
+        found.sort(key=attrgetter("time"))
         return replace(self, transitions=(*before.transitions, *others, *found))
 
-    def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[MonitorState, pd.DataFrame]:
+    def advanced(self, active: ActiveDetector, fresh: pd.DatetimeIndex) -> tuple[History, pd.DataFrame]:
         """The state after new records, which are in the store already, and what it says of these and of later ones.
 
         It goes on from the beginning of the day of the first new record, and evaluates all records from that one on.
         """
         first, rules, store = fresh[0], active.rules, self.store
-        place = max(n for n, one in enumerate(self.checkpoints) if n == 0 or one.day <= first)
+        place = _last_before(self.checkpoints, first)
         begin = self.checkpoints[place]
         raw = store.kept.iloc[store.kept.index.searchsorted(begin.day) :]
         states, seen = self._corrected_by_day(active.corrections, begin, raw)
@@ -156,15 +176,16 @@ class MonitorState(SavesFrames):
         index, is_contested = _by_rivals(index, seen, active, records, n_memory)
         outside = active.extrapolated(records.iloc[n_memory:])
         is_blind = active.is_blind(records, n_memory, outside) & ~seen.is_held
-        is_doubtful = seen.is_held | is_contested
-        series = dict.fromkeys(active.estimates, _not_closing(index, is_doubtful, active))
-        times = raw.index.asi8
-        after = (rules[kind].follow(begin.log.state(kind), one, times)[0] for kind, one in series.items())
-        rows = np.flatnonzero(np.any(list(after), axis=0) & ~np.isnan(index))
-        modes, effects = _drivers(active, records, n_memory, rows)
-        series |= {MEASUREMENT: seen.n_held}
-        drivers = dict.fromkeys(series, (modes, effects)) | {MEASUREMENT: (seen.held, [{}] * len(raw))}
-        log, numbers, points = _followed(rules, begin.log, states, series, drivers, raw.index)
+        is_doubtful, times = seen.is_held | is_contested, raw.index.asi8
+        # where a response was set aside the others cannot close an event, nor can records that thermometers leave open
+        level = np.where(is_doubtful, np.maximum(index, np.nextafter(rules[DAMAGE].release, np.inf)), index)
+        is_open = np.zeros(len(raw), dtype=bool)
+        for kind in active.estimates:
+            is_open |= rules[kind].follow(begin.log.state(kind), level, times)[0]
+        modes, effects = active.explained(records, n_memory, np.flatnonzero(is_open & ~np.isnan(index)))
+        series: dict[str, Shown] = dict.fromkeys(active.estimates, (level, modes, effects))
+        series[MEASUREMENT] = seen.n_held, seen.held, [{}] * len(raw)
+        log, numbers, points = _followed(rules, begin.log, states, series, raw.index)
         reasons = active.reasons(records, new, index[len(known) :], seen.notes[len(known) :], outside[len(known) :])
         reasons = known["reason"].tolist() + reasons
         before = self.evaluations.iloc[: self.evaluations.index.searchsorted(begin.day)]
@@ -175,21 +196,23 @@ class MonitorState(SavesFrames):
             "thermometers contradict each other, and without one of them it would be in alarm": is_contested,
             f"even a fall of all responses by {100 * active.fall_to_detect:.2g} % would stay undetected": is_blind,
         }
-        for row in range(len(known), len(raw)):
-            reasons[row] = "; ".join(filter(None, [reasons[row], *(text for text, at in remarks.items() if at[row])]))
+        for text, rows in remarks.items():
+            for row in np.flatnonzero(rows[len(known) :]) + len(known):
+                reasons[row] = f"{reasons[row]}; {text}" if reasons[row] else text
         is_held = is_doubtful | is_blind | pending | self._unexplained(log, numbers[MEASUREMENT], times)
         shown = np.where((modes == "") & seen.is_held, seen.held, modes)
-        answers = _answers(raw.index, index, active.threshold, (shown, effects), reasons, numbers, is_held)
+        answers = _answers(raw.index, index, active.threshold, shown, effects, reasons, numbers, is_held)
+        points = [*self.checkpoints[:place], *points]
         state = replace(
             self,
-            checkpoints=tuple(_since([*self.checkpoints[:place], *points], store.last - store.max_delay)),
+            checkpoints=tuple(points[_last_before(points, store.last - store.max_delay) :]),
             log=log,
             evaluations=pd.concat([before, answers]),
             days=self._with_days(active.corrections, states, _days_of(answers, seen.n_left_out)),
         )
         return state._remembering(active, records), self._news(answers.iloc[len(known) :], fresh)
 
-    def _remembering(self, active: ActiveDetector, records: pd.DataFrame) -> MonitorState:
+    def _remembering(self, active: ActiveDetector, records: pd.DataFrame) -> History:
         """The state with those of some corrected records that are kept, or that records to come need."""
         first, since = self.checkpoints[0].day, self.store.last - self.store.retention
         needed = active.memory.start(records.index.asi8, records.index.searchsorted(first), first.value)
@@ -201,7 +224,7 @@ class MonitorState(SavesFrames):
 
     def without(
         self, active: ActiveDetector, start: pd.Timestamp, end: pd.Timestamp | None = None
-    ) -> tuple[MonitorState, int]:
+    ) -> tuple[History, int]:
         """The state as if records from one stamp to another had never come, and the number of these.
 
         It is an error if how things stood before them is not known.
@@ -230,7 +253,7 @@ class MonitorState(SavesFrames):
 
     def _as_before(
         self, active: ActiveDetector, store: RecordStore, start: pd.Timestamp
-    ) -> tuple[MonitorState, pd.DatetimeIndex]:
+    ) -> tuple[History, pd.DatetimeIndex]:
         """A state that is not later than a stamp, with a store, and the stamps of records that follow it."""
         kept = store.kept.index
         places = [n for n, one in enumerate(self.checkpoints) if one.day <= start]
@@ -247,13 +270,13 @@ class MonitorState(SavesFrames):
             return replace(self.before, store=replace(store, kept=together)), new.index
         if len(self.days) and self.days.index[0] >= midnight(self.store.kept.index[0]):
             nothing = replace(store, kept=store.kept.iloc[:0])
-            return replace(MonitorState.of(active, nothing), store=store), kept
+            return replace(History.of(active, nothing), store=store), kept
         raise ValueError(
             f"records from {start} on cannot be discarded: how things stood then is known from "
             f"{self.checkpoints[0].day} on; expected a later start, or a monitor that was saved before"
         )
 
-    def handed_over(self, active: ActiveDetector, end: int | None = None) -> MonitorState:
+    def handed_over(self, active: ActiveDetector, end: int | None = None) -> History:
         """The state with another detector, which evaluates the records of the newest day anew.
 
         With an ``end``, events that are open have ended then, and sensors are watched from new.
@@ -286,9 +309,12 @@ class MonitorState(SavesFrames):
 
     def _unexplained(self, log: EventLog, numbers: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Records in an event of responses set aside that nobody had acknowledged as harmless before them."""
-        starts = np.array([0, *(event.start for event in log.events)])[numbers]
-        said = [(starts <= time) & (time < times) for time in self.acknowledged]
-        return (numbers > 0) & ~np.any(said, axis=0) if said else numbers > 0
+        unexplained = numbers > 0
+        if len(self.acknowledged):
+            starts = np.array([0, *(event.start for event in log.events)])[numbers]
+            for time in self.acknowledged:
+                unexplained &= ~((starts <= time) & (time < times))
+        return unexplained
 
     def _news(self, answers: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
         is_new = answers.index.isin(fresh)
@@ -318,19 +344,17 @@ def _followed(
     rules: dict[str, EventRule],
     log: EventLog,
     states: dict[pd.Timestamp, CorrectionState],
-    series: dict[str, Array],
-    drivers: dict[str, tuple[Sequence[str], Sequence[dict[str, float]]]],
+    series: dict[str, Shown],
     stamps: pd.DatetimeIndex,
 ) -> tuple[EventLog, dict[str, NDArray[np.int64]], list[Checkpoint]]:
     """The log after some days, numbers of the events at their records by kind, and checkpoints before each day."""
     bounds = [*stamps.searchsorted(pd.DatetimeIndex(list(states))), len(stamps)]
-    numbers, points = {kind: np.zeros(len(stamps), dtype=np.int64) for kind in series}, []
+    numbers, points = dict(zip(series, np.zeros((len(series), len(stamps)), dtype=np.int64), strict=True)), []
     for (day, state), (start, stop) in zip(states.items(), pairwise(bounds), strict=True):
         points.append(Checkpoint(day, state, log))
         own = slice(start, stop)
-        levels = {kind: one[own] for kind, one in series.items()}
-        of_day = {kind: (modes[own], effects[own]) for kind, (modes, effects) in drivers.items()}
-        found, log = log.follow(rules, levels, of_day, stamps.asi8[own])
+        of_day = {kind: (level[own], modes[own], effects[own]) for kind, (level, modes, effects) in series.items()}
+        found, log = log.follow(rules, of_day, stamps.asi8[own])
         for kind, number in found.items():
             numbers[kind][own] = number
     return log, numbers, points
@@ -344,7 +368,7 @@ def _by_rivals(
     Each of these is left out in turn: the lowest index counts, and a record is open unless the highest is low, too.
     """
     index, is_contested = index.copy(), np.zeros(len(index), dtype=bool)
-    for dispute in {one for one in seen.disputes if one is not None}:
+    for dispute in set(seen.disputes) - {None}:
         rows = np.array([one == dispute for one in seen.disputes])
         since = pd.Timestamp(dispute.since, tz="UTC").tz_convert(records.index.tz)
         each = []
@@ -354,15 +378,6 @@ def _by_rivals(
             each.append(active.index(without, first)[rows])
         index[rows], is_contested[rows] = np.fmin.reduce(each), ~(np.maximum.reduce(each) <= active.threshold)
     return index, is_contested & ~np.isnan(index)
-
-
-def _not_closing(index: Array, is_doubtful: NDArray[np.bool_], active: ActiveDetector) -> Array:
-    """Indices by which events open and close: where a response was set aside, the others cannot close one.
-
-    Nor can records that thermometers leave open.
-    """
-    above = np.nextafter(active.rules[DAMAGE].release, np.inf)
-    return np.where(is_doubtful, np.maximum(index, above), index)
 
 
 def _pending(is_above: NDArray[np.bool_], is_unknown: NDArray[np.bool_], before: Sequence[str]) -> NDArray[np.bool_]:
@@ -376,35 +391,24 @@ def _pending(is_above: NDArray[np.bool_], is_unknown: NDArray[np.bool_], before:
     return pending
 
 
-def _since(points: Sequence[Checkpoint], horizon: pd.Timestamp) -> Sequence[Checkpoint]:
-    """The checkpoints from the last one before a time on."""
-    return points[max(n for n, one in enumerate(points) if n == 0 or one.day <= horizon) :]
+def _last_before(points: Sequence[Checkpoint], time: pd.Timestamp) -> int:
+    """Position of the last checkpoint that is not after a time, or of the first one."""
+    return max(bisect_right(points, time, key=attrgetter("day")) - 1, 0)
 
 
 def not_evaluated(stamps: pd.DatetimeIndex, threshold: float = np.nan, reasons: Sequence[str] = ()) -> pd.DataFrame:
     """A row for each of some records that are not evaluated."""
     nothing, number = np.full(len(stamps), np.nan), np.zeros(len(stamps), dtype=np.int64)
-    drivers, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
-    return _answers(stamps, nothing, threshold, drivers, list(reasons), {DAMAGE: number}, is_held)
-
-
-def _drivers(
-    active: ActiveDetector, records: pd.DataFrame, n_memory: int, rows: NDArray[np.intp]
-) -> tuple[NDArray[np.object_], list[dict[str, float]]]:
-    """Modes that drive the index of some records after the memory, and effects of damage groups; none of the others."""
-    n_records = len(records) - n_memory
-    modes, effects = np.full(n_records, "", dtype=object), [{} for _ in range(n_records)]
-    modes[rows] = active.drivers(records, rows + n_memory)
-    for row, one in zip(rows, active.groups(records, rows + n_memory), strict=True):
-        effects[row] = one
-    return modes, effects
+    shown, is_held = ([""] * len(stamps), [{}] * len(stamps)), np.zeros(len(stamps), dtype=bool)
+    return _answers(stamps, nothing, threshold, *shown, list(reasons), {DAMAGE: number}, is_held)
 
 
 def _answers(
     stamps: pd.DatetimeIndex,
     index: Array,
     threshold: float,
-    drivers: tuple[Sequence[str], Sequence[dict[str, float]]],
+    modes: Sequence[str],
+    effects: Sequence[dict[str, float]],
     reasons: list[str],
     numbers: dict[str, NDArray[np.int64]],
     is_held: NDArray[np.bool_],
@@ -415,15 +419,17 @@ def _answers(
     is_watch = has_index & ~is_alarm & (numbers.get(WATCH, np.zeros(len(index))) > 0)
     for kind in (MEASUREMENT, WATCH):
         number = np.where(number > 0, number, numbers.get(kind, 0))
-    groups, is_shown = [", ".join(leading(sizes)) for sizes in drivers[1]], is_alarm | is_watch
+    is_shown, groups = is_alarm | is_watch, [""] * len(index)
+    for row in np.flatnonzero(is_shown):
+        groups[row] = ", ".join(leading(effects[row]))
     quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")
     state = np.where(is_alarm, "alarm", np.where(is_watch, "watch", quiet))
     table = {
         "state": pd.Series(state.tolist(), stamps, dtype=object),
         "index": index,
         "threshold": np.full(len(index), threshold),
-        "modes": pd.Series(np.where(is_shown, drivers[0], "").tolist(), stamps, dtype=object),
-        "groups": pd.Series(np.where(is_shown, groups, "").tolist(), stamps, dtype=object),
+        "modes": pd.Series(np.where(is_shown, modes, "").tolist(), stamps, dtype=object),
+        "groups": pd.Series(groups, stamps, dtype=object),
         "reason": pd.Series(reasons, stamps, dtype=object),
         "event": np.where(has_index | is_held, number, 0),
     }
@@ -438,18 +444,14 @@ def _days_of(answers: pd.DataFrame, n_left_out: NDArray[np.int64]) -> pd.DataFra
     """
     days = midnights(answers.index).rename("day")
     begins = np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[:1] - 1))
-    state, index = (answers[name].to_numpy() for name in ("state", "index"))
-    known = [one[~np.isnan(one)] for one in np.split(index, begins[1:])] if len(begins) else []
-
-    def total(values: Array | NDArray[np.int64]) -> NDArray[np.int64]:
-        return np.add.reduceat(values.astype(np.int64), begins) if len(begins) else np.zeros(0, dtype=np.int64)
-
-    table = {
-        "n_records": total(np.ones(len(state))),
-        "n_evaluated": total(state != "not evaluated"),
-        "n_alarms": total(state == "alarm"),
-        "n_left_out": total(n_left_out),
-        "index_median": np.array([np.median(one) if len(one) else np.nan for one in known], dtype=float),
-        "index_max": np.array([one.max() if len(one) else np.nan for one in known], dtype=float),
-    }
-    return pd.DataFrame(table, days[begins])
+    state, index = answers["state"].to_numpy(), answers["index"].to_numpy()
+    counted = np.column_stack([np.ones(len(state)), state != "not evaluated", state == "alarm", n_left_out])
+    totals, levels = np.zeros((len(begins), 4), dtype=np.int64), np.full((len(begins), 2), np.nan)
+    if len(begins):
+        totals = np.add.reduceat(counted.astype(np.int64), begins)
+        for day, own in enumerate(np.split(index, begins[1:])):
+            known = own[~np.isnan(own)]
+            if len(known):
+                levels[day] = np.median(known), known.max()
+    table = pd.DataFrame(totals, days[begins], ["n_records", "n_evaluated", "n_alarms", "n_left_out"])
+    return table.assign(index_median=levels[:, 0], index_max=levels[:, 1])
