@@ -41,6 +41,7 @@ from skthermo._validation import (
 )
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, evaluate
+from skthermo.fem.affine import ResponseSurface, n_terms
 from skthermo.surrogate._regression import FrequencyInverse
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.inverse._steps import (
@@ -54,7 +55,6 @@ from skthermo.surrogate.inverse._steps import (
     refine,
 )
 from skthermo.surrogate.inverse._steps import deviations as deviations_of
-from skthermo.surrogate.inverse._surface import ResponseSurface, n_terms
 
 N_TEACHING = 300  # records, spread evenly, that teach prior and noise
 FEWEST_TEACHING = 10  # below which a warning is given

@@ -1,4 +1,4 @@
-"""Frequencies and mode shapes as they are measured, and steps on an FE model to the posterior mode of its parameters."""
+"""What is measured of modes, and steps from it on an FE model to the posterior mode of the parameters."""
 
 from __future__ import annotations
 
