@@ -207,8 +207,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/inverse/_posterior.py", "surrogate/test_posterior_inverse.py"): [
         ("rows that stall", "np.where(lost, np.nan, np.exp(local.x))", "np.exp(local.x)"),
         ("weight of rows with gaps", "((at_best / std) ** 2)", "(at_best / std)"),
-    ],
-    ("surrogate/inverse/_prior.py", "surrogate/test_posterior_inverse.py"): [
         ("the common factor", "return self.common**2 + np.diag(self.own**2)", "return np.diag(self.own**2)"),
     ],
     ("surrogate/inverse/_posterior.py", "surrogate/test_reduced_posterior.py"): [

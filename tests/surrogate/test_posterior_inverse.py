@@ -12,7 +12,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.fem import AffineModel, CallableModel, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
-from skthermo.surrogate.inverse._prior import LinearRecords, ThermalPrior
+from skthermo.surrogate.inverse._posterior import LinearRecords, ThermalPrior
 from tests.fem.frames import FRAME, portal
 from tests.surrogate.chains import TRUSS, F, T
 

@@ -1,16 +1,17 @@
-"""Polynomials for the frequencies of one structure near the parameters that its weather gives."""
+"""Polynomials for frequencies: of one structure in all its weather, and of a model near the parameters of records."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations, combinations_with_replacement
 from math import comb
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo._estimators.threads import single_blas_thread
 from skthermo._tables.arrays import Array, Bounds, check_theta, spread_evenly
 
 FIRST_DEGREE = 3
@@ -24,6 +25,11 @@ MOST_ROWS = 1000  # rows, spread evenly, that the box is made of
 CLOSE = 0.01  # relative distance of two modes in which the order of their columns is not known
 PAIRED = 0.05  # relative distance below which two modes are fitted together
 SAFETY = 0.5  # share of the smallest estimate at a check point of too large an error
+
+MOST_TERMS_OF_RECORDS, MOST_DEGREE_OF_RECORDS = 150, 3  # of a polynomial through solutions with derivatives
+KEPT = 0.01  # weight by which coefficients stay small that solutions hardly determine
+LEAST_SCALE = 0.01  # of ln theta
+ROWS_PER_CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +124,79 @@ class SmoothCoordinates:
             values[:, j] = values[:, i] + signs[:, number] * half
             values[:, i] -= signs[:, number] * half
         return np.exp(values), errors.max(axis=1)
+
+
+@dataclass(frozen=True)
+class ResponseSurface:
+    """ln f as a polynomial of z = (ln theta - middle) / scale; coefficients (n_terms, n_modes)."""
+
+    degree: int
+    middle: Array
+    scale: Array
+    coefficients: Array
+
+    @classmethod
+    def of(cls, x: Array, frequencies: Array, sensitivity: Array | None = None) -> ResponseSurface:
+        """The surface through frequencies at rows of ln theta = x and, where they are known, d ln f / d ln theta."""
+        solved = np.isfinite(frequencies).all(axis=1)
+        x, log_f, n_parameters = x[solved], np.log(frequencies[solved]), x.shape[1]
+        most = MOST_TERMS_OF_RECORDS if sensitivity is not None else len(x) // 2
+        degree = 1
+        while degree < MOST_DEGREE_OF_RECORDS and n_terms(n_parameters, degree + 1) <= most:
+            degree += 1
+        middle, scale = x.mean(axis=0), np.maximum(x.std(axis=0), LEAST_SCALE)
+        z = (x - middle) / scale
+        equations, results = [terms(z, degree)], [log_f]
+        if sensitivity is not None:
+            small = KEPT * np.sqrt(len(x)) * np.eye(n_terms(n_parameters, degree))[1 + n_parameters :]
+            equations += [slopes_of_terms(z, degree).reshape(-1, small.shape[1]), small]
+            results.append((sensitivity[solved] * scale).swapaxes(1, 2).reshape(-1, log_f.shape[1]))
+            results.append(np.zeros((len(small), log_f.shape[1])))
+        with single_blas_thread():  # the same bits on any number of threads
+            coefficients = np.linalg.lstsq(np.vstack(equations), np.vstack(results), rcond=None)[0]
+        return cls(degree, middle, scale, coefficients)
+
+    def linearise(self, theta: Array) -> tuple[Array, Array]:
+        """Frequencies and d ln f / d ln theta."""
+        z = (np.log(theta) - self.middle) / self.scale
+        log_f = np.empty((len(z), self.coefficients.shape[1]))
+        slopes = np.empty((*log_f.shape, z.shape[1]))
+        for first in range(0, len(z), ROWS_PER_CHUNK):
+            rows = slice(first, first + ROWS_PER_CHUNK)
+            log_f[rows] = terms(z[rows], self.degree) @ self.coefficients
+            slopes[rows] = (slopes_of_terms(z[rows], self.degree) @ self.coefficients).swapaxes(1, 2)
+        return np.exp(log_f), slopes / self.scale
+
+
+def n_terms(n_variables: int, degree: int) -> int:
+    """Number of products of up to so many variables, 1 included."""
+    return comb(n_variables + degree, degree)
+
+
+def products(n_variables: int, degree: int) -> list[list[tuple[int, ...]]]:
+    """Which variables are multiplied in each product of one, of two, ... variables."""
+    variables = range(n_variables)
+    return [[*combinations_with_replacement(variables, n_factors)] for n_factors in range(1, degree + 1)]
+
+
+def terms(z: Array, degree: int) -> Array:
+    """1 and every product of up to so many variables, (n_samples, n_terms)."""
+    values, variables = np.ones((n_terms(z.shape[1], degree), len(z))), np.ascontiguousarray(z.T)
+    for value, chosen in zip(values[1:], chain(*products(z.shape[1], degree)), strict=True):
+        for variable in chosen:
+            np.multiply(value, variables[variable], out=value)
+    return values.T
+
+
+def slopes_of_terms(z: Array, degree: int) -> Array:
+    """Derivatives of the terms by each variable, (n_samples, n_variables, n_terms)."""
+    slopes = [np.zeros((*z.shape, 1))]
+    for chosen in map(np.array, products(z.shape[1], degree)):
+        slope, column = np.zeros((*z.shape, len(chosen))), np.arange(len(chosen))
+        for factor in range(chosen.shape[1]):
+            slope[:, chosen[:, factor], column] += z[:, np.delete(chosen, factor, axis=1)].prod(axis=2)
+        slopes.append(slope)
+    return np.concatenate(slopes, axis=2)
 
 
 class FrequencySurface:
@@ -216,8 +295,8 @@ class FrequencySurface:
             Of polynomials with at most 500 terms.
         """
         degree = FIRST_DEGREE - 1
-        while (terms := n_terms(n_parameters, degree + 1)) <= MOST_TERMS:
-            if POINTS_PER_TERM * terms + CHECK_POINTS > n_solves:
+        while (number := n_terms(n_parameters, degree + 1)) <= MOST_TERMS:
+            if POINTS_PER_TERM * number + CHECK_POINTS > n_solves:
                 break
             degree += 1
         return degree
@@ -267,10 +346,7 @@ class FrequencySurface:
         self.n_solves_ = len(points) + len(checks)
 
     def _fit(self, points: Array, values: Array, degree: int) -> None:
-        from sklearn.preprocessing import PolynomialFeatures  # importing fem does not load scikit-learn
-
-        self.degree_, self._features = degree, PolynomialFeatures(degree)
-        features = self._features.fit_transform(self._box.places(points))
+        self.degree_, features = degree, terms(self._box.places(points), degree)
         n_lower = n_terms(points.shape[1], degree - 1)
         smooth, halves = self._coordinates.of(values)
         whole, lower = (np.linalg.lstsq(part, smooth, rcond=None)[0] for part in (features, features[:, :n_lower]))
@@ -302,7 +378,7 @@ class FrequencySurface:
         is_inside = self._box.holds(theta[known], places)
         inside = known[is_inside]
         if len(inside):
-            polynomials = self._features.transform(places[is_inside]) @ self._coefficients
+            polynomials = terms(places[is_inside], self.degree_) @ self._coefficients
             smooth, differences, halves = np.split(polynomials, [n_modes, 2 * n_modes], axis=1)
             frequencies[inside], errors = self._coordinates.frequencies(smooth, np.abs(differences), np.sign(halves))
             is_apart = smallest_gap(frequencies[inside]) > CLOSE
@@ -314,11 +390,6 @@ class FrequencySurface:
         found = self._coordinates.of(frequencies)[1]
         agreed: NDArray[np.bool_] = np.abs(halves - found) < np.abs(found) / 2
         return np.asarray(agreed.all(axis=1))
-
-
-def n_terms(n_parameters: int, degree: int) -> int:
-    """Number of monomials up to a degree."""
-    return comb(n_parameters + degree, degree)
 
 
 def smallest_gap(frequencies: Array) -> Array:

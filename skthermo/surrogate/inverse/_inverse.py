@@ -28,9 +28,8 @@ from skthermo._validation import (
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2
-from skthermo.surrogate._regression import MultiplierRegressor, default_network
+from skthermo.surrogate._regression import FrequencyInverse, MultiplierRegressor, default_network
 from skthermo.surrogate._simulator import Box
-from skthermo.surrogate.inverse._base import FrequencyInverse
 
 N_HELD_OUT = 500  # simulations that a score is of
 HELD_OUT_SEED = 20_260_000  # of them: the same for all settings that are compared
