@@ -37,7 +37,7 @@ from skthermo.fem.modal import LocalModes
 
 Key = tuple[str, ...]
 
-DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)
+DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably a percentage given instead of a fraction
 DENSE_SHARE = 0.3  # share of nonzero entries above which a matrix counts as dense
 
