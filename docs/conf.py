@@ -24,7 +24,7 @@ extensions = [
     "gallery_order",
 ]
 default_role = "py:obj"
-exclude_patterns = ["_build", "gallery/**/*.ipynb"]
+exclude_patterns = ["_build", "gallery/**/*.ipynb", "measured"]
 templates_path = ["_templates"]
 
 autosummary_generate = True

@@ -1,4 +1,4 @@
-"""A bridge of known truth: what folds, a dead thermometer and batches of a day do to alarms, year after year.
+"""A bridge of known truth: what folds and a dead thermometer do to alarms, year after year.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/compensator_year.py
     OMP_NUM_THREADS=1 python tests/benchmarks/compensator_year.py --only folds sensor --seeds 1
@@ -8,32 +8,22 @@ supports with one of days, and frost stiffens them. The detector learns the firs
 and evaluates the second: healthy, and with two kinds of damage. The exit code is 1 if a target is missed.
 """
 
-import argparse
 import sys
-import warnings
 
 import numpy as np
 import pandas as pd
-from sklearn.ensemble import HistGradientBoostingRegressor
-from sklearn.linear_model import LinearRegression
-from sklearn.multioutput import MultiOutputRegressor
-from sklearn.pipeline import make_pipeline
+from harness import arguments, shown
+from structures import lagged
 
 from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import add_noise
-from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import TemperatureMapper
 
 HOURS, PER_DAY = 2, 12
 NOISE = 0.0006
 DAMAGES = {"healthy": {}, "bottom 1 %": {"bottom": 0.01}, "diagonal 1.5 %": {"diagonal": 0.015}}
 ASKED, MOST_FALSE = 2.0, 3.0
-REGRESSORS = {
-    "piecewise-linear": lambda: TemperatureMapper(),
-    "linear": lambda: LinearRegression(),
-    "boosting": lambda: MultiOutputRegressor(HistGradientBoostingRegressor(random_state=0)),
-}
 
 
 def smoothed(series, hours):
@@ -73,20 +63,14 @@ def campaign(seed):
     return states["healthy"][:half], {name: records[half:] for name, records in states.items()}, names
 
 
-def compensator(names, regressor="piecewise-linear", **options):
-    lags = LagFeatures([0, 3, 12], freq="2h")
-    return TemperatureCompensator(make_pipeline(lags, REGRESSORS[regressor]()), targets=names, **options)
-
-
-def by_day(residuals):
-    """Means of days."""
-    return residuals.resample("1D").mean()
+def compensator(names, **options):
+    return TemperatureCompensator(lagged(TemperatureMapper()), targets=names, **options)
 
 
 def alarm_rates(residuals, evaluated):
     """Alarms in percent, by record and by a day's mean."""
     rates = {}
-    for kind, transform in (("record", lambda frame: frame), ("day", by_day)):
+    for kind, transform in (("record", lambda frame: frame), ("day", lambda frame: frame.resample("1D").mean())):
         detector = MahalanobisDetector(ASKED / 100).fit(transform(residuals))
         for name, found in evaluated.items():
             index = detector.damage_index(transform(found))
@@ -94,89 +78,41 @@ def alarm_rates(residuals, evaluated):
     return rates
 
 
-def mean_table(rows, title):
-    """Print the mean of alarm rates over seeds, and give it back."""
-    table = pd.DataFrame({key: pd.DataFrame(found).mean() for key, found in rows.items()}).T
-    print(f"{title}, %, {ASKED:g} asked\n\n{table.round(1).to_string()}\n")
-    return table
-
-
-def folds(seeds, regressors):
-    """Contiguous folds beside the default, plain and whitened."""
+def compared(seeds, title, ways, judged):
+    """Alarms in year 2 by each way to learn, and whether the last of them has too many."""
     rows = {}
     for seed in seeds:
         baseline, states, names = campaign(seed)
-        for regressor in regressors:
-            for cv in ("contiguous", None):
-                for whiten in (None, "local"):
-                    learner = compensator(names, regressor, cv=cv, whiten=whiten)
-                    residuals = learner.fit_transform(baseline)
-                    evaluated = {name: learner.transform(records) for name, records in states.items()}
-                    key = regressor, whiten or "plain", f"{cv or 'default'}"
-                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, evaluated)))
-    found = mean_table(rows, "Alarms in year 2").xs("default", level=2)
-    return int((found["record", "healthy"] > MOST_FALSE).sum())
-
-
-def sensor(seeds, regressors):
-    """The girder's thermometer dies after the baseline."""
-    rows = {}
-    for seed in seeds:
-        baseline, states, names = campaign(seed)
-        for regressor in regressors:
-            for whiten in (None, "local"):
-                learner = compensator(names, regressor, whiten=whiten)
+        for whiten in (None, "local"):
+            for way, (options, seen) in ways.items():
+                learner = compensator(names, whiten=whiten, **options)
                 residuals = learner.fit_transform(baseline)
-                for what in ("alive", "dead"):
-                    evaluated = {
-                        name: learner.transform(records.assign(girder=np.nan) if what == "dead" else records)
-                        for name, records in states.items()
-                    }
-                    key = regressor, whiten or "plain", what
-                    rows.setdefault(key, []).append(pd.Series(alarm_rates(residuals, evaluated)))
-    found = mean_table(rows, "Alarms in year 2 by the girder's thermometer").xs("dead", level=2)
-    return int((found["record", "healthy"] > MOST_FALSE).sum())
+                evaluated = {name: learner.transform(seen(records)) for name, records in states.items()}
+                rows.setdefault((whiten or "plain", way), []).append(alarm_rates(residuals, evaluated))
+    table = pd.DataFrame({key: pd.DataFrame(found).mean() for key, found in rows.items()}).T
+    shown(f"Alarms in year 2{title}, %, {ASKED:g} asked", table, 1)
+    return int((table.xs(judged, level=1)["record", "healthy"] > MOST_FALSE).sum())
 
 
-def days(seeds, regressors):
-    """Year 2 in batches of a day, alone and behind the 30 hours before; number of rows that are silently worse."""
-    baseline, states, names = campaign(seeds[0])
-    learner = compensator(names, regressors[0], whiten="local")
-    detector = MahalanobisDetector(ASKED / 100).fit(learner.fit_transform(baseline))
-    half = 180 * PER_DAY
-    records = pd.concat([states["healthy"][:half], states["bottom 1 %"][half:]])
-    expected = detector.damage_index(learner.transform(records))[2 * PER_DAY :]
-    alone, behind, messages = [], [], {}
-    for _, batch in records.iloc[2 * PER_DAY :].groupby(records.index[2 * PER_DAY :].floor("D")):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            alone.append(detector.damage_index(learner.transform(batch)))
-        for warning in caught:
-            messages.setdefault(str(warning.message)[:40], str(warning.message))
-        some = records.loc[batch.index[0] - pd.Timedelta("30h") : batch.index[-1]]
-        behind.append(detector.damage_index(learner.transform(some))[-len(batch) :])
-    alone, behind, limit = pd.concat(alone), pd.concat(behind), detector.threshold_
-    evaluated = alone.notna()
-    silent = evaluated & ~np.isclose(alone, expected, rtol=1e-9) | ~evaluated & (not messages)
-    otherwise = (behind > limit) != (expected > limit)
-    print(f"Year 2 in batches of a day, {regressors[0]}: {len(expected)} rows, {(expected > limit).sum()} in alarm\n")
-    print(f"alone: {(~evaluated).sum()} rows not evaluated, {silent.sum()} rows silently worse, at most 0")
-    print(f"behind the 30 hours before: {otherwise.sum()} rows decided otherwise than in one pass, at most 0")
-    print("what is said of the first day:", *messages.values(), sep="\n- ")
-    return int(silent.sum() + otherwise.sum())
+def folds(seeds):
+    """Contiguous folds beside the default, plain and whitened."""
+    ways = {name: ({"cv": cv}, lambda table: table) for name, cv in (("contiguous", "contiguous"), ("default", None))}
+    return compared(seeds, "", ways, "default")
 
 
-PARTS = {"folds": folds, "sensor": sensor, "days": days}
+def sensor(seeds):
+    """The girder's thermometer dies after the baseline."""
+    ways = {"alive": ({}, lambda table: table), "dead": ({}, lambda table: table.assign(girder=np.nan))}
+    return compared(seeds, " by the girder's thermometer", ways, "dead")
+
+
+PARTS = {"folds": folds, "sensor": sensor}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="*", default=[*PARTS], choices=[*PARTS])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--regressors", nargs="*", default=[*REGRESSORS], choices=[*REGRESSORS])
-    options = parser.parse_args()
-    missed = [PARTS[part](range(options.seeds), options.regressors) for part in options.only]
-    return 1 if any(missed) else 0
+    options = arguments(__doc__, only=PARTS, seeds=2)
+    missed = sum([PARTS[part](range(options.seeds)) for part in options.only])
+    return int(missed > 0)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,18 @@
 """False alarms and detection on simulated residuals, whose law is known: thresholds, dependence in time, windows,
-missing modes, charts, drift, trend.
+missing modes, charts, drift, short baselines.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/detection_thresholds.py
 
-``--parts`` chooses some of the seven. The exit code is 1 where "dependence" gives more false alarms than it should.
+``--parts`` chooses some of the seven. The exit code is 1 where "dependence" or
+"short" gives more false alarms than it should, or "short" finds too little.
 """
 
-import argparse
-import warnings
 from itertools import product
 
 import numpy as np
 import pandas as pd
-from control_charts import correlated, cusum, whitened
-from sklearn.covariance import LedoitWolf
+from harness import arguments, autoregression, is_missed, shown
+from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 from sklearn.ensemble import IsolationForest
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.svm import OneClassSVM
@@ -32,6 +31,27 @@ N_MODES = 4
 SHIFTS = (0.0, 0.5, 1.0, 2.0)
 """In standard deviations of a single record; none shows the false alarms."""
 BETWEEN_ALARMS = 500
+
+
+def cusum(records, allowance):
+    """Length of Crosier's multivariate cumulative sum, which shrinks by the allowance with every record."""
+    total, lengths = np.zeros(records.shape[1:]), np.empty(records.shape[:-1])
+    for i, record in enumerate(records):
+        total = total + record
+        length = np.linalg.norm(total, axis=-1)
+        total *= np.maximum(1 - allowance / length, 0.0)[..., np.newaxis]
+        lengths[i] = np.maximum(length - allowance, 0.0)
+    return lengths
+
+
+def whitened(baseline, records):
+    """Records in standard deviations of a baseline, uncorrelated there."""
+    law = EmpiricalCovariance().fit(baseline)
+    return (records - law.location_) @ np.linalg.cholesky(law.precision_)
+
+
+def correlated(random, shape, correlation):
+    return autoregression(random, shape, correlation, 200)
 
 
 def rate(detector, records):
@@ -91,22 +111,6 @@ def print_dependence(options):
     print(table.to_string(), end="\n\n")
     print(f"Mahalanobis, cases with more than {100 * ASKED:.0f} % and sampling error: {n_missed} of {len(rows)}\n")
     return n_missed
-
-
-def print_trend(options):
-    """False alarms of windows after a baseline with a trend, which goes on or stays where it ended."""
-    rows = {}
-    for trend, rule in product((0.0, 0.5, 1.0), RULES):
-        random, rates = np.random.default_rng(4), {"stays": [], "goes on": []}
-        for _ in range(options.repeats):
-            baseline, new = (correlated(random, (YEAR // 4, N_MODES), CORRELATION) for _ in range(2))
-            rise = trend * np.linspace(-0.5, 0.5, len(new))[:, np.newaxis]
-            alarm = WindowedAlarm(24, rule=rule, contamination=ASKED).fit(baseline + rise)
-            for how, found in rates.items():
-                found.append(rate(alarm, new + trend / 2 + (rise + trend / 2 if how == "goes on" else 0)))
-        rows[f"{trend} deviations", RULES[rule]] = {how: np.mean(100 * np.array(found)) for how, found in rates.items()}
-    print("False alarms of windows of 24, %, after a quarter of a year with a trend in every mode, which then\n")
-    print(pd.DataFrame(rows).T.round(1).to_string(), end="\n\n")
 
 
 def with_gaps(random, records, share):
@@ -264,6 +268,31 @@ def print_drift(options):
     print(table.round(1).to_string(), end="\n\n")
 
 
+def print_short(options):
+    """Short baselines whose records depend on each other, beside the paper's quantile; whether there is too much of it.
+
+    Detectors evaluate the third of their number that follows, and as many in which all modes have shifted, by five
+    standard deviations together.
+    """
+    rows = {}
+    for memory, length, threshold in product(
+        (0.0, 0.5, 0.8, 0.9, 0.95, 0.97), (100, 144, 300, 1000), ("conformal", "quantile")
+    ):
+        found = []
+        for seed in range(options.seeds):
+            shape = (length + 2 * (length // 3), N_MODES)
+            records = autoregression(np.random.default_rng(seed), shape, memory, 400)
+            healthy, damaged = np.split(records[length:], 2)
+            detector = MahalanobisDetector(ASKED, threshold=threshold).fit(records[:length])
+            alarms = [100 * (detector.predict(one) == -1).mean() for one in (healthy, damaged + 5 / np.sqrt(N_MODES))]
+            found.append([detector.threshold_, *alarms])
+        rows[memory, length, threshold] = np.mean(found, axis=0)
+    table = pd.DataFrame(rows, ["threshold", "false alarms", "found"]).T.unstack().swaplevel(axis=1).sort_index(axis=1)
+    shown("Thresholds, false alarms and shifts found, %, by correlation and length of the baseline", table, 1)
+    false, found = (table["conformal", what].mean() for what in ("false alarms", "found"))
+    return is_missed("false alarms on the mean, %", false, "<= 4") + is_missed("found on the mean, %", found, ">= 85")
+
+
 PARTS = {
     "finite-samples": print_finite_samples,
     "dependence": print_dependence,
@@ -271,23 +300,24 @@ PARTS = {
     "missing-modes": print_missing_modes,
     "charts": print_charts,
     "drift": print_drift,
-    "trend": print_trend,
+    "short": print_short,
 }
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--parts", nargs="*", default=[*PARTS], choices=PARTS)
-    parser.add_argument("--baselines", type=int, default=2000, help="short baselines")
-    parser.add_argument("--dependent", type=int, default=200, help="dependent baselines of 100 records")
-    parser.add_argument("--repeats", type=int, default=30, help="baselines of correlated residuals")
-    parser.add_argument("--lengths", type=int, nargs="*", default=[1000, 3000, 10_000], help="their lengths")
-    parser.add_argument("--new-in-time", type=int, default=20_000, help="new records for each of them")
-    parser.add_argument("--new", type=int, default=1_000_000, help="new records with missing modes")
-    parser.add_argument("--calibration", type=int, default=200_000, help="healthy records that set charts' thresholds")
-    parser.add_argument("--streams", type=int, default=200, help="streams with a shift")
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", ".*few-baseline-records")
+    options = arguments(
+        __doc__,
+        parts=PARTS,
+        baselines=(2000, "short baselines"),
+        dependent=(200, "dependent baselines of 100 records"),
+        repeats=(30, "baselines of correlated residuals"),
+        lengths=([1000, 3000, 10_000], "their lengths"),
+        new_in_time=(20_000, "new records for each of them"),
+        new=(1_000_000, "new records with missing modes"),
+        calibration=(200_000, "healthy records that set charts' thresholds"),
+        streams=(200, "streams with a shift"),
+        seeds=(60, "of short baselines"),
+    )
     return sum(PARTS[name](options) or 0 for name in options.parts) > 0
 
 

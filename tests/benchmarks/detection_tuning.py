@@ -12,21 +12,14 @@ It fails if the mean score of the winners is more than 2 points below that of th
 more than 5 points from what fresh simulation predicted.
 """
 
-import argparse
-import sys
-import warnings
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
+from harness import arguments
 from sklearn.model_selection import GridSearchCV, ParameterGrid
+from tuning_recipes import GRID, LIMIT, detector, fitted_chain, true_score, true_year
 
 from skthermo.datasets import make_truss
 from skthermo.studies import detection_task, sweep
-
-sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
-
-from tuning_recipes import GRID, LIMIT, detector, fitted_chain, true_score, true_year
 
 SCENARIOS = sweep(make_truss(), (0.03, 0.06), ["bottom", "top", "diagonal"])
 
@@ -67,12 +60,7 @@ def short(setting):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--repeats", type=int, default=4, help="of each scenario in the search")
-    parser.add_argument("--jobs", type=int, default=None)
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", message=".*(not-converged|(outside-bounds|outside-training-weather))")
+    options = arguments(__doc__, seeds=5, repeats=(4, "of each scenario in the search"), jobs=int)
     tables, ranks = {}, []
     for seed in range(options.seeds):
         tables[seed], rank = one_seed(seed, options.repeats, options.jobs)

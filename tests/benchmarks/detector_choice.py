@@ -18,18 +18,17 @@ is above 2 points in more than one seed of twenty where nothing is wrong, or the
 false alarms.
 """
 
-import argparse
 import sys
 import time
 import warnings
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from harness import arguments, autoregression, compensated, recipes
 from joblib import Parallel, delayed
-from scipy.signal import lfilter
+from kw51_recipes import DEFAULT, NOISE, RECIPES, TRAINED, Fitted, Records
 from scipy.stats import spearmanr
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.neighbors import KNeighborsRegressor, LocalOutlierFactor
@@ -42,10 +41,7 @@ from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
-sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
-
-from detector_recipes import field_detectors
-from kw51_recipes import DEFAULT, NOISE, RECIPES, TRAINED, Fitted, Records
+field_detectors = recipes("detector").field_detectors
 
 ASKED = 0.02  # false alarms of each detector
 MARGIN, SHARE = 2.0, 0.95  # points of the best by truth, and share of seeds within
@@ -76,15 +72,10 @@ def twelve(targets, **others):
     outliers = make_pipeline(StandardScaler(), LocalOutlierFactor(novelty=True))
     return {
         **{name: known[name] for name in SEEN},
-        **{name: compensated(regressor, targets) for name, regressor in others.items()},
+        **{name: compensated(targets, MahalanobisDetector(ASKED), one) for name, one in others.items()},
         "in-sample, local outlier factor": OutlierDetector(outliers, ASKED, threshold="quantile"),
         "in-sample, 5 neighbours": make_pipeline(InSample(neighbours, targets=targets), MahalanobisDetector(ASKED)),
     }
-
-
-def compensated(regressor, targets):
-    """Mahalanobis distance of the residuals of a regression on temperatures."""
-    return make_pipeline(TemperatureCompensator(regressor, targets=targets), MahalanobisDetector(ASKED))
 
 
 @dataclass(frozen=True)
@@ -147,9 +138,7 @@ class Truss:
     def campaign(self, seed, damage=None, louder=1.0):
         """Temperatures and frequencies of a year."""
         year = make_truss_campaign(samples_per_year=self.records, noise=0.0, damage=damage, random_state=seed)
-        memory = self.wrong.memory
-        drawn = np.random.RandomState((seed, 1)).standard_normal((1000 + self.records, len(self.targets)))
-        lasting = lfilter([np.sqrt(1 - memory**2)], [1, -memory], drawn, axis=0)[1000:]
+        lasting = autoregression(np.random.RandomState((seed, 1)), year.frequencies.shape, self.wrong.memory, 1000)
         return year.temperatures, year.frequencies * (1 + louder * self.noise * lasting)
 
     def truth(self, scenario, seed):
@@ -252,7 +241,7 @@ def one_seed(options, kind, seed):
     structure, severities, records, _ = STRUCTURES[options.structure]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of models that are wrong on purpose, and of parameters outside the box
-        made = structure(seed, WRONG[kind], options.records or records, options.severities or severities)
+        made = structure(seed, WRONG[kind], options.records or records, severities)
         assumed, coming = both_studies(made, options.repeats, seed)
     tables, outcomes = [], []
     for limit in options.limits:
@@ -307,17 +296,17 @@ def is_missed(outcomes):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structure", choices=list(STRUCTURES), default="truss")
-    parser.add_argument("--seeds", type=int, help="20 of the truss, 10 of KW51 by default")
-    parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--repeats", type=int, default=5, help="of the noise and, in truth, of the truss' weather")
-    parser.add_argument("--records", type=int, help="in a year of the truss (365), hours of KW51 (4000)")
-    parser.add_argument("--severities", type=float, nargs="+", help=".1 .2 .3 of the truss, .05 .1 .2 of KW51")
-    parser.add_argument("--wrong", nargs="+", default=["nothing"], choices=list(WRONG), help="of the truss only")
-    parser.add_argument("--limits", type=float, nargs="+", default=[0.02, 0.03], help="of false alarms; .02 is asked")
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        structure=("truss", None, list(STRUCTURES)),
+        seeds=(int, "20 of the truss, 10 of KW51 by default"),
+        first=(0, "first seed"),
+        repeats=(5, "of the noise and, in truth, of the truss' weather"),
+        records=(int, "in a year of the truss (365), hours of KW51 (4000)"),
+        wrong=(["nothing"], "of the truss only", list(WRONG)),
+        limits=([0.02, 0.03], "of false alarms; .02 is asked"),
+        jobs=1,
+    )
     seeds = range(options.first, options.first + (options.seeds or STRUCTURES[options.structure][-1]))
     shipped, began = {}, time.perf_counter()
     for kind in options.wrong:

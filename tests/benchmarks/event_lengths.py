@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/event_lengths.py [--seeds 100 200] [--per-day 1 4 24]
 
-Truss, three bridges of the fleet and the footbridge of `blind_bridge.py`: a default monitor learns a year, and another
+Truss, three bridges of the fleet and the footbridge of `structures.py`: a default monitor learns a year, and another
 healthy year is evaluated. So that there are events enough, their lengths are also those at six false alarms a year.
 Damage lowers all frequencies by 1.2 times the smallest change that the monitor states; an event that opens after the
 first one is a reopening. Prints, by structure and records a day: events a year and their days in the mean, for one and
@@ -11,13 +11,13 @@ is 1 if false events of several records a day last more than two days in the mea
 month.
 """
 
-import argparse
 import sys
-import warnings
 
 import pandas as pd
-from directions_in_service import structures
+from harness import arguments, joined, modes_of
+from structures import Footbridge
 
+from skthermo.datasets import make_fleet, make_truss_campaign
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._events import find_events
 from skthermo.monitoring._threshold import estimate_false_alarms
@@ -25,6 +25,18 @@ from skthermo.monitoring._threshold import estimate_false_alarms
 DAY = pd.Timedelta("1D")
 ABOVE = 1.2  # times the smallest change
 LONGEST, REOPENED = 2.0, 2.0
+
+
+def structures(seed, per_day):
+    """Name, baseline and another healthy year."""
+    options = {"samples_per_year": 365 * per_day, "samples_per_day": per_day}
+    baseline, later = (joined(make_truss_campaign(**options, random_state=s)) for s in (seed, seed + 1))
+    yield "truss", baseline, later.set_index(later.index + pd.Timedelta("365D"))
+    for bridge in make_fleet(3, atypical=0.0, random_state=seed).values():
+        years = (bridge.records(365, start, samples_per_day=per_day) for start in ("2024-01-01", "2025-01-01"))
+        yield "bridge", *map(joined, years)
+    bridge = Footbridge(seed)
+    yield "footbridge", bridge.training(True), bridge.evaluated({})
 
 
 def index_of(monitor, records):
@@ -74,19 +86,15 @@ def summarised(table, by):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[100, 200])
-    parser.add_argument("--per-day", type=int, nargs="+", default=[1, 4, 24])
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
+    options = arguments(__doc__, seeds=[100, 200], per_day=[1, 4, 24])
     rows = []
     for seed in options.seeds:
         for per_day in options.per_day:
-            for name, _, baseline, later in structures(seed, 3, per_day):
-                targets = [column for column in baseline if column.startswith("f")]
+            for name, baseline, later in structures(seed, per_day):
+                targets = modes_of(baseline)
                 monitor = Monitor(targets=targets, sensors=False).fit(baseline)
                 found = measured(monitor, later, targets)
-                rows.append({"structure": name.split()[0], "records a day": per_day} | found)
+                rows.append({"structure": name, "records a day": per_day} | found)
     table = pd.DataFrame(rows)
     print(summarised(table, ["records a day", "structure"]).round(2).to_string())
     every = summarised(table, ["records a day"])

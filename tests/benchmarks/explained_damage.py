@@ -10,24 +10,20 @@ Each is asked about 90 later days without damage, with damage of one group, and 
 "wrong model" (every group 5 % too stiff or too soft, the footbridge's elements coarser than the truth), "shapes", and
 "ensemble" (the wrong model as a sample of calibrated ones).
 
-Prints how often the truth is the most probable explanation, a table of reliability, and the coverage of bands. With
-``--z24``, the explanations of Z24's damage, which choose nothing. The exit code is 1 if a target is missed by more than
-two sampling errors. On a version of the library without explanations, the most probable one is the set of significant
-groups.
+Prints how often the truth is the most probable explanation, a table of reliability, and the coverage of bands. The exit
+code is 1 if a target is missed by more than two sampling errors.
 """
 
-import argparse
-import os
 import sys
 import time
-import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from explained_structures import STRUCTURES, Campaign, memory_of
+from harness import arguments
+from structures import KNOWN, Campaign, memory_of
 
 from skthermo.studies import identify_damage
+from skthermo.updating import ModelUpdater
 
 DESIGNS = {
     "truss": ("right model", "wrong model", "ensemble"),
@@ -40,7 +36,6 @@ SHARE = {"right model": 1.0, "shapes": 1.0, "wrong model": 0.4, "ensemble": 0.1}
 N_HEALTHY = {"truss": 2, "KW51": 4, "frame": 4, "footbridge": 3}  # windows without damage of each campaign
 N_MODELS = 6  # of an ensemble
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named
-NORMAL = 1.645  # standard errors of a band of 90 %, where there are no bands
 BINS = [0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.001]
 RIGHT = ["right model", "shapes"]
 SHOWN = ["right model", "shapes", "wrong model", "ensemble"]
@@ -73,18 +68,9 @@ def answered(found, truth, groups):
     truth = pd.Series(truth, dtype=float).reindex(groups).fillna(0.0)
     damaged = set(truth.index[truth > 0])
     alone, beside = (d.reindex(groups).fillna(np.inf)[list(damaged)] for d in deviations(found))
-    if hasattr(found, "explanations"):
-        said, probability = set(found.most_probable), found.probability
-        every = [
-            (set(label.split(" + ")) if label != "no damage" else set(), p)
-            for label, p in found.explanations["probability"].items()
-        ]
-        true_one = float(sum(p for causes, p in every if causes == damaged))
-        lowest, highest, likely = table["ci_low"], table["ci_high"], table["probability"]
-    else:
-        said, probability, true_one = set(table.index[table["significant"].eq(True)]), np.nan, np.nan
-        error = NORMAL * table["standard_error"]
-        lowest, highest, likely = table["severity"] - error, table["severity"] + error, pd.Series(np.nan, groups)
+    said, lowest, highest = set(found.most_probable), table["ci_low"], table["ci_high"]
+    every = found.explanations["probability"].items()
+    true_one = sum(p for label, p in every if damaged == set(label.split(" + ")) - {"no damage"})
     state = {
         "n": len(damaged),
         "severity": truth.max(),
@@ -92,7 +78,7 @@ def answered(found, truth, groups):
         "visible": (truth[list(damaged)] > VISIBLE * beside).all(),
         "hit": said == damaged,
         "else": "something else" in said,
-        "probability": probability,
+        "probability": found.probability,
         "true one": true_one,
         "truth": ", ".join(f"{g} {100 * truth[g]:g}" for g in truth.index if truth[g] > 0) or "healthy",
         "said": " + ".join(sorted(said)) or "no damage",
@@ -102,7 +88,7 @@ def answered(found, truth, groups):
     of_groups = pd.DataFrame(
         {
             "truth": truth,
-            "probability": likely,
+            "probability": table["probability"],
             "held": ((lowest <= truth + 1e-12) & (truth <= highest + 1e-12)).where(lowest.notna()),
             "seen": table["error_alone"] < 0.06,
         }
@@ -126,7 +112,7 @@ def asked(campaign, truth, number, design, models):
 
 def measured(name, design, seeds, verbose):
     """States and groups of all campaigns of one design."""
-    structure, states, groups = STRUCTURES[name](), [], []
+    structure, states, groups = KNOWN[name](), [], []
     spent = {"fit": 0.0, "identify": 0.0}
     for seed in seeds:
         start = time.process_time()
@@ -155,8 +141,6 @@ def measured(name, design, seeds, verbose):
 
 def sampled(campaign):
     """Calibrated models drawn from what the training records' mean leaves open."""
-    from skthermo.updating import ModelUpdater
-
     mean = campaign.records[1].mean().to_numpy()[np.newaxis]
     updater = ModelUpdater(campaign.model).fit(mean, frequency_std=0.005)
     return updater.sample_models(N_MODELS, random_state=campaign.seed)
@@ -244,40 +228,19 @@ def is_met(values, lowest, highest):
     return abs(values.mean() - limit) <= 2 * np.sqrt(limit * (1 - limit) / len(values))
 
 
-def z24(folder):
-    """Explanations of the damage of Z24: only reported."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
-    from z24_damage_recipes import identify
-    from z24_recipes import Bridge, find
-
-    found = identify(Bridge(find(Path(folder))))[1]
-    print(found.summary())
-    if hasattr(found, "explanations"):
-        print(found.explanations.round(3).to_string())
-    print(found.table.round(3).to_string())
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", default=list(DESIGNS), choices=list(DESIGNS))
-    parser.add_argument("--designs", nargs="+", default=SHOWN, choices=SHOWN)
-    parser.add_argument("--campaigns", type=int, help="number of campaigns of each structure and design")
-    parser.add_argument(
-        "--first", type=int, default=100, help="seed of the first campaign; those below 100 chose settings"
+    options = arguments(
+        __doc__,
+        structures=DESIGNS,
+        designs=dict.fromkeys(SHOWN),
+        campaigns=(int, "number of campaigns of each structure and design"),
+        first=(100, "seed of the first campaign; those below 100 chose settings"),
+        quick=(False, "a sixth of the campaigns"),
+        verbose=(False, "a line for each state"),
     )
-    parser.add_argument("--quick", action="store_true", help="a sixth of the campaigns")
-    parser.add_argument("--verbose", action="store_true", help="a line for each state")
-    parser.add_argument("--z24", action="store_true", help="Z24 alone")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
-    if options.z24:
-        z24(os.environ["SKTHERMO_DATA"])
-        return 0
     every = []
     for name in options.structures:
         for design in [one for one in DESIGNS[name] if one in options.designs]:
-            if design == "ensemble" and "models" not in identify_damage.__kwdefaults__:
-                continue
             number = options.campaigns or max(round(SHARE[design] * N_CAMPAIGNS[name] / (6 if options.quick else 1)), 1)
             seeds = range(options.first, options.first + number)
             every.append(measured(name, design, seeds, options.verbose))

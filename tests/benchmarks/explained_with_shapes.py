@@ -10,13 +10,13 @@ cause beside all others. The exit code is 1 if shapes do not lower the mean leas
 or if they make the true explanations less probable in the mean.
 """
 
-import argparse
 import sys
 import warnings
 from functools import cache
 
 import numpy as np
 import pandas as pd
+from harness import arguments
 
 from skthermo.datasets import kw51_sensors, kw51_structure, make_kw51
 from skthermo.studies import identify_damage
@@ -88,16 +88,13 @@ def evaluated(fem, case, seed, n_days):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=2, help="campaigns of each case")
-    parser.add_argument("--days", type=int, default=20, help="daily records after the change")
-    asked = parser.parse_args()
+    options = arguments(__doc__, seeds=(2, "campaigns of each case"), days=(20, "daily records after the change"))
     inverse = PosteriorInverse(noise=NOISE)
     fem = DataInformedFEM(bridge(), inverse=inverse, random_state=0).fit(*records(365, 0))
     rows, precision = [], None
     for case in CASES:
-        for seed in range(asked.seeds):
-            row, precision = evaluated(fem, case, seed, asked.days)
+        for seed in range(options.seeds):
+            row, precision = evaluated(fem, case, seed, options.days)
             rows.append(row)
     table = pd.DataFrame(rows)
     print(table.groupby("case", sort=False).mean().drop(columns="seed").round(2).to_string(), "\n")

@@ -12,22 +12,16 @@ more false alarms than asked, and sampling error, where weather repeats: piecewi
 dependent noise, which is too little for their bends.
 """
 
-import argparse
-import os
-import sys
 import time
-import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from compensator_year import campaign as freezing
-from control_charts import correlated
+from harness import DATA, arguments, autoregression, modes_of, recipes
 
 from skthermo.datasets import make_truss_campaign, steel_modulus
 
-sys.path.append(str(Path(__file__).parents[2] / "examples"))
-from detector_recipes import field_detectors
+field_detectors = recipes("detector").field_detectors
 
 ASKED, SLACK = 2.0, 0.3
 NOISE, DAMAGE = 0.01, {"bottom": 0.2}
@@ -37,7 +31,7 @@ HALF = 182  # days, in which the season is warm
 def year(seed, damage=None, memory=0.0, colder=0.0, n_years=1):
     """Temperatures beside frequencies."""
     clean = make_truss_campaign(n_years, noise=0, random_state=seed)
-    noise = correlated(np.random.default_rng(seed), clean.frequencies.shape, memory)
+    noise = autoregression(np.random.default_rng(seed), clean.frequencies.shape, memory, 200)
     T = clean.temperatures - colder
     F = clean.model.damaged(damage or {}).frequencies(steel_modulus(T)) * (1 + NOISE * noise)
     return T.join(pd.DataFrame(F, T.index, clean.frequencies.columns))
@@ -60,7 +54,7 @@ def frost(seed):
 def z24(seed):
     import z24_recipes
 
-    return z24_recipes.Records.of(z24_recipes.Bridge(z24_recipes.find(Path(os.environ["SKTHERMO_DATA"]))))
+    return z24_recipes.Records.of(z24_recipes.Bridge(z24_recipes.find(DATA)))
 
 
 CASES = {
@@ -80,10 +74,10 @@ REPEATS = ("independent", "dependent", "dependent, two years")
 def alarms(case, seed, without):
     """False alarms and records found, in percent, by detector."""
     baseline, healthy, damaged = CASES[case](seed)
-    targets = [name for name in baseline if name.startswith("f")]
+    targets = modes_of(baseline)
     rates = {}
     for name, detector in field_detectors(targets, block="1D" if "days" in case else None).items():
-        if any(word in name for word in without):
+        if any(word and word in name for word in without):
             continue
         sees = targets if name.startswith("raw") else list(baseline)
         detector.fit(baseline[sees])
@@ -92,12 +86,12 @@ def alarms(case, seed, without):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--cases", nargs="*", default=list(CASES)[:-2], choices=CASES)
-    parser.add_argument("--without", nargs="*", default=[], help="detectors with such a word are left out")
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", category=UserWarning)
+    options = arguments(
+        __doc__,
+        seeds=20,
+        cases=(list(CASES)[:-2], None, list(CASES)),
+        without=([""], "detectors with such a word are left out"),
+    )
     table, missed = {}, []
     for case in options.cases:
         start = time.perf_counter()

@@ -14,14 +14,13 @@ that are found, and "found" the share of the damaged ones, by shift. The exit co
 above .15.
 """
 
-import argparse
 import sys
 import time
-import warnings
 
 import numpy as np
 import pandas as pd
 from false_alarm_rates import LAWS, STAMPS, YEAR, drawn
+from harness import arguments
 from scipy.stats import false_discovery_control
 
 from skthermo.detection import MahalanobisDetector
@@ -68,16 +67,14 @@ def measures(found):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--laws", nargs="+", choices=LAWS, default=["iid", "ar .5", "t3", "outliers .1 %", "outliers .5 %"]
+    options = arguments(
+        __doc__,
+        laws=(["iid", "ar .5", "t3", "outliers .1 %", "outliers .5 %"], None, list(LAWS)),
+        fleets=(20, "of each law"),
+        persistence=[1, 3],
+        seed=0,
+        quick=(False, "two fleets of each law"),
     )
-    parser.add_argument("--fleets", type=int, default=20, help="of each law")
-    parser.add_argument("--persistence", type=int, nargs="+", default=[1, 3])
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--quick", action="store_true", help="two fleets of each law")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
     start, rows, shifts = time.perf_counter(), [], [*SHIFTS, *[0.0] * (N_BRIDGES - len(SHIFTS))]
     for law in options.laws:
         for fleet in range(2 if options.quick else options.fleets):

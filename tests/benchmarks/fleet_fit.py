@@ -13,7 +13,6 @@ nothing is fitted anew. The exit code is 1 if bridges are missing, if any bits d
 killed is not reported, if a worker needs more than 2 GB, or if more healthy bridges are significant than damaged ones.
 """
 
-import argparse
 import contextlib
 import os
 import signal
@@ -21,12 +20,12 @@ import sys
 import tempfile
 import threading
 import time
-import warnings
 from functools import partial
 from pathlib import Path
 
 import joblib
 import pandas as pd
+from harness import arguments
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 
@@ -125,16 +124,16 @@ def bits(fleet, names, campaign):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bridges", type=int, default=200)
-    parser.add_argument("--again", type=int, default=24, help="bridges of the runs with killed workers and with Dask")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--kill-after", type=float, default=20.0, help="seconds until a worker is killed")
-    parser.add_argument("--quick", action="store_true", help="8 bridges, 4 of them again")
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        bridges=200,
+        again=(24, "bridges of the runs with killed workers and with Dask"),
+        jobs=2,
+        kill_after=(20.0, "seconds until a worker is killed"),
+        quick=(False, "8 bridges, 4 of them again"),
+    )
     if options.quick:
         options.bridges, options.again, options.kill_after = 8, 4, 10.0
-    warnings.simplefilter("ignore", UserWarning)  # each fleet's table counts them
     campaign = make_fleet(options.bridges, random_state=0)
     makers = {name: partial(make_chain, bridge) for name, bridge in campaign.items()}
     records = {name: partial(baseline, bridge) for name, bridge in campaign.items()}

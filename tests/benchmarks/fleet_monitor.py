@@ -2,12 +2,11 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py --quick
-    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_monitor.py --kinds girder --chains
 
 Bridges of the library's synthetic fleet (`skthermo.datasets.make_fleet`), four records a day with gaps; outliers have
 been removed. Those of the fleet have a year each. A new bridge has 15 days or more from a day of the year on that is
 drawn, then a year in service. Its monitor is set for one false event a year. At three times of that year, damage sets
-in; it is found if an event opens within 30 days (the first bridge's events are also those of ``Monitor.update``). The
+in; it is found if an event opens within 30 days. The
 means by role of the thermometers now and 12 and 48 hours ago, for all regressions.
 
 fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the frequencies
@@ -16,7 +15,6 @@ fleet mean   a ridge on the bridge's own records towards the mean coefficients o
 ridge        of all temperatures, on the bridge's own records
 lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
 neighbours   distance to the 20th nearest of the raw frequencies of the baseline
-fleet chain  with --chains: a ``DataInformedFEM`` whose mapper is the fleet's prior on the parameters of FE models
 
 "within" is the share of bridges whose number of events lies below the highest that ``false_alarm_estimate_`` names for
 a single year; "fitted" those whose monitor could be made at all. The exit code is 1 if the fleet's monitors have more
@@ -24,13 +22,12 @@ than 1.5 false events a year on average, or fewer than 90 % of them are within t
 or if the fleet finds no more of the damage than the best of the others whose false events are as few.
 """
 
-import argparse
 import sys
 import time
-import warnings
 
 import numpy as np
 import pandas as pd
+from harness import arguments, compensated, joined
 from sklearn.base import BaseEstimator, OutlierMixin, RegressorMixin
 from sklearn.linear_model import Ridge
 from sklearn.neighbors import NearestNeighbors
@@ -38,12 +35,12 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import OutlierDetector
 from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._events import find_events
-from skthermo.preprocessing import BiasAligner, HingeFeatures, LagFeatures, SensorMeans
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from skthermo.preprocessing import HingeFeatures, LagFeatures, SensorMeans
+from skthermo.surrogate import TemperatureMapper
 
 PER_DAY, LAGS, MEMORY = 4, [0, 2, 8], 60
 DAYS = (15, 30, 60, 120)
@@ -131,16 +128,10 @@ def prepared(bridge, records):
     return make_pipeline(*weather_of(bridge)).fit_transform(records.temperatures), records.frequencies
 
 
-def chain_of(bridge, mapper):
-    inverse = PosteriorInverse(noise=0.005)
-    mapper = make_pipeline(*weather_of(bridge), mapper)
-    return DataInformedFEM(bridge.model, inverse=inverse, mapper=mapper, aligner=BiasAligner(), random_state=0)
-
-
 class Kind:
     """The fleet of one kind of bridge, and what it gives new ones."""
 
-    def __init__(self, kind, n_fleet, n_new, seed, with_chains):
+    def __init__(self, kind, n_fleet, n_new, seed):
         made = make_fleet(n_fleet + n_new, kinds=(kind,), atypical=0.05, random_state=seed)
         names = list(made)
         self.kind, self.new = kind, [made[name] for name in names[n_fleet:]]
@@ -152,14 +143,8 @@ class Kind:
         self.prior = FleetPrior().fit(fleet, covariates)
         self.mean = FleetMean(fleet)
         self.penalties = {}
-        if with_chains:
-            chains = {
-                name: chain_of(bridge, TemperatureMapper()).fit(years[name].temperatures, years[name].frequencies)
-                for name, bridge in members.items()
-            }
-            self.chain_prior = FleetPrior().fit(chains, covariates)
 
-    def regressors(self, bridge, days, with_chains):
+    def regressors(self, bridge, days):
         if days not in self.penalties:
             self.penalties[days] = self.mean.penalty(days)
         own = {"material": bridge.covariates["material"], "span": bridge.covariates["span"]}
@@ -169,17 +154,11 @@ class Kind:
             "ridge": make_pipeline(StandardScaler(), Ridge(1.0)),
             "lines": TemperatureMapper(),
         }
-        found = {name: make_pipeline(*weather_of(bridge), regressor) for name, regressor in found.items()}
-        if with_chains:
-            found["fleet chain"] = chain_of(bridge, self.chain_prior.mapper(own))
-        return found
+        return {name: make_pipeline(*weather_of(bridge), regressor) for name, regressor in found.items()}
 
 
-def detectors(kind, bridge, modes, days, with_chains, whiten):
-    found = {
-        name: make_pipeline(TemperatureCompensator(regressor, targets=modes, whiten=whiten), MahalanobisDetector())
-        for name, regressor in kind.regressors(bridge, days, with_chains).items()
-    }
+def detectors(kind, bridge, modes, days):
+    found = {name: compensated(modes, regressor=regressor) for name, regressor in kind.regressors(bridge, days).items()}
     return found | {"neighbours": make_pipeline(StandardScaler(), OutlierDetector(NeighbourDistance()))}
 
 
@@ -187,7 +166,7 @@ def events_of(index, rule):
     return find_events(index.to_numpy(), index.index, rule)
 
 
-def served(detector, modes, baseline, healthy, damaged, also_by_update):
+def served(detector, modes, baseline, healthy, damaged):
     """A monitor's threshold, false events in a year, highest number of its range, and the share of damage found.
 
     Damage is found by an event that opens after it has set in; while a false one is open, none can.
@@ -208,9 +187,6 @@ def served(detector, modes, baseline, healthy, damaged, also_by_update):
             opened.append((events["start"] >= hurt.index[first]).any())
         found[f"found {severity:.0%}"] = float(np.mean(opened))
     events = events_of(calm, rule)
-    if also_by_update:
-        monitor.update(healthy)
-        assert list(monitor.events_["start"]) == list(events["start"])
     return {
         "events": len(events),
         "within": len(events) <= monitor.false_alarm_estimate_.highest,
@@ -226,14 +202,14 @@ def rows_of(kind, bridge, number, options):
     longest = max(options.days)
     records = history(bridge, longest + 365, start)
     group, modes, first = DAMAGED[kind.kind], list(records.frequencies), longest * PER_DAY
-    healthy, damaged = records.temperatures.join(records.frequencies), {}
+    healthy, damaged = joined(records), {}
     for severity in options.severities:
         hurt = history(bridge, longest + 365, start, damage={group: severity})
-        damaged[severity] = hurt.temperatures.join(hurt.frequencies)[first:]
+        damaged[severity] = joined(hurt)[first:]
     for days in options.days:
         baseline = healthy[first - days * PER_DAY : first]
-        for name, detector in detectors(kind, bridge, modes, days, options.chains, options.whiten).items():
-            if options.detectors is not None and name not in options.detectors:
+        for name, detector in detectors(kind, bridge, modes, days).items():
+            if name not in options.detectors:
                 continue
             row = {
                 "kind": kind.kind,
@@ -243,31 +219,29 @@ def rows_of(kind, bridge, number, options):
                 "detector": name,
             }
             try:
-                found = served(detector, modes, baseline, healthy[first:], damaged, number == 0)
+                found = served(detector, modes, baseline, healthy[first:], damaged)
                 yield row | {"fitted": 1.0, "error": ""} | found
             except ValueError as error:
                 yield row | {"fitted": 0.0, "error": str(error)}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kinds", nargs="+", default=["girder", "truss"], choices=list(DAMAGED))
-    parser.add_argument("--fleet", type=int, default=40, help="bridges of each kind with a year of records")
-    parser.add_argument("--new", type=int, default=12, help="new bridges of each kind")
-    parser.add_argument("--days", type=int, nargs="+", default=list(DAYS))
-    parser.add_argument("--detectors", nargs="+", help="only these")
-    parser.add_argument("--whiten", choices=["global", "local"], help="of the compensators; by default none")
-    parser.add_argument("--severities", type=float, nargs="+", default=list(SEVERITIES), help="of the damage")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--chains", action="store_true", help="chains with FE models, too")
-    parser.add_argument("--quick", action="store_true", help="few bridges, in less than a minute")
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        kinds=(["girder", "truss"], None, list(DAMAGED)),
+        fleet=(40, "bridges of each kind with a year of records"),
+        new=(12, "new bridges of each kind"),
+        days=list(DAYS),
+        detectors=(["fleet", "fleet mean", "ridge", "lines", "neighbours"], "only these"),
+        severities=(list(SEVERITIES), "of the damage"),
+        seed=0,
+        quick=(False, "few bridges, in less than a minute"),
+    )
     if options.quick:
         options.kinds, options.fleet, options.new, options.days = ["girder"], 12, 3, [30]
-    warnings.simplefilter("ignore")
     rows, begun = [], time.perf_counter()
     for kind in options.kinds:
-        one = Kind(kind, options.fleet, options.new, options.seed, options.chains)
+        one = Kind(kind, options.fleet, options.new, options.seed)
         print(f"{kind}: fleet of {options.fleet} after {time.perf_counter() - begun:.0f} s", flush=True)
         for number, bridge in enumerate(one.new):
             rows += rows_of(one, bridge, number, options)

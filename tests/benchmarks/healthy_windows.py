@@ -14,13 +14,12 @@ least that of independent windows. Settings
 were chosen on seeds below 100. The exit code is 1 if a share is outside its target by more than two standard errors.
 """
 
-import argparse
 import sys
-import warnings
 
 import numpy as np
 import pandas as pd
-from explained_structures import STRUCTURES, Campaign
+from harness import arguments
+from structures import KNOWN, Campaign
 
 from skthermo.studies import DamagePrior, identify_damage
 
@@ -67,22 +66,20 @@ def shares(table, by):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", default=["truss", "footbridge", "girder"], choices=list(STRUCTURES))
-    parser.add_argument("--correlations", nargs="+", type=float, default=[0.0, 0.5])
-    parser.add_argument(
-        "--first", type=int, default=100, help="seed of the first chain; those below 100 chose settings"
+    options = arguments(
+        __doc__,
+        structures=(["truss", "footbridge", "girder"], None, list(KNOWN)),
+        correlations=[0.0, 0.5],
+        first=(100, "seed of the first chain; those below 100 chose settings"),
+        seeds=(20, "number of chains of each structure and correlation"),
+        quick=(False, "4 chains each"),
+        healthy=(False, "without the power"),
     )
-    parser.add_argument("--seeds", type=int, default=20, help="number of chains of each structure and correlation")
-    parser.add_argument("--quick", action="store_true", help="4 chains each")
-    parser.add_argument("--healthy", action="store_true", help="without the power")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
     windows, states = [], []
     for name in options.structures:
         for memory in options.correlations:
             for seed in range(options.first, options.first + (4 if options.quick else options.seeds)):
-                campaign = Campaign(STRUCTURES[name](), seed, memory=memory, is_plain=True, n_days=TRAINING_DAYS)
+                campaign = Campaign(KNOWN[name](), seed, memory=memory, is_plain=True, n_days=TRAINING_DAYS)
                 of_chain = {"structure": name, "correlation": memory, "seed": seed}
                 windows += [of_chain | one for one in healthy(campaign, memory)]
                 states += [] if options.healthy else [of_chain | one for one in damaged(campaign, memory)]

@@ -6,12 +6,9 @@ The chain learns from a year of the truss and predicts 90 % intervals for the ne
 first-order autoregression, always with the same variance, whose correlation from day to day is varied.
 """
 
-import argparse
-import warnings
-
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
+from harness import arguments, autoregression
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.surrogate import DataInformedFEM
@@ -21,19 +18,12 @@ CORRELATIONS = (0.0, 0.5, 0.9, 0.98)
 PERIODS = {"later 60 days": 60, "later year": DAYS}
 
 
-def autoregression(shape, correlation, random):
-    """Stationary noise of unit variance along the rows; columns are independent."""
-    shocks = random.standard_normal(shape)
-    shocks[1:] *= np.sqrt(1 - correlation**2)
-    return lfilter([1.0], [1.0, -correlation], shocks, axis=0)
-
-
 def held(correlation, seed):
     """Which frequencies of the second year are in their intervals, (n_days, n_modes)."""
     random = np.random.RandomState(seed)
     campaign = make_truss_campaign(n_years=2, noise=0.0, random_state=random)
     clean, T = campaign.clean_frequencies, campaign.temperatures
-    F = clean * (1 + NOISE * autoregression(clean.shape, correlation, random))
+    F = clean * (1 + NOISE * autoregression(random, clean.shape, correlation))
     fem = DataInformedFEM(make_truss(), random_state=seed).fit(T[:DAYS], F[:DAYS])
     lowest, highest = fem.predict_interval(T[DAYS:])
     later = F[DAYS:]
@@ -62,11 +52,7 @@ def table(correlations, repeats):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--repeats", type=int, default=30)
-    parser.add_argument("--correlations", type=float, nargs="+", default=CORRELATIONS)
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", ".*(not-converged|modes-cross|(outside-bounds|outside-training-weather))")
+    options = arguments(__doc__, repeats=30, correlations=list(CORRELATIONS))
     found = table(options.correlations, options.repeats)
     print(f"coverage of 90 % intervals in percent: mean of {options.repeats} repeats, standard deviation between")
     print(

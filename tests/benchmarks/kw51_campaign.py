@@ -1,17 +1,13 @@
 """The synthetic campaigns of KW51 beside what is known of the real one.
 
 python tests/benchmarks/kw51_campaign.py --seeds 10
-
-With SKTHERMO_DATA, daily medians are compared with the real ones of mode 6, too.
 """
 
-import argparse
-import os
 import time
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from harness import arguments
 
 from skthermo.datasets import make_kw51_campaign
 
@@ -53,19 +49,6 @@ def statistics(campaign, healthy):
     return pd.concat(found)
 
 
-def daily_statistics(daily):
-    """Statistics of daily medians of mode 6 (column f) and of the temperature (T)."""
-    parts = {"before": daily[:"2019-05-14"], "after": daily["2019-09-28":]}
-    found = {}
-    for name, part in parts.items():
-        found |= {(name, "correlation"): part["f"].corr(part["T"])}
-        for column, unit in (("f", "Hz"), ("T", "C")):
-            found |= {
-                (name, f"{column} {what} ({unit})"): part[column].agg(what) for what in ("mean", "std", "min", "max")
-            }
-    return pd.Series(found)
-
-
 def side_by_side(real, runs):
     """The real value, and mean, lowest and highest over campaigns."""
     table = pd.DataFrame({"real": real, "mean": runs.mean(), "lowest": runs.min(), "highest": runs.max()})
@@ -74,17 +57,13 @@ def side_by_side(real, runs):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Synthetic campaigns of KW51 beside the real one.")
-    parser.add_argument("--seeds", type=int, default=10)
-    options = parser.parse_args()
-    runs, daily, seconds = [], [], []
+    options = arguments(__doc__, seeds=10)
+    runs, seconds = [], []
     for seed in range(options.seeds):
         started = time.perf_counter()
         campaign = make_kw51_campaign(random_state=seed)
         seconds.append(time.perf_counter() - started)
         runs.append(statistics(campaign, make_kw51_campaign(retrofit=False, random_state=seed)))
-        both = pd.DataFrame({"f": campaign.frequencies["f6"], "T": campaign.temperatures["tBD31A"]})
-        daily.append(daily_statistics(both.resample("D").median()))
     real = pd.concat(
         {
             "correlation before the retrofit": CORRELATION,
@@ -98,14 +77,6 @@ def main():
         f"{options.seeds} campaigns; the first took {seconds[0]:.1f} s, the others {np.mean(seconds[1:]):.1f} s each\n"
     )
     print(side_by_side(real, pd.DataFrame(runs)).round(3).to_string())
-    folder = os.environ.get("SKTHERMO_DATA")
-    if not folder:
-        print("\nDaily medians are not compared: SKTHERMO_DATA is not set.")
-        return
-    path = Path(folder) / "kw51" / "kw51_mode6_daily.csv"
-    measured = daily_statistics(pd.read_csv(path, index_col="date", parse_dates=True))
-    print("\nDaily medians of mode 6 and of the temperature:")
-    print(side_by_side(measured, pd.DataFrame(daily)).round(4).to_string())
 
 
 if __name__ == "__main__":

@@ -8,21 +8,17 @@ its own; "worst" is the campaign that is farthest off. Rates of the chain are me
 which single ones scatter around as measured rates do. The exit code is 1 if a limit is missed.
 """
 
-import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-
-sys.path.append(str(Path(__file__).parents[2] / "examples"))  # which Python does itself for a file that it runs
-
+from harness import arguments
 from kw51_recipes import DEFAULT, MODES, PAIR, RECIPES, TRAINED, Fitted, Records, index, rates
 
 from skthermo.datasets import make_kw51_campaign
 from skthermo.detection import MahalanobisDetector
 
-INDEX, ALARMS, SHARE = "mean index", "alarms, %", "records with an index, %"
+INDEX, ALARMS = "mean index", "alarms, %"
 TARGETS = {
     "largest MAPE of a mode, true, %": "at most 0.10",
     "round trip, %": "at most 0.1",
@@ -96,13 +92,14 @@ def summary(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=10, help="campaigns")
-    parser.add_argument("--first", type=int, default=100, help="seed of the first campaign")
-    parser.add_argument("--draws", type=int, default=5, help="draws of the chain's noise")
-    parser.add_argument("--share", type=float, default=0.3, help="of the retrofit that is to be found")
-    parser.add_argument("--recipes", nargs="+", default=[DEFAULT], choices=list(RECIPES))
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        seeds=(10, "campaigns"),
+        first=(100, "seed of the first campaign"),
+        draws=(5, "draws of the chain's noise"),
+        share=(0.3, "of the retrofit that is to be found"),
+        recipes=([DEFAULT], None, list(RECIPES)),
+    )
     rows, gaps = {name: [] for name in options.recipes}, []
     for seed in range(options.first, options.first + options.seeds):
         records = Records.read(seed=seed)

@@ -7,16 +7,16 @@ own, as `load_affine` does it. Memory is the peak of that process less what it t
 which ten are allowed. Every matrix is compared with the one that was written.
 """
 
-import argparse
 import multiprocessing
 import tempfile
-import time
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import scipy.io
 import scipy.sparse
+from harness import arguments, peak_megabytes, shown, timed
 
 from skthermo._io._child import read
 from skthermo._io._matrix_files import form_of
@@ -104,15 +104,11 @@ TEXTS = {
 }
 
 
-def peak_bytes():
-    return 1024 * int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
-
-
 def measured(reader, file, pipe):
     """Send the seconds of the processor, the memory and the matrix of one reading."""
-    before, start = peak_bytes(), time.process_time()
-    found = reader(str(file))
-    seconds, memory = time.process_time() - start, peak_bytes() - before
+    before = peak_megabytes()
+    seconds, found = timed(lambda: reader(str(file)))
+    memory = 1e6 * (peak_megabytes() - before)
     found = next(iter(found.values())) if isinstance(found, dict) else found
     pipe.send((seconds, memory, getattr(found, "matrix", found)))
 
@@ -121,7 +117,7 @@ def ours(file):
     return read(file, form_of(Path(file)))
 
 
-def row(title, reader, file, matrix):
+def row(reader, file, matrix):
     """One line of the table, from a process of its own."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -131,28 +127,26 @@ def row(title, reader, file, matrix):
     process.join()
     error = abs(scipy.sparse.csc_array(found) - matrix).max() / abs(matrix).max()
     size = file.stat().st_size
-    print(f"{title:46s}{size / 1e6:8.0f}{seconds:8.2f}{memory / 1e6:8.0f}{memory / size:8.1f}{error:10.0e}", flush=True)
+    columns = ("file, MB", "processor, s", "peak, MB", "peak / file", "error")
+    return dict(zip(columns, (size / 1e6, seconds, memory / 1e6, memory / size, float(error)), strict=True))
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--dofs", type=int, default=10_000)
-    matrix = plate(parser.parse_args().dofs)
-    print(f"{matrix.shape[0]} degrees of freedom, {matrix.nnz} entries")
-    print(f"{'':46s}{'MB':>8s}{'CPU s':>8s}{'MB used':>8s}{'x file':>8s}{'error':>10s}")
+    matrix, rows = plate(arguments(__doc__, dofs=10_000).dofs), {}
     with tempfile.TemporaryDirectory() as folder:
         for title, (name, text) in TEXTS.items():
             file = Path(folder, name)
             file.write_text(text(matrix))
-            row(title, ours, file, matrix)
+            rows[title] = row(ours, file, matrix)
             file.unlink()
         file = Path(folder, "K.mtx")
         scipy.io.mmwrite(file, matrix, symmetry="symmetric")
-        row("Matrix Market, half", ours, file, matrix)
-        row("  scipy.io.mmread", scipy.io.mmread, file, matrix)
+        rows["Matrix Market, half"] = row(ours, file, matrix)
+        rows["the same by scipy.io.mmread"] = row(scipy.io.mmread, file, matrix)
         scipy.io.hb_write(file, matrix)
-        row("Harwell-Boeing, RUA", ours, file, matrix)
-        row("  scipy.io.hb_read", scipy.io.hb_read, file, matrix)
+        rows["Harwell-Boeing, RUA"] = row(ours, file, matrix)
+        rows["the same by scipy.io.hb_read"] = row(scipy.io.hb_read, file, matrix)
+    shown(f"Formats, {matrix.shape[0]} degrees of freedom, {matrix.nnz} entries", pd.DataFrame(rows).T, "3g")
 
 
 if __name__ == "__main__":

@@ -9,15 +9,13 @@ bearings. The matrices are written as a folder of .npz files, as an FE program w
 factorisation is compared with what the core gives: the rate of matrix products, and of a sum of long vectors.
 """
 
-import argparse
-import resource
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import scipy.sparse
+from harness import arguments, core_rates, peak_megabytes, timed
 
 from skthermo.fem import load_affine
 from skthermo.fem.modal import check_supported, count_modes
@@ -143,84 +141,58 @@ def records(model, n_days):
     return T, frequencies * (1 + 0.001 * random.standard_normal(frequencies.shape))
 
 
-def peak_megabytes():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-
-
-def timed(what, way):
-    """Run a way once; print its seconds of wall and processor, and the peak memory of the process so far."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    result = way()
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    print(f"{what:<44}{cpu:9.2f} s CPU{wall:9.2f} s{peak_megabytes():9.0f} MB", flush=True)
-    return result, cpu
-
-
-def roofline(seconds, flops, n_bytes):
-    """What a factorisation needs against what this core gives."""
-    a = np.random.default_rng(0).standard_normal((1500, 1500))
-    a @ a
-    gemm, stream = [], []
-    long = np.zeros(20_000_000)
-    for _ in range(5):
-        start = time.process_time()
-        a @ a
-        gemm.append(2 * 1500**3 / (time.process_time() - start))
-        start = time.process_time()
-        np.add(long, 1.0, out=long)
-        stream.append(16 * len(long) / (time.process_time() - start))
-    rate, bandwidth = max(gemm), max(stream)
-    print(
-        f"factorisation: {flops / 1e9:.2f} Gflop, {n_bytes / 1e6:.0f} MB of factors, {flops / seconds / 1e9:.1f} "
-        f"Gflop/s; matrix products give {rate / 1e9:.0f} Gflop/s and a stream {bandwidth / 1e9:.1f} GB/s: bound "
-        f"{max(flops / rate, n_bytes / bandwidth):.3f} s, measured {seconds:.3f} s"
-    )
+def step(what, way):
+    """Run a way once; print its seconds of the processor, and the peak memory of the process so far."""
+    seconds, result = timed(way)
+    print(f"{what:<44}{seconds:9.2f} s{peak_megabytes():9.0f} MB", flush=True)
+    return result
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kind", choices=list(KINDS), default="grid")
-    parser.add_argument("--dof", type=int, default=100_000)
-    parser.add_argument("--days", type=int, default=365, help="records of the chain; 0 leaves the chain out")
-    parser.add_argument("--solves", type=int, default=3, help="full solves whose time is measured")
-    parser.add_argument("--full-only", action="store_true", help="leave out the reduced model and the chain")
-    options = parser.parse_args()
-    print(f"{'':<44}{'':>15}{'wall':>9}  {'peak so far'}")
+    options = arguments(
+        __doc__,
+        kind=("grid", None, list(KINDS)),
+        dof=100_000,
+        days=(365, "records of the chain; 0 leaves the chain out"),
+        solves=(3, "full solves whose time is measured"),
+        full_only=(False, "leave out the reduced model and the chain"),
+    )
     with tempfile.TemporaryDirectory() as folder:
-        (terms, mass), _ = timed("generating the matrices", lambda: KINDS[options.kind](options.dof))
+        terms, mass = step("generating the matrices", lambda: KINDS[options.kind](options.dof))
         write(folder, terms, mass)
         entries = sum(matrix.nnz for matrix in terms.values())
         print(f"{options.kind} of {mass.shape[0]} degrees of freedom, {entries} entries of stiffness")
-        model, _ = timed("load_affine, with all checks", lambda: load_affine(folder))
+        model = step("load_affine, with all checks", lambda: load_affine(folder))
     print(model, model.frequencies(np.ones((1, 5)))[0].round(3))
     stiffness, mass = model.matrices(np.ones(5))
-    timed("check_supported alone", lambda: check_supported(stiffness))
-    timed("count_modes alone", lambda: count_modes(mass, at_least=6))
+    step("check_supported alone", lambda: check_supported(stiffness))
+    step("count_modes alone", lambda: count_modes(mass, at_least=6))
     theta = 1 + BOUNDS * np.random.default_rng(1).uniform(-1, 1, (options.solves, 5))
-    timed(f"frequencies of {options.solves} theta", lambda: model.frequencies(theta))
-    timed(f"Jacobians of {options.solves} theta", lambda: model.jacobian(theta))
-    roofline(*factorisation(model))
+    step(f"frequencies of {options.solves} theta", lambda: model.frequencies(theta))
+    step(f"Jacobians of {options.solves} theta", lambda: model.jacobian(theta))
+    seconds, flops, n_bytes = factorisation(model)
+    rate, bandwidth = core_rates()
+    print(
+        f"factorisation: {flops / 1e9:.2f} Gflop, {n_bytes / 1e6:.0f} MB of factors, {flops / seconds / 1e9:.1f} "
+        f"Gflop/s of {rate / 1e9:.0f}, bound {max(flops / rate, n_bytes / bandwidth):.3f} s, measured {seconds:.3f} s"
+    )
     if options.full_only:
         return
-    reduced, _ = timed("reduced(0.2)", lambda: model.reduced(BOUNDS, random_state=0))
+    reduced = step("reduced(0.2)", lambda: model.reduced(BOUNDS, random_state=0))
     print(f"{reduced.basis_size_} vectors, {len(reduced.snapshot_points_)} snapshots, error {reduced.error_:.1e}")
     if options.days:
         T, F = records(reduced, options.days)
         inverse = PosteriorInverse(noise=0.001)
         chain = DataInformedFEM(model, inverse=inverse, reduce=True, random_state=0)
-        timed(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
-        timed("predict", lambda: chain.predict(T))
+        step(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
+        step("predict", lambda: chain.predict(T))
 
 
 def factorisation(model):
     """Seconds, flops and bytes of one factorisation L L', the order of elimination left out."""
     matrix = model.matrices(np.ones(5))[0]
     elimination = model._core.stiffness.pattern.elimination
-    seconds = []
-    for _ in range(3):
-        start = time.process_time()
-        elimination.factorise(matrix)
-        seconds.append(time.process_time() - start)
+    seconds = [timed(lambda: elimination.factorise(matrix))[0] for _ in range(3)]
     return min(seconds[1:]), *work(elimination, matrix)
 
 

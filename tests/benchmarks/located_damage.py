@@ -3,7 +3,7 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/located_damage.py
 
 Some neighbouring members of a random group lose 20 to 50 % of their stiffness, in the truss (the thermo-mechanical
-truth, 1 % noise, 120 records) and in the cable-stayed footbridge of ``blind_bridge.py`` (60 days, .15 % noise). The
+truth, 1 % noise, 120 records) and in the cable-stayed footbridge (60 days, .15 % noise). The
 chains are fitted to a year of healthy records. Their FE model is right, or each member of the truth differs from it, by
 5 % of its stiffness (standard deviation), which no parameter can follow. Cases in which damage has a probability below
 one half are counted and left out.
@@ -15,14 +15,14 @@ members of the group; and the highest probability of damage in healthy records. 
 missed.
 """
 
-import argparse
 import sys
 import time
-import warnings
 
 import numpy as np
 import pandas as pd
-from blind_bridge import GROUPS, MODES, Bridge, footbridge
+from harness import arguments, is_missed
+from structures import FOOTBRIDGE_GROUPS, footbridge
+from structures import Footbridge as Measured
 
 from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
 from skthermo.fem import add_noise
@@ -53,12 +53,13 @@ class Truss:
 class Footbridge:
     """A year of daily means of the footbridge that trains, and two months of the next."""
 
-    name, groups, noise, modes, options = "footbridge", GROUPS, DAILY_NOISE, MODES, {"reduce": True}
+    name, groups, noise, options = "footbridge", FOOTBRIDGE_GROUPS, DAILY_NOISE, {"reduce": True}
+    modes = Measured.modes
 
     def __init__(self, seed):
-        bridge, self.structure = Bridge(seed), footbridge()
-        self.truth = self.structure.assemble(GROUPS, n_modes=len(MODES))
-        self.model = self.structure.assemble(GROUPS, n_modes=len(MODES), track=True)
+        bridge, self.structure = Measured(seed), footbridge()
+        self.truth = self.structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(self.modes))
+        self.model = self.structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(self.modes), track=True)
         T = bridge.T.resample("1D").mean()
         theta = pd.DataFrame(bridge.theta, bridge.T.index).resample("1D").mean().to_numpy()
         self.weather = tuple((T[rows], theta[rows]) for rows in (slice(0, 365), slice(365, 365 + N_DAYS)))
@@ -145,12 +146,13 @@ def summary(cases):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--structures", nargs="+", default=["truss", "footbridge"], choices=["truss", "footbridge"])
-    parser.add_argument("--seeds", type=int, default=2, help="chains of each structure and model")
-    parser.add_argument("--cases", type=int, default=15, help="of each chain")
-    parser.add_argument("--list", action="store_true", help="print every case")
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        structures=dict.fromkeys(["truss", "footbridge"]),
+        seeds=(2, "chains of each structure and model"),
+        cases=(15, "of each chain"),
+        list=(False, "print every case"),
+    )
     table, missed = {}, 0
     for kind in (Truss, Footbridge):
         if kind.name not in options.structures:
@@ -160,14 +162,12 @@ def main():
             bridge = kind(seed)
             for which, off in (("right", 0.0), ("5 % off", OFF)):
                 truth = Truth(bridge, off, seed)
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)
-                    fem = truth.chain(seed)
-                    whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
-                    healthy[which].append(whole.probability_of_damage)
-                    unseen = whole.found.separability.unobservable
-                    places = {g: where for g, where in whole.places.items() if g not in unseen}
-                    found[which].append(evaluated(truth, fem, places, seed, options.cases))
+                fem = truth.chain(seed)
+                whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
+                healthy[which].append(whole.probability_of_damage)
+                unseen = whole.found.separability.unobservable
+                places = {g: where for g, where in whole.places.items() if g not in unseen}
+                found[which].append(evaluated(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)
             if options.list:
@@ -176,8 +176,7 @@ def main():
     print(pd.DataFrame(table).T.round(1).to_string())
     for (name, which), row in table.items():
         least = 80 if which == "right" else 70  # of few cases: 90 % less two standard deviations
-        missed += row["held, %"] < least
-        print(f"{'met' if row['held, %'] >= least else 'MISSED':7} {name}, model {which}: held {row['held, %']:.0f} %")
+        missed += is_missed(f"{name}, model {which}: held, %", row["held, %"], f">= {least}")
     return 1 if missed else 0
 
 

@@ -6,11 +6,10 @@ Medians of several rounds in one run; the loops and the one-thread batch have on
 memory is what one call allocates beyond its input.
 """
 
-import argparse
 import os
 
 import scipy.linalg
-from measure import median_seconds, peak_megabytes
+from harness import arguments, median_seconds, peak_megabytes
 from threadpoolctl import threadpool_limits
 
 from skthermo.datasets import make_truss
@@ -26,10 +25,7 @@ def loop(model, theta, **options):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=10_000)
-    parser.add_argument("--rounds", type=int, default=5)
-    options = parser.parse_args()
+    options = arguments(__doc__, samples=10_000, rounds=5)
     model = make_truss()
     theta = sample(model, 0.2, options.samples, random_state=0).theta
     ways = {

@@ -7,26 +7,24 @@ Records of the truss on days spread over a year, as in ``examples/plot_accelerat
 (damping / (2 pi f duration))^(1/2). Seconds are those of the processor for one record.
 """
 
-import argparse
 import os
-import sys
-import time
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
+from harness import arguments, recipes, shown, timed
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.preprocessing import ModeTracker
 
 os.environ |= {"PYOMA_LOG_LEVEL": "ERROR", "TQDM_DISABLE": "1"}
-sys.path.append(str(Path(__file__).parents[2] / "examples"))
 
-from accelerations_recipes import DAMPING, RATE, ambient_vibration, modes_below
 from pyoma2.algorithms import SSI
 from pyoma2.algorithms.data.run_params import Clustering, Step1, Step2, Step3
 from pyoma2.setup import SingleSetup
 
+accelerations = recipes("accelerations")
+DAMPING, RATE = accelerations.DAMPING, accelerations.RATE
 SENSORS = np.linspace(0, 22, 8).astype(int)
 REFERENCES = [0, 3, 5, 7]
 SETTINGS = {
@@ -64,10 +62,7 @@ def poles(accelerations, *, order=None, quick=None, br=20, ref_ind=REFERENCES, m
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--records", type=int, default=12, help="for each setting (default 12)")
-    parser.add_argument("--settings", nargs="+", default=list(SETTINGS), choices=list(SETTINGS))
-    options = parser.parse_args()
+    options = arguments(__doc__, records=(12, "for each setting"), settings=SETTINGS)
 
     truss = make_truss()
     f, phi = truss.modes(np.ones((1, 4)))
@@ -78,12 +73,12 @@ def main():
         given = dict(SETTINGS[name])
         duration, spent, records = 60 * given.pop("minutes", 10), 0, []
         for day, theta in enumerate(year.theta.to_numpy()):
-            modes = modes_below(year.model, theta, RATE / 2)
+            modes = accelerations.modes_below(year.model, theta, RATE / 2)
             random = np.random.default_rng(day)
-            record = ambient_vibration(*modes, SENSORS, random, n_samples=int(duration * RATE))
-            start = time.process_time()
-            records.append(poles(record, **given))
-            spent += time.process_time() - start
+            record = accelerations.ambient_vibration(*modes, SENSORS, random, n_samples=int(duration * RATE))
+            seconds, found = timed(partial(poles, record, **given))
+            spent += seconds
+            records.append(found)
         found = tracker.transform(records)
         error = 100 * (found.frequencies / year.clean_frequencies.to_numpy() - 1)
         limit = 100 * np.sqrt(DAMPING / (2 * np.pi * f[0] * duration))
@@ -95,9 +90,9 @@ def main():
             "left over": found.left_over.mean(),
             "seconds": spent / options.records,
         }
-        print(pd.Series(rows[name], name=name).round(3).to_frame().T.to_string(), flush=True)
-    print("\nErrors in %, modes found in %, poles left over in each record (the seventh mode is one)")
-    print(pd.DataFrame(rows).T.round(3).to_string())
+        shown(
+            f"Errors in %, modes found in %, poles left over in a record; {len(rows)} settings", pd.DataFrame(rows).T, 3
+        )
 
 
 if __name__ == "__main__":

@@ -7,11 +7,10 @@ constant, so ``I_p`` is set to that. Its solve assembles the structure, as each 
 the terms of an assembled model.
 """
 
-import argparse
 from itertools import product
 
 import numpy as np
-from measure import median_seconds
+from harness import arguments, median_seconds
 
 from skthermo.fem import Beam, Structure
 
@@ -56,10 +55,7 @@ def theirs(nodes, members, feet):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--storeys", type=int, nargs="+", default=[3, 10, 30])
-    parser.add_argument("--rounds", type=int, default=3)
-    options = parser.parse_args()
+    options = arguments(__doc__, storeys=[3, 10, 30], rounds=3)
     theta = np.random.default_rng(0).uniform(0.7, 1.3, (20, 2))
     print("   dof   skthermo ms a solve   PyNiteFEA ms   ratio   largest difference of a frequency")
     for n_storeys in options.storeys:

@@ -1,4 +1,4 @@
-"""Share of right assignments of ModeTracker, on simulated poles whose modes are known, and its speed.
+"""Share of right assignments of ModeTracker, on simulated poles whose modes are known.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/mode_tracker.py
 
@@ -10,11 +10,8 @@ sums of those of all modes, or of the two nearest. Shape noise is complex, and r
 shape's components. The last lines are for modes of the FE model of Z24, which swap order in 28 % of the records.
 """
 
-import argparse
-import time
-import warnings
-
 import numpy as np
+import pandas as pd
 
 from skthermo.datasets import make_z24
 from skthermo.preprocessing import ModeTracker
@@ -93,39 +90,25 @@ def ways(records, reference, max_shift):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--records", type=int, default=10_000)
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")  # on modes that frequency alone does not distinguish
-    records, true, reference = simulated_poles(options.records)
-    for follow in (None, 200):
-        start = time.perf_counter()
-        tracked = ModeTracker(reference, follow=follow).fit_transform(records)
-        seconds = time.perf_counter() - start
-        share = right(tracked.poles, true)
-        print(f"{options.records} records, follow={follow}: {share:.2f} % right, {seconds:.2f} s")
-    print(tracked.summary.round(3))
-    n_some = max(options.records // 5, 1)
-    print(f"\n% right of {n_some} records, max_shift 0.15 / 0.08")
-    print("sensors  noise  spurious mix        shapes     frequency    sorting")
-    cases = [(n, noise, 8) for n in (12, 6, 4, 3) for noise in (0.05, 0.15, 0.3, 0.5)] + [(12, 0.15, 2), (6, 0.15, 2)]
-    for n_sensors, noise, mixes in cases:
-        records, true, reference = simulated_poles(n_some, n_sensors, noise, mixes=mixes, seed=1)
-        wide, narrow = (ways(records, reference, shift) for shift in (0.15, 0.08))
-        both = "   ".join(
-            f"{right(wide[way], true):5.2f} / {right(narrow[way], true):5.2f}" for way in ("shapes", "frequency")
-        )
-        print(f"{n_sensors:7d}  {noise:5.2f}  {mixes:5d} modes  {both}   {right(wide['sorting'], true):5.1f}")
-    records, true, reference = simulated_poles(n_some, 12, 0.5, seed=1)
+    from harness import arguments, shown  # which tests that import this do not have
+
+    n_records = arguments(__doc__, records=2000).records
+    cases, rows = [(n, noise, 8) for n in (12, 6, 4, 3) for noise in (0.05, 0.15, 0.3, 0.5)], {}
+    for n_sensors, noise, mixes in [*cases, (12, 0.15, 2), (6, 0.15, 2)]:
+        records, true, reference = simulated_poles(n_records, n_sensors, noise, mixes=mixes, seed=1)
+        for shift in (0.15, 0.08):
+            found = ways(records, reference, shift)
+            rows[n_sensors, noise, mixes, shift] = {way: right(poles, true) for way, poles in found.items()}
+    table = pd.DataFrame(rows).T.rename_axis(["sensors", "shape noise", "modes mixed", "max_shift"])
+    shown(f"Right poles, % of the modes of {n_records} records", table, 1)
+    records, true, reference = simulated_poles(n_records, 12, 0.5, seed=1)
     tracked = ModeTracker(reference, min_mac=0.6).fit_transform(records)
     print(f"12 sensors, noise 0.5, min_mac=0.6: {right(tracked.poles, true):.2f} % right")
     for n_sensors in (16, 5):
-        records, true, reference = z24_poles(min(n_some, 400), n_sensors, 0.2)
-        shares = [right(ModeTracker(reference, max_shift=s).fit_transform(records).poles, true) for s in (0.15, 0.25)]
-        print(
-            f"Z24, stiffnesses within 30 %, {n_sensors} sensors, noise 0.2: {shares[0]:.2f} / {shares[1]:.2f} % right "
-            f"(max_shift 0.15 / 0.25), sorting {right(by_sorting(records, 4), true):.1f} %"
-        )
+        records, true, reference = z24_poles(min(n_records, 400), n_sensors, 0.2)
+        rows = {s: right(ModeTracker(reference, max_shift=s).fit_transform(records).poles, true) for s in (0.15, 0.25)}
+        rows["sorting"] = right(by_sorting(records, 4), true)
+        shown(f"Z24, {n_sensors} sensors, stiffnesses within 30 %: right by max_shift, %", pd.Series(rows), 1)
 
 
 if __name__ == "__main__":

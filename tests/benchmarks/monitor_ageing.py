@@ -13,16 +13,15 @@ month and four months later, in percent of the damage (its own rate gives 0.7 an
 all days, which gives the follower the states of one day after the other. The exit code is 1 if a target is missed.
 """
 
-import argparse
 import sys
-import warnings
 
 import numpy as np
 import pandas as pd
-from ageing_bridges import BRIDGES
+from harness import arguments, compensated, split
 from sklearn.pipeline import make_pipeline
+from structures import AGEING
 
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import WindowedAlarm
 from skthermo.monitoring import Monitor
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.preprocessing import LagFeatures
@@ -38,7 +37,7 @@ def detector(bridge, modes):
     lines = TemperatureMapper()
     regressor = lines if bridge.name == "truss" else make_pipeline(LagFeatures([0, 6, 24], freq="1h"), lines)
     window = "7D" if bridge.name == "truss" else "1D"
-    return make_pipeline(TemperatureCompensator(regressor, targets=modes, whiten="global"), WindowedAlarm(window))
+    return compensated(modes, WindowedAlarm(window), regressor, whiten="global")
 
 
 def followed(follower, T, F, n_first):
@@ -82,7 +81,8 @@ def run(bridge, seed, correlation):
     group, rows = bridge.groups[seed % len(bridge.groups)], []
     for rate in RATES:
         drift = {group: rate}
-        T, F, n_first = bridge.records(bridge.campaign(YEARS, seed, correlation, drift=drift))
+        records, n_first = bridge.campaign(YEARS, seed, correlation, drift=drift)
+        T, F = split(records)
         fem = bridge.chain().fit(T[:n_first], F[:n_first])
         follower = DriftFollower.of(fem, T[:n_first], F[:n_first])
 
@@ -98,9 +98,8 @@ def run(bridge, seed, correlation):
         if not rate:
             continue
         onset = F.index[0] + pd.Timedelta(days=round(365.25 * (YEARS - 1 + AFTER)))
-        T, damaged, _ = bridge.records(
-            bridge.campaign(YEARS, seed, correlation, drift=drift, damage={group: DAMAGE}, damage_from=onset)
-        )
+        changes = {"drift": drift, "damage": {group: DAMAGE}, "damage_from": onset}
+        T, damaged = split(bridge.campaign(YEARS, seed, correlation, **changes)[0])
         corrected, with_damage = followed(follower, T, damaged, n_first)
         _, events = evaluated(monitor_of, T, pd.concat([F[:n_first], corrected]), n_first)
         waited = (events["start"] - onset)[events["start"] >= onset].min()
@@ -131,16 +130,16 @@ def misses(table):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bridges", nargs="+", choices=list(BRIDGES), default=["truss"])
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--correlation", type=float, default=0.0, help="of the noise of neighbouring records")
-    parser.add_argument("--each", action="store_true", help="print every run")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
+    options = arguments(
+        __doc__,
+        bridges=(["truss"], None, list(AGEING)),
+        seeds=20,
+        correlation=(0.0, "of the noise of neighbouring records"),
+        each=(False, "print every run"),
+    )
     rows = []
     for name in options.bridges:
-        bridge = BRIDGES[name]()
+        bridge = AGEING[name]()
         for seed in range(options.seeds):
             rows += run(bridge, seed, options.correlation)
             if options.each:

@@ -11,27 +11,24 @@ measured daily medians of one mode, where ``SKTHERMO_DATA`` names their folder. 
 missed.
 """
 
-import argparse
-import os
 import sys
-import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
+from harness import DATA, arguments, compensated, joined, modes_of
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._records import Memory
 from skthermo.monitoring._retraining import begun_again, retrained
 from skthermo.preprocessing import HingeFeatures
-from skthermo.surrogate import TemperatureMapper
 
 ASKED = 0.02  # share of healthy records above the threshold
 DAYS = (3, 7, 14, 30, 60, 90)
@@ -86,21 +83,19 @@ def in_service(detector, baseline, kept, targets):
     )
 
 
-def joined(campaign):
+def stamped(campaign):
     """Records on stamps in nanoseconds, as a monitor keeps them."""
-    records = campaign.temperatures.join(campaign.frequencies)
+    records = joined(campaign)
     return records.set_axis(records.index.as_unit("ns"))
 
 
 def lines(targets):
-    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=targets), MahalanobisDetector(ASKED))
+    return compensated(targets, MahalanobisDetector(ASKED))
 
 
 def above(detector, threshold, records):
     """Share of records above a threshold, in percent."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of weather that half a year does not have
-        index = -np.asarray(detector.score_samples(records[list(detector.feature_names_in_)]))
+    index = -np.asarray(detector.score_samples(records[list(detector.feature_names_in_)]))
     return 100 * float((index > threshold)[~np.isnan(index)].mean())
 
 
@@ -109,15 +104,15 @@ def refit(seeds):
     rows = []
     for seed in range(seeds):
         settings = {"n_years": 2, "random_state": seed}
-        healthy = joined(make_truss_campaign(**settings))
+        healthy = stamped(make_truss_campaign(**settings))
         onset = healthy.index[240]
         kinds = {
             "healthy": healthy,
-            "5 % sudden": joined(make_truss_campaign(**settings, damage={"bottom": 0.05}, damage_from=onset)),
-            "10 % sudden": joined(make_truss_campaign(**settings, damage=DAMAGE, damage_from=onset)),
-            "10 % a year": joined(make_truss_campaign(**settings, drift=DAMAGE)),
+            "5 % sudden": stamped(make_truss_campaign(**settings, damage={"bottom": 0.05}, damage_from=onset)),
+            "10 % sudden": stamped(make_truss_campaign(**settings, damage=DAMAGE, damage_from=onset)),
+            "10 % a year": stamped(make_truss_campaign(**settings, drift=DAMAGE)),
         }
-        later = joined(make_truss_campaign(**settings, damage=DAMAGE))[365:]
+        later = stamped(make_truss_campaign(**settings, damage=DAMAGE))[365:]
         targets = list(make_truss_campaign(n_years=1, samples_per_year=20, random_state=0).frequencies)
         for kind, records in kinds.items():
             monitor = in_service(lines(targets), records[:182], records[182:365], targets)
@@ -145,10 +140,8 @@ def refit(seeds):
 
 def shifted_only(monitor, own, targets):
     """The old detector on frequencies moved by the mean of what its regression leaves of the new days."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        compensator = clone(monitor.detector_[0]).set_params(whiten=None).fit(monitor.trained_)
-        left = pd.DataFrame(np.asarray(compensator.transform(own)), own.index, targets)  # in Hz
+    compensator = clone(monitor.detector_[0]).set_params(whiten=None).fit(monitor.trained_)
+    left = pd.DataFrame(np.asarray(compensator.transform(own)), own.index, targets)  # in Hz
 
     def moved(records):
         return records.assign(**{name: records[name] - left[name].mean() for name in targets})
@@ -170,9 +163,7 @@ def after_intervention(detector, before, after, damaged, targets, days=DAYS):
             row["false: prior"] = above(found.detector, threshold, healthy)
             row["found: prior"] = above(found.detector, threshold, bad)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                alone = clone(detector).fit(own)
+            alone = clone(detector).fit(own)
             level = limit(alone)
             row["false: alone"], row["found: alone"] = above(alone, level, healthy), above(alone, level, bad)
         except ValueError:
@@ -199,10 +190,10 @@ def truss(seeds):
     tables = []
     for seed in range(seeds):
         settings = {"n_years": 2, "random_state": seed}
-        before = joined(make_truss_campaign(**settings))[:365]
-        after = joined(make_truss_campaign(**settings, damage={"diagonal": -0.1}))[365:]
-        damaged = joined(make_truss_campaign(**settings, damage={"diagonal": -0.1} | DAMAGE))[365:]
-        targets = [name for name in before if name.startswith("f")]
+        before = stamped(make_truss_campaign(**settings))[:365]
+        after = stamped(make_truss_campaign(**settings, damage={"diagonal": -0.1}))[365:]
+        damaged = stamped(make_truss_campaign(**settings, damage={"diagonal": -0.1} | DAMAGE))[365:]
+        targets = modes_of(before)
         tables.append(after_intervention(lines(targets), before, after, damaged, targets))
     mean = printed("The truss, diagonals strengthened by 10 %, then 10 % damage of the bottom chord", tables)
     return int((mean["false: prior"] > 100 * 1.5 * ASKED).sum())
@@ -214,8 +205,8 @@ def kw51(seeds):
     for seed in range(seeds):
         healthy = make_kw51_campaign(random_state=seed)
         bad = make_kw51_campaign(random_state=seed, damage={"pipes": 0.1}, damage_from="2019-09-28")
-        daily, damaged = (joined(one).resample("1D").mean() for one in (healthy, bad))
-        targets = [name for name in daily if name.startswith("f")]
+        daily, damaged = (stamped(one).resample("1D").mean() for one in (healthy, bad))
+        targets = modes_of(daily)
         before = daily["2018-11-22":"2019-05-14"]
         after, damaged = daily["2019-09-28":], damaged["2019-09-28":]
         tables.append(after_intervention(lines(targets), before, after, damaged, targets, [n for n in DAYS if n <= 60]))
@@ -225,17 +216,14 @@ def kw51(seeds):
 
 def real(seeds):
     """KW51's measured mode 6, daily medians, over its retrofit."""
-    path = Path(os.environ.get("SKTHERMO_DATA", "")) / "kw51" / "kw51_mode6_daily.csv"
+    path = (DATA or Path()) / "kw51" / "kw51_mode6_daily.csv"
     if not path.exists():
         print(f"KW51, measured: {path} is not there\n")
         return 0
     daily = pd.read_csv(path, index_col=0, parse_dates=True).dropna()
     daily.index = daily.index.as_unit("ns")
     before, after = daily[:"2019-05-14"], daily["2019-09-28":]
-    detector = make_pipeline(
-        TemperatureCompensator(make_pipeline(HingeFeatures(), LinearRegression()), targets=["f"]),
-        MahalanobisDetector(ASKED),
-    )
+    detector = compensated(["f"], MahalanobisDetector(ASKED), make_pipeline(HingeFeatures(), LinearRegression()))
     damaged = after.assign(f=after["f"] * (1 - 0.01))
     table = after_intervention(detector, before, after, damaged, ["f"])
     printed("KW51, measured, mode 6; found: a loss of 1 % of the frequency", [table])
@@ -246,10 +234,7 @@ PARTS = {"refit": refit, "truss": truss, "kw51": kw51, "real": real}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="*", default=[*PARTS], choices=[*PARTS])
-    parser.add_argument("--seeds", type=int, default=10)
-    options = parser.parse_args()
+    options = arguments(__doc__, only=PARTS, seeds=10)
     missed = [PARTS[part](options.seeds) for part in options.only]
     return 1 if any(missed) else 0
 

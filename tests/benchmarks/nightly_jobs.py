@@ -9,7 +9,6 @@ failed sensors and transitions are compared with those of a monitor that sees al
 memory of a nightly call in a process of its own are measured.
 """
 
-import argparse
 import contextlib
 import io
 import json
@@ -27,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from harness import arguments, joined
 
 from skthermo.commands.main import main as skthermo
 from skthermo.datasets import make_truss_campaign
@@ -51,7 +51,7 @@ def records_of(seed):
     damage = DAMAGES[seed % len(DAMAGES)]
     options |= {"damage": damage, "damage_from": "2026-08-01"} if damage else {}
     campaign = make_truss_campaign(2, **options)
-    records = campaign.temperatures.join(campaign.frequencies)
+    records = joined(campaign)
     if seed % 2 == 0:
         records.loc["2026-05-01":"2026-05-20", "T2"] = np.nan
     return records
@@ -151,10 +151,7 @@ def cost(settings, now):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--nights", type=int, default=365)
-    parser.add_argument("--bridges", type=int, default=5)
-    options = parser.parse_args()
+    options = arguments(__doc__, nights=365, bridges=5)
     random, counts, codes, missed = np.random.default_rng(0), Counter(), Counter(), 0
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
@@ -162,8 +159,8 @@ def main():
         for seed in range(options.bridges):
             records, name = records_of(seed), f"bridge{seed}"
             records[:"2025"].to_csv("all.csv")
-            for arguments in (("init", "all.csv", "--into", name), ("fit", f"{name}/monitor.toml")):
-                code, text = command(*arguments)
+            for words in (("init", "all.csv", "--into", name), ("fit", f"{name}/monitor.toml")):
+                code, text = command(*words)
                 assert code == 0, text
             settings = Path(name) / "monitor.toml"
             text = settings.read_text()
@@ -173,12 +170,12 @@ def main():
         days = pd.date_range("2026-01-01", periods=options.nights)
         for number, day in enumerate([*days, *(days[-1] + pd.to_timedelta(range(1, 8), "D"))]):
             for name, feed in bridges.items():
-                arguments = ("update", Path(name) / "monitor.toml", "--now", f"{day:%Y-%m-%d} 23:59")
+                words = ("update", Path(name) / "monitor.toml", "--now", f"{day:%Y-%m-%d} 23:59")
                 fault = feed.night(number, day if number < options.nights else None)
                 if fault in (KILLED, FULL):
-                    disturbed(fault, int(random.integers(0, 5)), arguments)
+                    disturbed(fault, int(random.integers(0, 5)), words)
                 else:
-                    code, _ = command(*arguments)
+                    code, _ = command(*words)
                     codes[code] += 1
         print(f"{options.nights} nights of {options.bridges} bridges; faults: {dict(counts)}")
         print(f"exit codes of calls that were not disturbed: {dict(sorted(codes.items()))}")

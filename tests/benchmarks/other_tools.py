@@ -9,13 +9,12 @@ year, beside `predict_interval`; SMT's Kriging beside scikit-learn's Gaussian pr
 refining. What is not installed is left out.
 """
 
-import argparse
 import importlib
 import time
-import warnings
 
 import numpy as np
 import pandas as pd
+from harness import arguments, joined
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.compose import make_column_transformer
 from sklearn.ensemble import IsolationForest
@@ -68,7 +67,7 @@ class Kriging(RegressorMixin, BaseEstimator):
 def records(seed, **damage):
     """A year of temperatures and frequencies side by side."""
     year = make_truss_campaign(damage=damage or None, random_state=seed)
-    return year.temperatures.join(year.frequencies), list(year.frequencies)
+    return joined(year), list(year.frequencies)
 
 
 def detectors(seed):
@@ -133,10 +132,7 @@ def surrogates(seed):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=10)
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore")  # of optimisers that stop early
+    options = arguments(__doc__, seeds=10)
     for compare in (detectors, intervals, surrogates):
         print(compare.__doc__)
         try:

@@ -10,26 +10,18 @@ of the baseline and assumed damage. The own kind's advantage is the change of it
 chain, less that of other kinds of compensators there.
 """
 
-import argparse
-import os
-import sys
-import warnings
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
+from harness import DATA, arguments, compensated, recipes
 from sklearn.ensemble import GradientBoostingRegressor
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neural_network import MLPRegressor
-from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
-sys.path.append(str(Path(__file__).parents[2] / "examples"))
-from detector_recipes import field_detectors
+field_detectors = recipes("detector").field_detectors
 
 NOISE = 0.01
 RAW = ("raw, Mahalanobis", "raw, 20 neighbours")
@@ -50,11 +42,8 @@ def detectors_of(targets, chains, whiten, block=None):
     """Detectors that learn the baseline, by name."""
     estimators = kinds() | {f"chain, {name}": chain for name, chain in chains.items()}
     raw = field_detectors(targets, block=block)
-    compensated = {
-        name: make_pipeline(TemperatureCompensator(one, targets=targets, whiten=whiten), MahalanobisDetector())
-        for name, one in estimators.items()
-    }
-    return {name: raw[name] for name in RAW} | compensated
+    residuals = {name: compensated(targets, regressor=one, whiten=whiten) for name, one in estimators.items()}
+    return {name: raw[name] for name in RAW} | residuals
 
 
 def truss_case(seed):
@@ -79,7 +68,7 @@ def z24_case(seed):
     """The same with measured records, of which there is one repeat."""
     import z24_recipes
 
-    bridge = z24_recipes.Bridge(z24_recipes.find(Path(os.environ["SKTHERMO_DATA"])))
+    bridge = z24_recipes.Bridge(z24_recipes.find(DATA))
     records, model = z24_recipes.Records.of(bridge), z24_recipes.bridge_model()
     chains = {name: z24_recipes.chain(model).set_params(mapper=mapper) for name, mapper in kinds().items()}
     measured = {"healthy": records.later, "damaged": records.damaged}
@@ -146,12 +135,7 @@ BRIDGES = {"truss": truss_case, "Z24": z24_case}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=10, help="of the truss; Z24 has one baseline")
-    parser.add_argument("--repeats", type=int, default=10)
-    parser.add_argument("--bridges", nargs="*", default=["truss"], choices=BRIDGES)
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", category=UserWarning)
+    options = arguments(__doc__, seeds=(10, "of the truss"), repeats=10, bridges=(["truss"], None, list(BRIDGES)))
     for bridge in options.bridges:
         seeds = range(options.seeds if bridge == "truss" else 1)
         tables = [by_measure(alarms(BRIDGES[bridge], seed, options.repeats)) for seed in seeds]

@@ -1,7 +1,6 @@
 """Stiffness followed over four years in which one group loses some of it, by `track_parameters` and by simpler ways.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py
-    OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py --bridges KW51 --seeds 4
     OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py --quiet --ways tracked filtered --rates 0.01 0.04
 
 Groups take turns over the seeds. A chain learns from the first year; then all four years are followed. The simpler
@@ -19,19 +18,18 @@ ways, and the filter of a monitor, which knows at each day only what came before
 Printed are, in percent: drifts found; right groups named first, by themselves or in a set that cannot be distinguished;
 end values within two standard errors, of the group that drifts and of all; end values whose error is below half a
 percent of the stiffness; days on which the band of 95 % holds the truth, over all groups; twice the standard error and
-the error of the end value of the group that drifts. With ``--quiet`` the drift begins after the first year (truss). The
+the error of the end value of the group that drifts. With ``--quiet`` the drift begins after the first year. The
 exit code is 1 if `track_parameters` misses a target; there are none with ``--quiet``.
 """
 
-import argparse
 import sys
 import time
-import warnings
 
 import numpy as np
 import pandas as pd
-from ageing_bridges import BRIDGES
+from harness import arguments, split
 from scipy import stats
+from structures import AGEING
 
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import track_parameters
@@ -79,11 +77,9 @@ def filtered(fem, T, F):
 
 
 def parameters_apart(fem, T, F):
-    """M1's parameters less M2's. A group is the parameter that bears its name or, in KW51's model, its modulus."""
+    """M1's parameters less M2's; a group is the parameter that bears its name."""
     apart = np.log(fem.estimate_parameters(F)) - np.log(fem.predict_parameters(T))
     daily = apart.groupby(apart.index.floor("D")).mean().dropna()
-    short = {"E_bot": "bottom", "E_arc": "arch", "E_br": "braces", "E_con": "connections", "E_pip": "pipes"}
-    daily = daily.rename(columns=short)
     usual = daily.rolling(f"{SMOOTHED}D", min_periods=10)
     estimates, errors = usual.mean(), usual.std() / np.sqrt(usual.count())
     year = daily.index < daily.index[0] + pd.Timedelta(days=365)
@@ -144,12 +140,10 @@ def run(bridge, rate, seed, options):
     """All ways on one campaign."""
     group = bridge.groups[seed % len(bridge.groups)]
     changes = {"correlation": options.correlation, "drift": {group: rate}}
-    if options.quiet:
-        T, F, n_first = bridge.quiet_first(YEARS, seed, **changes)
-    else:
-        T, F, n_first = bridge.records(bridge.campaign(YEARS, seed, **changes))
+    records, n_first = (bridge.quiet_first if options.quiet else bridge.campaign)(YEARS, seed, **changes)
+    T, F = split(records)
     begin = F.index[n_first if options.quiet else 0]
-    fem = bridge.chain(options.wrong).fit(T[:n_first], F[:n_first])
+    fem = bridge.chain().fit(T[:n_first], F[:n_first])
     rows = []
     for name in options.ways:
         start = time.perf_counter()
@@ -175,27 +169,21 @@ def misses(table):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bridges", nargs="+", choices=list(BRIDGES), default=["truss"])
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--rates", type=float, nargs="+", default=[0.0, 0.005, 0.01, 0.02], help="lost a year")
-    parser.add_argument("--ways", nargs="+", choices=WAYS, default=[way for way in WAYS if way != "filtered"])
-    parser.add_argument("--correlation", type=float, default=0.0, help="of the noise of neighbouring records")
-    parser.add_argument("--wrong", action="store_true", help="a model whose stiffnesses are 5 %% off")
-    parser.add_argument("--quiet", action="store_true", help="the drift begins after the first year; truss only")
-    parser.add_argument("--each", action="store_true", help="print every run")
-    options = parser.parse_args()
-    if options.quiet and options.bridges != ["truss"]:
-        parser.error("--quiet is for the truss only")
-    warnings.simplefilter("ignore")
+    options = arguments(
+        __doc__,
+        seeds=20,
+        rates=([0.0, 0.005, 0.01, 0.02], "lost a year"),
+        ways=([way for way in WAYS if way != "filtered"], None, list(WAYS)),
+        correlation=(0.0, "of the noise of neighbouring records"),
+        quiet=(False, "the drift begins after the first year"),
+        each=(False, "print every run"),
+    )
     rows = []
-    for name in options.bridges:
-        bridge = BRIDGES[name]()
-        for rate in options.rates:
-            for seed in range(options.seeds):
-                rows += run(bridge, rate, seed, options)
-                if options.each:
-                    print(rows[-len(options.ways)], flush=True)
+    for rate in options.rates:
+        for seed in range(options.seeds):
+            rows += run(AGEING["truss"](), rate, seed, options)
+            if options.each:
+                print(rows[-len(options.ways)], flush=True)
     table = pd.DataFrame(rows)
     figures = table.drop(columns=["group", "seed"]).copy()
     for what in ("found", "right group", "end within 2 errors", "all ends", "error small", "in band"):
@@ -203,8 +191,7 @@ def main():
     figures["rms error, %"] = figures.pop("error, %") ** 2
     means = figures.groupby(["bridge", "way", "rate, %"], sort=False).mean()
     means["rms error, %"] **= 0.5
-    model = ", wrong model" if options.wrong else ""
-    model += ", drift begins after a year" if options.quiet else ""
+    model = ", drift begins after a year" if options.quiet else ""
     print(f"\n{options.seeds} seeds, noise correlated by {options.correlation}{model}; in percent\n")
     print(means.round(2).to_string())
     missed = [] if options.quiet else list(misses(table))

@@ -2,8 +2,6 @@
 
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/plain_call.py
     OMP_NUM_THREADS=1 python tests/benchmarks/plain_call.py --structures truss bridges --first-seed 100
-    OMP_NUM_THREADS=1 python tests/benchmarks/plain_call.py --raw
-    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/plain_call.py --times
 
 Mean errors of frequencies without noise in a later year, healthy and damaged, in percent; of the tower and of Z24,
 errors of measured frequencies that were held out. Variants:
@@ -16,48 +14,30 @@ updated      with the FE model updated to the mean frequencies before
 no delta     with ``discrepancy=None``: the paper's chain
 regression   of frequencies on temperatures, times the nominal model's frequencies, damaged over healthy
 
-Errors are those of the records that all variants of a case can predict. ``--raw`` compares fits to records with gaps
-and 0.5 % outliers, to the same records cleaned by `HampelFilter`, and to the same records without outliers. ``--times``
-gives the seconds of plain calls for three large models.
+Errors are those of the records that all variants of a case can predict.
 """
 
-import argparse
 import contextlib
 import io
-import os
-import signal
 import sys
-import time
-import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from harness import DATA, EXAMPLES, KW51_NOISE, arguments, shown, timed, z24_records
 from scipy.signal import lfilter
 from sklearn.model_selection import PredefinedSplit, cross_val_predict
 from sklearn.pipeline import make_pipeline
-from slow_soil import DAMAGES, slow_soil
-from works import building_frame, frame_records, processor_seconds
+from structures import SOIL_DAMAGES, slow_soil
 
-from skthermo.datasets import (
-    load_z24,
-    make_fleet,
-    make_kw51,
-    make_kw51_campaign,
-    make_truss,
-    make_truss_campaign,
-    make_z24,
-)
+from skthermo.datasets import make_fleet, make_kw51, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
 from skthermo.fem import Beam, Spring, Structure
 from skthermo.metrics import mape
-from skthermo.preprocessing import BiasAligner, HampelFilter, LagFeatures
+from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-DATA = Path(os.environ["SKTHERMO_DATA"]) if "SKTHERMO_DATA" in os.environ else None
 SEVERITY, HALF = 0.2, 0.5
 LARGE = 100  # degrees of freedom from which on the guide asks for reduced models
 KW51_START, KW51_GROUPS = 1236, ("arch_connections", "deck_connections", "ballast", "pipes")
@@ -65,39 +45,17 @@ KW51_START, KW51_GROUPS = 1236, ("arch_connections", "deck_connections", "ballas
 
 @dataclass
 class Case:
-    """Records to learn from, and the true frequencies of later states.
+    """Records to learn from, and damage and true frequencies of later states by name."""
 
-    Attributes
-    ----------
-    table : str
-        Structure and training, over which errors are averaged.
-    name : str
-        Of this case in the table.
-    model : FE model
-        The user's.
-    T : DataFrame
-        Temperatures of all records, to learn from and later.
-    F : DataFrame
-        Frequencies to learn from.
-    states : dict
-        Damage and frequencies to predict, by name.
-    noise : float or array, optional
-        True relative standard deviation of the noise.
-    lags : LagFeatures, optional
-        Lags for the mapper.
-    means : str, optional
-        Duration of rolling means of the temperatures.
-    """
-
-    table: str
+    table: str  # over which errors are averaged
     name: str
     model: object
-    T: pd.DataFrame
-    F: pd.DataFrame
+    T: pd.DataFrame  # of all records, to learn from and later
+    F: pd.DataFrame  # to learn from
     states: dict
     noise: object = None
     lags: LagFeatures | None = None
-    means: str | None = None
+    means: str | None = None  # duration of rolling means of the temperatures
     computed: dict = field(default_factory=dict)
 
     @property
@@ -207,7 +165,7 @@ VARIANTS = {
     "regression, ratio at theta": (regression, {"at_theta": True}),
     "regression, ratio at theta, memory": (regression, {"at_theta": True, "memory": True}),
 }
-QUICK, RAW = ("plain", "auto", "auto, memory", "regression"), ("plain", "auto")
+QUICK = ("plain", "auto", "auto, memory", "regression")
 
 
 def is_for(case, options):
@@ -274,9 +232,7 @@ def replaced_arguments(*arguments):
 
 
 def z24(options):
-    data = load_z24(DATA / "z24" / "z24_monitoring.csv")
-    healthy = (data.state == "undamaged").to_numpy()
-    T, F = data.temperatures[healthy], data.frequencies[healthy]
+    (T, F), _ = z24_records()
     for label, share in (("four fifths", 0.8), ("60 %", 0.6))[: 1 if options.quick else None]:
         n = int(share * len(T))
         yield Case(f"Z24, trained on {label}", "Z24", make_z24(), T, F[:n], {"healthy": ({}, F[n:])})
@@ -297,7 +253,7 @@ def kw51(options):
             for name, damage in damages.items()
         }
         T, F = campaign.temperatures[first:], campaign.frequencies[first : first + n_train]
-        noise = np.array([0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015])
+        noise = np.array(KW51_NOISE)
         yield Case("KW51, a year of hours", f"seed {seed}", make_kw51(), T, F, states, noise=noise)
 
 
@@ -308,7 +264,7 @@ def girder(options):
         records = slow_soil(seed, **known)
         start = records.frequencies.index[-1].floor("D") + pd.Timedelta("1D")
         days = 90 if options.quick else 365
-        damages = {"healthy": {}} | {f"{group} 20 %": {group: s} for one in DAMAGES for group, s in one.items()}
+        damages = {"healthy": {}} | {f"{group} 20 %": {group: s} for one in SOIL_DAMAGES for group, s in one.items()}
         later = {name: slow_soil(seed, start, days, damage=damage) for name, damage in damages.items()}
         week = np.arange(len(later["healthy"].temperatures)) // (7 * 12)
         states = {name: (damages[name], year.clean_frequencies[week % 4 == 0]) for name, year in later.items()}
@@ -377,45 +333,20 @@ def seeds(options, n):
     return range(options.first_seed, options.first_seed + n)
 
 
-class TooLong(BaseException):
-    """A fit with its predictions that takes more than it may."""
-
-
-@contextlib.contextmanager
-def processor_limit(seconds):
-    """Stop what takes more processor seconds, on systems that have such alarms."""
-
-    def stop(number, frame):
-        raise TooLong
-
-    signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-
-
-def evaluated(case, names, minutes):
-    """Rows of errors by variant and state, over what all of them predict; NaN where one was stopped."""
+def evaluated(case, names):
+    """Rows of errors by variant and state, over what all of them predict."""
     found, seconds = {}, {}
     for name in names:
         predict, options = VARIANTS[name]
         if is_for(case, options):
-            begun = processor_seconds()
-            try:
-                with processor_limit(60 * minutes):
-                    found[name] = predict(case, **options)
-            except TooLong:
-                print(f"{case.table}, {case.name}: {name} took more than {minutes:g} processor minutes", flush=True)
-            seconds[name] = processor_seconds() - begun
+            seconds[name], found[name] = timed(partial(predict, case, **options))
     rows = []
     for state, (_, truth) in case.states.items():
         known = np.logical_and.reduce([truth.notna(), *(~np.isnan(values[state]) for values in found.values())])
         kind = "healthy" if state == "healthy" else "damaged"
         shared = {"table": case.table, "case": case.name, "state": kind, "predicted": known.mean()}
         for name, spent in seconds.items():
-            error = mape(truth.where(known), found[name][state]).mean() if name in found else np.nan
+            error = mape(truth.where(known), found[name][state]).mean()
             rows.append(shared | {"variant": name, "error": error, "seconds": spent})
     return rows
 
@@ -459,10 +390,6 @@ def summary_of(rows):
     return pd.DataFrame(found).T
 
 
-def shown(title, frame):
-    print(f"{title}\n{frame.to_string(float_format='{:.3f}'.format)}\n", flush=True)
-
-
 def compare(options):
     """Tables of all structures, and their summary."""
     rows = []
@@ -470,107 +397,29 @@ def compare(options):
         if structure in REAL and DATA is None:
             print(f"{structure} is left out: SKTHERMO_DATA is not set\n")
             continue
-        found = [
-            row for case in STRUCTURES[structure](options) for row in evaluated(case, options.variants, options.minutes)
-        ]
+        found = [row for case in STRUCTURES[structure](options) for row in evaluated(case, options.variants)]
         for table, part in pd.DataFrame(found).groupby("table", sort=False):
             n_cases, share = part["case"].nunique(), 100 * part["predicted"].mean()
-            shown(f"{table} ({n_cases} cases, {share:.0f} % of the records): mean error, %", table_of(part))
+            shown(f"{table} ({n_cases} cases, {share:.0f} % of the records): mean error, %", table_of(part), 3)
         rows += found
     summary = summary_of(pd.DataFrame(rows))
     if len(summary):
-        shown("Plain call and best settings: mean error, %", summary)
+        shown("Plain call and best settings: mean error, %", summary.infer_objects(), 3)
         better = summary[["best", "regression"]].astype(float).min(axis=1)
         close = summary["plain"].astype(float) <= 1.05 * better
         print(f"plain within 5 % of the better of settings and regression in {close.sum()} of {len(close)} rows")
 
 
-def with_outliers(F, clean, noise, seed):
-    """Records with 10 % gaps, and the same with 0.5 % outliers of ten times the noise."""
-    random = np.random.default_rng(seed)
-    sound = F.mask(random.random(F.shape) < 0.1)
-    is_wrong = random.random(F.shape) < 0.005
-    return sound, sound + np.where(is_wrong, 10 * noise * random.choice([-1, 1], F.shape), 0.0) * clean
-
-
-def raw_cases(options):
-    """Cases with the frequencies to learn from, without and with outliers."""
-    for case in truss(options):
-        yield case, *with_outliers(case.F, case.F, case.noise, options.first_seed)
-    fleet = make_fleet(options.bridges, random_state=options.first_seed)
-    for case in bridges(options):
-        if fleet[case.name].kind == "girder" and case.table.endswith("a year"):
-            known = [fleet[case.name].records(365, gaps=0.1, outliers=share).frequencies for share in (0.0, 0.005)]
-            yield case, *known
-    for case in girder(options):
-        days = {"n_days": round(len(case.F) / 12)}
-        yield case, slow_soil(options.first_seed, **days, outliers=0.0).frequencies, case.F
-
-
-def compare_raw(options):
-    """Errors of plain calls on raw records, on cleaned ones, and on records without outliers."""
-    rows = []
-    for case, sound, raw in raw_cases(options):
-        T = case.T.loc[raw.index]
-        cleaned = HampelFilter(targets=list(raw)).fit_transform(T.join(raw))[list(raw)]
-        for records, F in {"without outliers": sound, "raw": raw, "cleaned": cleaned}.items():
-            one = replace(case, F=F, computed={})
-            rows += [row | {"records": records} for row in evaluated(one, options.variants, options.minutes)]
-    frame = pd.DataFrame(rows)
-    index = ["table", "variant", "state"]
-    table = frame.pivot_table(index=index, columns="records", values="error", sort=False)
-    table = table.assign(**{"raw / cleaned": table["raw"] / table["cleaned"]})
-    shown("Records to learn from: mean error, %", table)
-
-
-def timed(options):
-    """Wall-clock and processor seconds of plain fits."""
-    records = slow_soil(options.first_seed, n_days=90 if options.quick else 417)
-    works = {"girder on slow soil": (records.model, records.temperatures, records.frequencies)}
-    if DATA is not None:
-        frame = building_frame()
-        works["building frame"] = (frame, *frame_records(frame, 60 if options.quick else 365))
-    campaign = make_kw51_campaign(
-        n_hours=KW51_START + (1000 if options.quick else 8760), retrofit=False, random_state=options.first_seed
-    )
-    works["KW51"] = (make_kw51(), campaign.temperatures[KW51_START:], campaign.frequencies[KW51_START:])
-    rows = {}
-    for name, (model, T, F) in works.items():
-        fem = DataInformedFEM(model, random_state=0)
-        begun = time.perf_counter(), processor_seconds()
-        try:
-            with processor_limit(60 * options.minutes):
-                fem.fit(T, F)
-            ended = "fitted"
-        except TooLong:
-            ended = "stopped"
-        spent = time.perf_counter() - begun[0], processor_seconds() - begun[1]
-        rows[name] = {"degrees of freedom": model.n_dof, "records": len(F)}
-        rows[name] |= dict(zip(("seconds", "processor seconds"), spent, strict=True)) | {"": ended}
-    shown("Fit of the plain call", pd.DataFrame(rows).T)
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", choices=list(STRUCTURES), default=list(STRUCTURES))
-    parser.add_argument(
-        "--variants", nargs="+", choices=list(VARIANTS), help="by default all; with --quick, four; with --raw, two"
+    options = arguments(
+        __doc__,
+        structures=STRUCTURES,
+        first_seed=(0, "of campaigns and of the fleet"),
+        bridges=9,
+        quick=(False, "fewer seeds, bridges and records"),
     )
-    parser.add_argument("--first-seed", type=int, default=0, help="of campaigns and of the fleet")
-    parser.add_argument("--bridges", type=int, default=9)
-    parser.add_argument("--minutes", type=float, default=5.0, help="processor minutes after which a variant is stopped")
-    parser.add_argument("--quick", action="store_true", help="fewer seeds, bridges and records")
-    parser.add_argument("--raw", action="store_true", help="compare raw and cleaned records")
-    parser.add_argument("--times", action="store_true", help="seconds of plain calls for large models")
-    options = parser.parse_args()
-    options.variants = options.variants or (RAW if options.raw else QUICK if options.quick else list(VARIANTS))
-    warnings.simplefilter("ignore")  # of weather outside the training's, few records, models that are off
-    if options.raw:
-        compare_raw(options)
-    elif options.times:
-        timed(options)
-    else:
-        compare(options)
+    options.variants = QUICK if options.quick else list(VARIANTS)
+    compare(options)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ Run it with ``python tests/benchmarks/program_calls.py``; it takes about eight m
 from time import perf_counter
 
 import numpy as np
+from harness import arguments
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
@@ -58,6 +59,7 @@ def emulated(model, n_runs=200):
 
 
 def main():
+    arguments(__doc__)
     print("model             uncertainty    runs    chain (s)  study (s)  rates")
     for name in ("program", "emulator", "exact model"):
         for uncertainty in (None, "noise", "all"):

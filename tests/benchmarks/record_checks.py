@@ -1,4 +1,4 @@
-"""Faults and gross errors that `check_records` names, findings on healthy records, what `HampelFilter` removes, time.
+"""Faults and gross errors that `check_records` names, findings on healthy records, what `HampelFilter` removes.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/record_checks.py [FOLDER] [--seeds 20] [--gross]
 
@@ -8,19 +8,17 @@ campaign is missed in more than a tenth of the seeds, gross errors in more than 
 finding. ``--gross`` tries only gross errors.
 """
 
-import argparse
 import collections
-import os
 import sys
-import time
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from slow_soil import slow_soil
+from harness import arguments, autoregression, z24_records
+from structures import slow_soil
 
-from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
+from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import HampelFilter, check_records, set_aside
 from skthermo.preprocessing.checks._findings import SET_ASIDE
 
@@ -34,14 +32,6 @@ Z24_BASELINE = 2240
 """First four fifths of the healthy records."""
 
 
-def autocorrelated(random, shape, rho):
-    """Normal noise of unit variance."""
-    noise = random.standard_normal(shape)
-    for row in range(1, len(noise)):
-        noise[row] = rho * noise[row - 1] + np.sqrt(1 - rho**2) * noise[row]
-    return noise
-
-
 def healthy_campaigns(seeds):
     """Names and pairs of tables without any fault."""
     for seed in range(seeds):
@@ -50,7 +40,7 @@ def healthy_campaigns(seeds):
         T, F = year.temperatures, year.frequencies
         yield "truss, a year of days", (T, F)
         yield "truss, 10 % gaps", (T.mask(random.random(T.shape) < 0.1), F.mask(random.random(F.shape) < 0.1))
-        noise = 1 + 0.01 * autocorrelated(random, F.shape, 0.9)
+        noise = 1 + 0.01 * autoregression(random, F.shape, 0.9)
         yield "truss, AR(1) .9", (T, year.clean_frequencies * noise)
         yield "truss, rounded to 1 degree", (T.round(0), F.round(2))
         yield "truss, arrays", (T.to_numpy(), F.to_numpy())
@@ -81,16 +71,11 @@ def more_healthy_records(seeds):
 def real_records(folder):
     """Names and pairs of tables of healthy real structures."""
     if (folder / "z24").is_dir():
-        bridge = load_z24(folder / "z24" / "z24_monitoring.csv")
-        healthy = np.asarray(bridge.state) == "undamaged"
-        yield "Z24, healthy", (bridge.temperatures[healthy], bridge.frequencies[healthy])
-        first = slice(Z24_BASELINE)
-        yield "Z24, baseline", (bridge.temperatures.iloc[first], bridge.frequencies.iloc[first])
+        (T, F), _ = z24_records(folder)
+        yield "Z24, healthy", (T, F)
+        yield "Z24, baseline", (T[:Z24_BASELINE], F[:Z24_BASELINE])
         for digits in (1, 0):
-            yield (
-                f"Z24, rounded to {digits} digits",
-                (bridge.temperatures[healthy].round(digits), bridge.frequencies[healthy]),
-            )
+            yield f"Z24, rounded to {digits} digits", (T.round(digits), F)
     if (folder / "tower").is_dir():
         log = pd.read_csv(folder / "tower" / "tower.csv", index_col=0, parse_dates=True)
         yield "tower", (log[["T1", "T2"]], log.drop(columns=["T1", "T2"]))
@@ -238,20 +223,6 @@ def no_tables(T, F):
         yield f"{name} as temperatures", {"no-table"}, {""}, (table, F)
 
 
-def other_units(T, F):
-    """Frequencies in other units than the model's."""
-    for name, values in (("rad/s", 2 * np.pi * F), ("kHz", F / 1000), ("periods", 1 / F)):
-        yield name, {"unit-of-frequencies"}, {""}, (T, values)
-    if F.shape[1] > 1:
-        yield (
-            "one mode in rad/s",
-            {"unit-of-a-mode"},
-            {F.columns[0]},
-            (T, with_values(F, slice(None), 0, 2 * np.pi * F.iloc[:, 0])),
-        )
-        yield "a mode too few", {"number-of-modes"}, {""}, (T, F.iloc[:, 1:])
-
-
 def print_all_gross_errors(folder, seeds):
     """Gross errors in campaigns and in real records; the smallest share of them that is named."""
     truss = [make_truss_campaign(random_state=seed) for seed in range(seeds)]
@@ -264,21 +235,15 @@ def print_all_gross_errors(folder, seeds):
     for name, tables in pairs.items():
         errors = (error for seed, pair in enumerate(tables) for error in gross_errors(*pair, seed))
         shares.append(print_gross_errors(f"{name}, gross errors that are not always named alone:", errors))
-    beside = [("Truss", make_truss(), pairs["Truss, a year of days"][:3])]
-    if "Z24, healthy" in pairs:
-        beside.append(("Z24", make_z24(), pairs["Z24, healthy"]))
-    for name, model, tables in beside:
-        errors = (error for pair in tables for error in other_units(*pair))
-        shares.append(print_gross_errors(f"{name} beside its model:", errors, model))
     return min(shares)
 
 
-def print_gross_errors(title, errors, model=None):
+def print_gross_errors(title, errors):
     """How often each gross error is named with its columns, and what happens else; shares named and misnamed."""
     counts = {}
     for name, kinds, columns, tables in errors:
         try:
-            table = check_records(*tables, **({} if model is None else {"model": model})).table
+            table = check_records(*tables).table
             rows = [(what, column) for what, column in table[["what", "column"]].to_numpy()]
             right = {column for what, column in rows if what in kinds}
             wrong = {what for what, _ in rows if what not in kinds | ALSO}
@@ -380,27 +345,9 @@ def print_outliers(folder):
         )
 
 
-def print_seconds():
-    """Time for many records."""
-    for n_rows in (20_000, 500_000):
-        random = np.random.default_rng(0)
-        air = (
-            10 + 12 * np.sin(2 * np.pi * np.arange(n_rows) / 8760) + 4 * autocorrelated(random, (n_rows, 1), 0.95)[:, 0]
-        )
-        T = air[:, np.newaxis] + random.standard_normal((n_rows, 5))
-        F = [4, 5, 10, 11, 15, 16] - 0.01 * air[:, np.newaxis] + 0.03 * random.standard_normal((n_rows, 6))
-        start = time.perf_counter()
-        kinds = found(T, F)
-        print(f"{n_rows} rows of 5 sensors and 6 modes: {time.perf_counter() - start:.1f} s, findings {sorted(kinds)}")
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"))
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--gross", action="store_true", help="only gross errors")
-    options = parser.parse_args()
-    folder = None if options.folder is None else Path(options.folder)
+    options = arguments(__doc__, folder=Path, seeds=20, gross=(False, "only gross errors"))
+    folder = options.folder
     named = print_all_gross_errors(folder, options.seeds)
     print(f"worst share of gross errors named: {named:.3f}, target 0.98")
     print("Gross errors found in healthy records:")
@@ -421,7 +368,6 @@ def main():
             print_hits(f"{name}:", [tables])
         if (folder / "z24").is_dir():
             print_outliers(folder)
-    print_seconds()
     print(f"findings on healthy records: {n_false}, target 0; worst share of faults named: {worst:.2f}, target 0.9")
     return 1 if n_false or worst < 0.9 or named < 0.98 else 0
 

@@ -16,7 +16,6 @@ answer is compared with the one to records where the same values are missing:
 The exit code is 1 if an answer is wrong or silently missing.
 """
 
-import argparse
 import collections
 import copy
 import sys
@@ -24,7 +23,7 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from sklearn.pipeline import make_pipeline
+from harness import arguments, compensated
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
@@ -40,6 +39,10 @@ OF_ONE_TABLE = {
     "TemperatureMapper.fit": "temperature",
     "MahalanobisDetector.fit": "frequency",
 }
+OF_ALL = [
+    *("DataInformedFEM.fit", "DataInformedFEM.predict", "TemperatureMapper.fit", "TemperatureCompensator.fit"),
+    *("MahalanobisDetector.fit", "Monitor.fit", "Monitor.update", "track_parameters", "FleetPrior.fit"),
+]
 SAME = 1e-6  # relative difference of answers that are the same
 
 
@@ -81,8 +84,7 @@ def callables(T, F):
     half = slice(0, len(T) // 2)
 
     def monitor():
-        compensator = TemperatureCompensator(TemperatureMapper(), targets=targets)
-        return Monitor(make_pipeline(compensator, MahalanobisDetector()), targets=targets)
+        return Monitor(compensated(targets), targets=targets)
 
     fitted = monitor().fit(T.join(F))
     chain = DataInformedFEM(model, random_state=0).fit(T[half], F[half])
@@ -139,20 +141,14 @@ def outcome(function, wrong, missing, column):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--shares", type=float, nargs="+", default=SHARES, help="of the rows, in %%")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--only", nargs="+", help="callables")
-    options = parser.parse_args()
+    options = arguments(__doc__, shares=(list(SHARES), "of the rows, in %%"), seeds=1, only=(list(OF_ALL), "callables"))
     rows = []
     for seed in range(options.seeds):
         T, F = campaign(seed)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            functions = callables(T, F)
+        functions = callables(T, F)
         random = np.random.default_rng(seed)
         for name, function in functions.items():
-            if options.only and name not in options.only:
+            if name not in options.only:
                 continue
             for what, table in (("temperature", T), ("frequency", F)):
                 if OF_ONE_TABLE.get(name, what) != what:

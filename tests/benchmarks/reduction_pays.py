@@ -8,10 +8,8 @@ each number of records, each of which costs three solves beside 1000 simulations
 that is than the better of the two. Processor seconds of one core.
 """
 
-import argparse
-import time
-
 import numpy as np
+from harness import arguments, timed
 
 from skthermo.fem import Beam, Structure, linearise
 
@@ -43,17 +41,8 @@ def model_of(nodes, beams, clamped, n_parameters):
     return structure.assemble(list(groups), track=True)
 
 
-def seconds(work):
-    """Processor seconds of a call, and what it gives."""
-    start = time.process_time()
-    result = work()
-    return time.process_time() - start, result
-
-
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--most", type=int, default=20_000, help="largest number of degrees of freedom")
-    options = parser.parse_args()
+    options = arguments(__doc__, most=(20_000, "largest number of degrees of freedom"))
     worst = 0.0
     shapes = [("line", line(n)) for n in (5, 8, 11, 17, 26, 34, 51, 101, 401)]
     shapes += [("grid", grid(n)) for n in (4, 6, 8, 16, 32, 58)]
@@ -64,9 +53,9 @@ def main():
             model = model_of(*parts, n_parameters)
             theta = 1 + 0.98 * BOUNDS * np.random.default_rng(0).uniform(-1, 1, (1000, n_parameters))
             n_full = 200 if model.n_dof < 200 else 16
-            full = seconds(lambda model=model, rows=theta[:n_full]: linearise(model, rows))[0] / n_full
-            basis, reduced = seconds(lambda model=model: model.reduced(BOUNDS, random_state=0))
-            fast = seconds(lambda reduced=reduced, theta=theta: linearise(reduced, theta))[0] / len(theta)
+            full = timed(lambda model=model, rows=theta[:n_full]: linearise(model, rows))[0] / n_full
+            basis, reduced = timed(lambda model=model: model.reduced(BOUNDS, random_state=0))
+            fast = timed(lambda reduced=reduced, theta=theta: linearise(reduced, theta))[0] / len(theta)
             lines = []
             for n_rows in ROWS:
                 n_solves = SAMPLES + SOLVES_PER_ROW * n_rows

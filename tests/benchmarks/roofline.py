@@ -10,33 +10,20 @@ solution for one vector (of a reduced model, LAPACK's
 eigenvalues of a matrix of its size), and a solve of six modes by the library.
 """
 
-import argparse
-import time
-
 import numpy as np
+import pandas as pd
 import scipy.sparse.linalg
-from bridges import frame_bridge
-from works import BOUNDS, DATA, building_frame, draw
+from harness import DATA, arguments, core_rates, draw, shown, timed
+from structures import building_frame, frame_bridge
 
 from skthermo.datasets import make_kw51, make_z24
 
+BOUNDS = 0.3
 SYMMETRIC = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 
 
 def least_seconds(way, rounds=5):
-    seconds = []
-    for _ in range(rounds):
-        start = time.process_time()
-        way()
-        seconds.append(time.process_time() - start)
-    return min(seconds)
-
-
-def core():
-    """Flops a second of a matrix product, and bytes a second to and from memory."""
-    square, long = np.random.default_rng(0).standard_normal((1000, 1000)), np.zeros(20_000_000)
-    product = least_seconds(lambda: square @ square)
-    return 2 * len(square) ** 3 / product, 16 * len(long) / least_seconds(lambda: np.add(long, 1.0, out=long))
+    return min(timed(way)[0] for _ in range(rounds))
 
 
 def full(model, n_rows):
@@ -65,23 +52,21 @@ def reduced(model, n_rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", type=int, default=10, help="full solves of each model; 100 times as many reduced")
-    options = parser.parse_args()
-    rate, bandwidth = core()
+    options = arguments(__doc__, rows=(10, "full solves of each model; 100 times as many reduced"))
+    rate, bandwidth = core_rates()
     print(f"this core: {rate / 1e9:.1f} Gflop/s in matrix products, {bandwidth / 1e9:.1f} GB/s to and from memory\n")
-    models = {"Z24": make_z24(track=False), "KW51": make_kw51()}
-    if DATA:
-        models["building frame"] = building_frame()
-    models["tied-arch bridge"] = frame_bridge()
-    print(f"{'':26}{'dof':>8}{'Mflop':>9}{'MB':>8}{'bound':>9}{'solve':>9}{'solve / bound':>15}   SciPy, LAPACK")
-    for name, model in models.items():
-        for kind, way, n_rows in (("", full, options.rows), (", reduced", reduced, 100 * options.rows)):
+    models = {"Z24": make_z24(track=False), "KW51": make_kw51()} | (
+        {"building frame": building_frame()} if DATA else {}
+    )
+    for kind, way, n_rows in (("Full", full, options.rows), ("Reduced", reduced, 100 * options.rows)):
+        rows = {}
+        for name, model in (models | {"tied-arch bridge": frame_bridge()}).items():
             flops, n_bytes, bare, solve = way(model, n_rows)
             bound = max(flops / rate, n_bytes / bandwidth)
-            cells = f"{1e3 * bound:9.3f}{1e3 * solve:9.3f}{solve / bound:15.0f}   "
-            cells += ", ".join(f"{1e3 * seconds:.3f}" for seconds in bare)
-            print(f"{name + kind:26}{model.n_dof:8}{flops / 1e6:9.2f}{n_bytes / 1e6:8.2f}{cells}", flush=True)
+            rows[name] = {"degrees of freedom": model.n_dof, "Mflop": flops / 1e6, "MB": n_bytes / 1e6}
+            rows[name] |= {"bound (ms)": 1e3 * bound, "a solve (ms)": 1e3 * solve, "solve / bound": solve / bound}
+            rows[name]["SciPy or LAPACK (ms)"] = ", ".join(f"{1e3 * seconds:.3g}" for seconds in bare)
+        shown(f"{kind} solves", pd.DataFrame(rows).T, "3g")
 
 
 if __name__ == "__main__":

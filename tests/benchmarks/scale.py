@@ -2,47 +2,40 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/scale.py
     OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 5256 52560 525600 --bridges 10 100 1000
-    OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 52560 525600 --parts detection service
     OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 5256 --bridges 4
 
 Frequencies of the truss follow made-up weather, with noise that is correlated in time, gaps and outliers. Each part and
-size has a process of its own, whose peak memory, without that of its workers, is printed. In the parts "chain" and
-"study", the inverse is a linear regression, which costs the same for each row and is not measured
-here; the part "defaults" has the defaults of all. "service" is a monitor that is fitted to the first tenth of the
+size has a process of its own, whose peak memory, without that of its workers, is printed. In the part
+"chain", the inverse is a linear regression, which costs the same for each row and is not measured here; the part
+"defaults" has the defaults of all. "service" is a monitor that is fitted to the first tenth of the
 records, a year of ten, and then updated by each of the other days; "fleet" are bridges with a year of hourly records
 each, whose files are updated by a day, in seconds by the clock. The exit code is 1 if a step takes more than three
 times as many seconds a row or bridge as with the next smaller size, where a quadratic one takes ten times as many, a
-part more than 4 GB, an update of the last days more than twice as long as one of the first, a drawing more than 2 MB.
+part more than 4 GB, an update of the last days more than twice as long as one of the first.
 """
 
-import argparse
-import io
 import json
-import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import joblib
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
+from harness import arguments, autoregression, compensated, peak_megabytes, shown
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet, make_truss
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import WindowedAlarm
 from skthermo.fleet import Fleet
 from skthermo.fleet._fleet import Storage
 from skthermo.fleet._workers import BridgeOutcome, known_of, pickled
 from skthermo.monitoring import Monitor
-from skthermo.plotting import DamageIndexDisplay, MonitorDisplay, PredictionDisplay
 from skthermo.preprocessing import (
     BlockedKFold,
     HampelFilter,
@@ -58,27 +51,20 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 MOST_GIGABYTES, MOST_RATIO, MOST_GROWTH = 4.0, 3.0, 2.0
 LEAST_SECONDS = 0.5  # of a step, below which its ratio says nothing
-MOST_MEGABYTES = 2.0  # of a drawing
-ROWS_FOR_DRAWINGS = 5000  # that what is drawn is learned from
 PER_DAY = 144
 LEAST_BASELINE = 30 * PER_DAY  # records
 N_FITTED = 4  # monitors of different bridges, which all bridges of a fleet share
-
-
-def memory(rows, correlation, random):
-    """Stationary series of unit variance whose columns remember what was before."""
-    return lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], random.standard_normal(rows), axis=0)
 
 
 def records(n_rows, n_seasons=1):
     """Three temperatures, and frequencies that follow them, with noise that is correlated in time."""
     random, row = np.random.default_rng(0), np.arange(n_rows)
     season, day = 10 * np.sin(2 * np.pi * row * n_seasons / n_rows), np.sin(2 * np.pi * row / 144)
-    slow = 3 * memory((n_rows, 1), 0.99, random)
+    slow = 3 * autoregression(random, (n_rows, 1), 0.99)
     T = 10 + season[:, np.newaxis] + day[:, np.newaxis] * [5, 2, 0] + slow + random.standard_normal((n_rows, 3))
     theta = 1 - 4e-4 * (T[:, [0, 1, 2, 0]] - 10)
     F = make_truss().reduced(0.05, random_state=0).frequencies(theta)
-    F *= 1 + 0.005 * memory(F.shape, 0.5, random)
+    F *= 1 + 0.005 * autoregression(random, F.shape, 0.5)
     times = pd.date_range("2000", periods=n_rows, freq="10min")
     return pd.DataFrame(T, times, columns=["T1", "T2", "T3"]), pd.DataFrame(F, times).add_prefix("f")
 
@@ -117,39 +103,6 @@ def quick_chain():
     return DataInformedFEM(make_truss(), inverse=inverse, imputer=KNNGapImputer(), reduce=True, random_state=0)
 
 
-def compensator(F):
-    lags = LagFeatures([0, 1, 6], freq="1h")
-    return TemperatureCompensator(make_pipeline(lags, LinearRegression()), targets=list(F), whiten="local")
-
-
-def detection(T, F):
-    X, whitening, found = T.join(F), compensator(F), {}
-    detector, windows, counts = MahalanobisDetector(), WindowedAlarm("24h"), WindowedAlarm("24h", rule="m-of-n")
-    yield "whitening, fit_transform", lambda: found.update(white=whitening.fit_transform(X))
-    yield "whitening, transform", lambda: whitening.transform(X)
-    yield "MahalanobisDetector, gaps", lambda: detector.fit(found["white"])
-    yield "MahalanobisDetector, complete", lambda: MahalanobisDetector().fit(found["white"].fillna(0.0))
-    yield "MahalanobisDetector, predict", lambda: detector.predict(found["white"])
-    yield "WindowedAlarm, mean", lambda: windows.fit(found["white"])
-    yield "WindowedAlarm, m of n", lambda: counts.fit(found["white"])
-    yield "WindowedAlarm, predict", lambda: windows.predict(found["white"])
-
-
-def monitoring(T, F):
-    X, half = T.join(F), len(T) // 2
-    monitor = Monitor(make_pipeline(compensator(F), WindowedAlarm("24h")))
-    yield "Monitor, fit to half", lambda: monitor.fit(X[:half])
-    yield "Monitor, update with half", lambda: monitor.update(X[half:])
-
-
-def study(T, F):
-    fem, names = quick_chain().fit(T, F), list(F)
-    whole = make_pipeline(TemperatureCompensator(LinearRegression(), targets=names), MahalanobisDetector())
-    scenarios = [{"bottom": 0.1}]
-    options = {"n_repeats": 2, "uncertainty": ("noise",), "random_state": 0}
-    yield "DetectabilityStudy", lambda: DetectabilityStudy(fem, whole, scenarios, **options).run(T, baseline=T.join(F))
-
-
 def defaults(T, F, n_replicates=10):
     fem = DataInformedFEM(make_truss(), random_state=0)
     options = {"n_replicates": n_replicates, "random_state": 0}
@@ -158,8 +111,7 @@ def defaults(T, F, n_replicates=10):
 
 
 def detector_of(F):
-    regression = make_pipeline(HingeFeatures(), Ridge())
-    return make_pipeline(TemperatureCompensator(regression, targets=list(F)), WindowedAlarm("24h"))
+    return compensated(F, WindowedAlarm("24h"), make_pipeline(HingeFeatures(), Ridge()))
 
 
 def service(T, F):
@@ -181,38 +133,12 @@ def service(T, F):
     yield "status", lambda: monitor.status("2026-01-01")
     yield "summary", lambda: monitor.summary()
     yield "owner_report", lambda: owner_report(monitor, file.with_suffix(".html"))
-    yield "MonitorDisplay, records", lambda: saved(MonitorDisplay.from_estimator(monitor, by="record"))
     megabytes, of_page = (one.stat().st_size / 1e6 for one in (file, file.with_suffix(".html")))
     says(
         f"an update by a day takes {1e3 * early:.0f} ms at first and {1e3 * late:.0f} ms at last, {len(days)} days; "
         f"the file has {megabytes:.1f} MB, the page {of_page:.1f} MB",
         is_missed=late > MOST_GROWTH * early,
     )
-
-
-def drawings(T, F):
-    some = slice(None, None, max(len(T) // ROWS_FOR_DRAWINGS, 1))
-    fem, detector = quick_chain().fit(T[some], F[some]), MahalanobisDetector().fit(F[some])
-    predicted, index = fem.predict(T), detector.damage_index(F)
-    ends = (1 - 2 * fem.noise_) * predicted, (1 + 2 * fem.noise_) * predicted
-    made = {
-        "PredictionDisplay": partial(PredictionDisplay.from_predictions, F, predicted, *ends),
-        "PredictionDisplay, scatter": partial(PredictionDisplay.from_predictions, F, predicted, kind="scatter"),
-        "DamageIndexDisplay": partial(DamageIndexDisplay.from_predictions, index, detector.threshold_),
-    }
-    displays, sizes = {}, []
-    for name, make in made.items():
-        yield name, lambda name=name, make=make: displays.update({name: make()})
-        for kind in ("png", "svg"):
-            yield f"{name}, {kind}", lambda name=name, kind=kind: sizes.append(saved(displays[name], kind))
-    says(f"files have up to {max(sizes):.2f} MB", is_missed=max(sizes) > MOST_MEGABYTES)
-
-
-def saved(display, kind="png"):
-    """Megabytes of the file of a display."""
-    file = io.BytesIO()
-    display.figure_.savefig(file, format=kind)
-    return file.tell() / 1e6
 
 
 def says(text, *, is_missed=False):
@@ -272,7 +198,7 @@ def by_dask(way):
         return way()
 
 
-OF_RECORDS = (preprocessing, chain, detection, monitoring, study, defaults, service, drawings)
+OF_RECORDS = (preprocessing, chain, defaults, service)
 PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
 
 
@@ -287,18 +213,18 @@ def one(part, size, **options):
         start = clock()
         way()
         print(json.dumps({"step": step, "seconds": clock() - start}), flush=True)
-    print(json.dumps({"gigabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}))
+    print(json.dumps({"gigabytes": peak_megabytes() / 1e3}))
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", type=int, nargs="+", default=[5_256, 52_560])
-    parser.add_argument("--bridges", type=int, nargs="+", default=[10, 100])
-    parser.add_argument("--parts", nargs="+", default=[*PARTS], choices=[*PARTS])
-    parser.add_argument("--replicates", type=int, default=10, help="of the study of the part defaults")
-    parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
+    options = arguments(
+        __doc__,
+        rows=[5_256, 52_560],
+        bridges=[10, 100],
+        parts=PARTS,
+        replicates=(10, "of the study of the part defaults"),
+        one=(False, "in this process, for the script itself"),
+    )
     if options.one:
         part = PARTS[options.parts[0]]
         more = {"n_replicates": options.replicates} if part is defaults else {}
@@ -320,10 +246,10 @@ def main():
         table = pd.DataFrame(seconds)
         each = table / table.columns.to_numpy()
         ratios = (each / each.shift(axis=1)).where(table >= LEAST_SECONDS)
-        shown = pd.concat({"seconds": table.round(2), f"us a {what}": (1e6 * each).round(1)}, axis=1)
-        shown["ratio"] = ratios.iloc[:, -1].round(2)
+        table = pd.concat({"seconds": table, f"us a {what}": 1e6 * each}, axis=1)
+        table["ratio"] = ratios.iloc[:, -1]
         memory_used = ", ".join(f"{peak:.2f} GB of {size} {what}s" for size, peak in peaks.items())
-        print("\n".join([f"{part}: at most {memory_used}", *texts, "", shown.to_string(), ""]), flush=True)
+        shown("\n".join([f"{part}: at most {memory_used}", *texts]), table)
         missed += int((ratios > MOST_RATIO).to_numpy().sum() + (max(peaks.values(), default=0.0) > MOST_GIGABYTES))
     print(f"steps that take over {MOST_RATIO:g} times as long a row, parts of over {MOST_GIGABYTES:g} GB: {missed}")
     return int(missed > 0)

@@ -5,13 +5,13 @@
 Tied-arch bridges of all sizes, and the 28-bar truss, with bounds of 30 %, in processor seconds of one core.
 """
 
-import argparse
 import time
 from pathlib import Path
 
 import numpy as np
-from bridges import frame_bridge
-from measure import median_seconds
+import pandas as pd
+from harness import arguments, median_seconds, shown
+from structures import frame_bridge
 
 from skthermo.datasets import make_truss
 from skthermo.fem import sample
@@ -67,13 +67,6 @@ def costs_of(model, rounds, n_samples):
     }
 
 
-def show(rows):
-    print("   ".join(rows[0]))
-    for row in rows:
-        cells = (f"{v:.3g}" if isinstance(v, float) else str(v) for v in row.values())
-        print("   ".join(f"{cell:>{len(name)}}" for cell, name in zip(cells, row, strict=True)))
-
-
 def plot(samples, sizes, zones):
     import matplotlib.pyplot as plt
 
@@ -98,23 +91,24 @@ def plot(samples, sizes, zones):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--most-samples", type=int, default=1_000_000)
-    parser.add_argument("--most-full", type=int, default=1000, help="samples of the bridge that is not reduced")
-    parser.add_argument("--sizes", type=int, default=len(SIZES), help="how many sizes of the bridge")
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--figure", type=Path, help="where the figure goes")
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        most_samples=1_000_000,
+        most_full=(1000, "samples of the bridge that is not reduced"),
+        sizes=(len(SIZES), "how many sizes of the bridge"),
+        rounds=3,
+        figure=(Path, "where the figure goes"),
+    )
     sizes = SIZES[: options.sizes]
 
     samples = by_samples(options.most_samples, options.most_full, sizes[-2], options.rounds)
-    for name, points in samples.items():
-        print(f"{name}: " + ", ".join(f"{n} in {seconds:.3g} s" for n, seconds in points))
+    table = pd.DataFrame({name: {f"{n} samples": s for n, s in points} for name, points in samples.items()}).T
+    shown("Processor seconds, the basis included", table, "3g")
     by_size = [costs_of(frame_bridge(*size), options.rounds, n_samples=20) for size in sizes]
-    show(by_size)
+    shown("Costs by degrees of freedom", pd.DataFrame(by_size).set_index("degrees of freedom"), "3g")
     middle = sizes[len(sizes) // 2]
     by_parameters = [costs_of(frame_bridge(*middle, n_zones=n), options.rounds, 20) for n in ZONES if n <= middle[0]]
-    show(by_parameters)
+    shown("Costs by parameters", pd.DataFrame(by_parameters).set_index("parameters"), "3g")
     if options.figure:
         options.figure.parent.mkdir(parents=True, exist_ok=True)
         plot(samples, by_size, by_parameters).savefig(options.figure, dpi=110)

@@ -2,37 +2,27 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/service_records.py
     OMP_NUM_THREADS=1 python tests/benchmarks/service_records.py --structures truss --seeds 4
-    OMP_NUM_THREADS=1 python tests/benchmarks/service_records.py --cleaned
-    OMP_NUM_THREADS=1 python tests/benchmarks/service_records.py --faults
 
 Structures whose truth is known are measured for a year: noise with a correlation of 0.5 from record to record, 10 % of
 the values missing in runs, and 0.5 % of them outliers. A chain and four detectors learn these records as they are, and
 a study says what the detectors will do in the weather of the next year. Beside it stands what they do with several
 measurements of that year, each with noise, gaps and outliers of its own. The exit code is 1 if the mean difference
-exceeds 1.5 points for the healthy structures or 2.5 for the damaged ones. With --cleaned, chain and detectors learn the
-records without the outliers that `HampelFilter` finds, and the study knows of none. With --faults, no study is made:
-the table says how many of the outliers the chain finds among its training records, how many values it takes for
-outliers that are none, and how gaps and outliers of simulated records compare with those of the training records.
+exceeds 1.5 points for the healthy structures or 2.5 for the damaged ones.
 """
 
-import argparse
 import sys
-import time
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from harness import arguments, autoregression, compensated, shown
 from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
-from slow_soil import slow_soil
+from structures import slow_soil
 
-from skthermo._tables.arrays import robust_deviation
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
-from skthermo.preprocessing import HampelFilter
+from skthermo.detection import MahalanobisDetector, WindowedAlarm
 from skthermo.studies import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
@@ -40,7 +30,6 @@ MEMORY, OUTLIERS = 0.5, 0.005
 OUTAGES, GAPS = (0.03, 5), (0.07, 3)
 """Share of the records, and of the values of each mode beside them, that are missing, and mean number in a row."""
 
-TOO_FAR = 6.0  # robust standard deviations of the residuals, from which a simulated value counts as an outlier
 FAR = (8.0, 20.0)  # distance of an outlier, in standard deviations of the noise
 WINDOW, N_REPEATS = 7, 8
 LARGE = 100  # degrees of freedom, from which on a reduced model is much faster
@@ -134,9 +123,7 @@ def measured(clean, level, seed):
     """Raw records of clean frequencies, and which of their values are outliers."""
     random = np.random.default_rng(seed)
     n_records, n_modes = clean.shape
-    noise = random.standard_normal(clean.shape)
-    for row in range(1, n_records):
-        noise[row] = MEMORY * noise[row - 1] + np.sqrt(1 - MEMORY**2) * noise[row]
+    noise = autoregression(random, clean.shape, MEMORY)
     is_outlier = random.random(clean.shape) < OUTLIERS
     far = random.uniform(*FAR, clean.shape) * random.choice([-1, 1], clean.shape)
     missing = np.column_stack([lasting(n_records, *GAPS, random) for _ in range(n_modes)])
@@ -152,27 +139,19 @@ def chain_of(truth):
 
 def detectors_of(modes):
     """Detectors by name."""
-
-    def compensated(last):
-        return make_pipeline(TemperatureCompensator(LinearRegression(), targets=modes), last)
-
     return {
         "raw frequencies": MahalanobisDetector(),
-        "temperature removed": compensated(MahalanobisDetector()),
-        f"mean of {WINDOW}": compensated(WindowedAlarm(WINDOW)),
-        f"m of {WINDOW}": compensated(WindowedAlarm(WINDOW, rule="m-of-n")),
+        "temperature removed": compensated(modes, None, LinearRegression()),
+        f"mean of {WINDOW}": compensated(modes, WindowedAlarm(WINDOW), LinearRegression()),
+        f"m of {WINDOW}": compensated(modes, WindowedAlarm(WINDOW, rule="m-of-n"), LinearRegression()),
     }
 
 
-def one_study(structure, seed, is_cleaned):
+def one_study(structure, seed):
     """Expected and true rates by state and detector, in percent."""
     truth = STRUCTURES[structure](seed)
     learned, modes = measured(truth.learned, truth.level, [seed, 0])[0], list(truth.learned)
     T, later = truth.weather
-    options = {}
-    if is_cleaned:
-        learned = HampelFilter(targets=modes).fit_transform(T.join(learned))[modes]
-        options = {"gaps": "fitted", "outliers": 0}
     fem = chain_of(truth).fit(T, learned)
     damages = {" ".join(damage) or "healthy": name for name, (damage, _) in truth.states.items()}
     study = DetectabilityStudy(
@@ -182,7 +161,6 @@ def one_study(structure, seed, is_cleaned):
         n_repeats=N_REPEATS,
         uncertainty="noise",
         random_state=seed,
-        **options,
     )
 
     def reference(scenario, number):
@@ -195,60 +173,21 @@ def one_study(structure, seed, is_cleaned):
     return rates.reset_index().assign(structure=structure, seed=seed)
 
 
-def faults(structure, seed):
-    """How many outliers are found among training records, and how often simulated records have faults."""
-    truth = STRUCTURES[structure](seed)
-    learned, later = truth.weather
-    raw, is_outlier = measured(truth.learned, truth.level, [seed, 0])
-    fem = chain_of(truth).fit(learned, raw)
-    found, options = ~np.isnan(fem.recorder_.service.outliers), {"noise": "fitted", "gaps": "fitted"}
-    drawn = [fem.simulate(later, outliers="fitted", random_state=number, **options) for number in range(N_REPEATS)]
-    noise = np.stack([(one / fem.simulate(later) - 1).to_numpy() for one in drawn])
-    is_far = np.abs(noise) > TOO_FAR * robust_deviation(fem.residuals().values)
-    n_values = raw.notna().to_numpy().sum()
-    return {
-        "structure": structure,
-        "seed": seed,
-        "outliers %": 100 * is_outlier.sum() / n_values,
-        "found %": 100 * (found & is_outlier).sum() / is_outlier.sum(),
-        "false %": 100 * (found & ~is_outlier).sum() / n_values,
-        "simulated %": 100 * is_far.sum() / (~np.isnan(noise)).sum(),
-        "missing %": 100 * raw.isna().to_numpy().mean(),
-        "simulated missing %": 100 * np.isnan(noise).mean(),
-        "in a row": _mean_length(raw.isna().to_numpy()),
-        "simulated in a row": np.mean([_mean_length(np.isnan(one)) for one in noise]),
-    }
-
-
-def _mean_length(missing):
-    begins = np.diff(missing.astype(int), axis=0, prepend=0) == 1
-    return missing.sum() / max(begins.sum(), 1)
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--structures", nargs="+", choices=list(STRUCTURES), default=list(STRUCTURES))
-    parser.add_argument("--seeds", type=int, default=3, help="number of structures of each kind")
-    parser.add_argument("--cleaned", action="store_true", help="learn records without outliers, and expect none")
-    parser.add_argument("--faults", action="store_true", help="gaps and outliers alone")
-    args = parser.parse_args()
-    warnings.simplefilter("ignore")  # of gaps and outliers, which are meant
-    start = time.perf_counter()
+    args = arguments(__doc__, structures=STRUCTURES, seeds=(3, "number of structures of each kind"))
     cases = [(structure, seed) for structure in args.structures for seed in range(args.seeds)]
-    if args.faults:
-        table = pd.DataFrame([faults(*case) for case in cases])
-        print(table.groupby("structure", sort=False).mean().drop(columns="seed").round(2).to_string())
-        return 0
-    table = pd.concat([one_study(*case, args.cleaned) for case in cases])
+    table = pd.concat([one_study(*case) for case in cases])
     table["state"] = np.where(table["scenario"] == "healthy", "healthy", "damaged")
     table["difference"] = table["expected"] - table["true"]
     table["absolute"] = table["difference"].abs()
-    means = table.groupby(["structure", "state", "detector"], sort=False)[
-        ["expected", "true", "difference", "absolute"]
-    ]
-    print(f"{args.seeds} seeds; percent\n{means.mean().round(1).to_string()}")
+    means = table.groupby(["structure", "state", "detector"], sort=False)
+    shown(
+        f"Expected and true rates, %, {args.seeds} seeds",
+        means[["expected", "true", "difference", "absolute"]].mean(),
+        1,
+    )
     overall = table.groupby("state", sort=False)[["difference", "absolute"]].mean()
-    print(f"\n{overall.round(2).to_string()}\n{time.perf_counter() - start:.0f} s")
+    shown("Differences, points", overall)
     return int(any(overall.loc[state, "absolute"] > most for state, most in LARGEST.items()))
 
 

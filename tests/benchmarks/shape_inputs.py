@@ -6,11 +6,9 @@ On the truss and on the railway bridge KW51 with the 12 channels of its monitori
 models, with noise on frequencies and on shapes. Both are posterior modes.
 """
 
-import argparse
-import warnings
-
 import numpy as np
 import pandas as pd
+from harness import arguments, shown
 
 from skthermo.datasets import kw51_sensors, make_kw51, make_truss
 from skthermo.fem import add_noise, sample
@@ -46,22 +44,17 @@ def print_errors(name, title, full, model, bounds, dofs, options):
         known = identifiability(model, noise=options.noise, **more).deviations
         rows["Cramer-Rao at the nominal state", inputs] = 100 * known
         found = PosteriorInverse(model, **settings, **more).fit(X).invert(X)
-        rows["posterior mode", inputs] = solved[inputs] = errors(found.theta, theta, known.index)
+        error = 100 * np.abs(found.theta / theta - 1).mean(axis=0)
+        rows["posterior mode", inputs] = solved[inputs] = pd.Series(error, known.index)
         held = (np.abs(found.theta - theta) < 1.645 * found.std).mean(axis=0)
         rows["coverage of 90 % intervals", inputs] = pd.Series(100 * held, known.index)
         if not found.converged.all():
             print(f"{(~found.converged).sum()} of {len(X)} rows from {inputs} have not converged")
-    print(f"\n{name}, box of {bounds:.0%}, {title}; mean errors in %")
-    print(pd.DataFrame(rows).T.round(2).to_string())
+    shown(f"Mean errors of {name}, box of {bounds:.0%}, {title}, %", pd.DataFrame(rows).T)
     parameter, least = WANTED[name]
     gain = 1 - solved["frequencies and shapes"][parameter] / solved["frequencies"][parameter]
     wanted = f", at least {least:.0%} wanted" if bounds == max(options.boxes) else ""
     print(f"error of {parameter!r}: {gain:.0%} lower with shapes{wanted}")
-
-
-def errors(found, theta, names):
-    """Mean absolute percentage error of each parameter."""
-    return pd.Series(100 * np.abs(found / theta - 1).mean(axis=0), names)
 
 
 def print_more_modes(options):
@@ -73,20 +66,19 @@ def print_more_modes(options):
         ),
         "frequencies of 9 modes": identifiability(make_kw51(n_modes=9), noise=options.noise),
     }
-    print("\nKW51: smallest standard deviations at the nominal state (Cramer-Rao), in %")
-    print(pd.DataFrame({name: 100 * each.deviations for name, each in known.items()}).T.round(2).to_string())
+    table = pd.DataFrame({name: 100 * each.deviations for name, each in known.items()}).T
+    shown("KW51: smallest standard deviations at the nominal state (Cramer-Rao), %", table)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=int, default=300, help="test rows")
-    parser.add_argument("--simulations", type=int, default=1000, help="training rows")
-    parser.add_argument("--noise", type=float, default=0.001, help="relative deviation of the noise of frequencies")
-    parser.add_argument("--shape-noise", type=float, default=0.01, help="noise of shapes, a share of their rms")
-    parser.add_argument("--boxes", type=float, nargs="+", default=[0.3, 0.1], help="half-widths of the box")
-    parser.add_argument("--models", nargs="+", default=["truss", "KW51"])
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore", ".*not-converged")
+    options = arguments(
+        __doc__,
+        rows=(300, "test rows"),
+        noise=(0.001, "relative deviation of the noise of frequencies"),
+        shape_noise=(0.01, "noise of shapes, a share of their rms"),
+        boxes=([0.3, 0.1], "half-widths of the box"),
+        models=["truss", "KW51"],
+    )
     for bounds in options.boxes:
         if "truss" in options.models:
             truss = make_truss()

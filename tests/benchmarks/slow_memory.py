@@ -9,14 +9,13 @@ looked for), and drift, as `track_parameters` finds it. The exit code is 1 if he
 with the mean, or damaged ones have neither.
 """
 
-import argparse
 import sys
-import warnings
 
 import numpy as np
 import pandas as pd
+from harness import arguments
 from sklearn.pipeline import make_pipeline
-from slow_soil import slow_soil
+from structures import slow_soil
 
 from skthermo.monitoring import track_parameters
 from skthermo.preprocessing import check_records, find_memory
@@ -63,10 +62,7 @@ def rows(seed):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(8))
-    options = parser.parse_args()
-    warnings.simplefilter("ignore")
+    options = arguments(__doc__, seeds=list(range(8)))
     found = []
     for seed in options.seeds:
         found += rows(seed)

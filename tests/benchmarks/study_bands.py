@@ -8,7 +8,7 @@ measured in each state, and the user's own detectors evaluate it. Structures:
 
 - the truss of the thermo-mechanical law (four zones of temperature that no multiplier of a group follows exactly),
   with the right FE model, and with one of which two groups are 5 % too stiff or too soft;
-- the footbridge of ``blind_bridge.py``, whose FE model has 16 beams for 44 and every stiffness 3 to 5 % off;
+- the footbridge, whose FE model has 16 beams for 44 and every stiffness 3 to 5 % off;
 - girders of `make_fleet`, one in each realisation, with the user's model of each, whose stiffnesses are 2 to 5 % off.
 
 Bands: of the noise alone; with other weather; with other training records too, of all replicates and of as many as a
@@ -22,7 +22,6 @@ default, or those of the ensemble, cover less than 85 or more than 95 % of partl
 the sampling error of the share.
 """
 
-import argparse
 import sys
 import time
 import warnings
@@ -30,15 +29,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from blind_bridge import GROUPS, MODES, NOISE, PER_DAY, SENSORS, Bridge, footbridge
+from harness import arguments, compensated, split
 from joblib import Parallel, delayed
-from sklearn.pipeline import make_pipeline
+from structures import FOOTBRIDGE_GROUPS, footbridge
+from structures import Footbridge as Measured
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import DetectabilityStudy, Scenario
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 from skthermo.updating import ModelUpdater
 
 CONFIDENCE, WANTED = 0.9, (85, 95)
@@ -52,7 +52,7 @@ DEVIATION = 0.005
 COARSE = [0.0, 3.75, 7.5, 11.25, 15.0, 19.5, 24.0, 28.5, 33.0, 37.5, 42.0, 46.5, 51.0, 54.75, 58.5, 62.25, 66.0]
 """Nodes of the deck in the user's model, m: those of the stays and of the supports, and one between."""
 
-EVERY = PER_DAY  # records of the footbridge: one a day
+EVERY = Measured.per_day  # records of the footbridge: one a day
 TRUSS_STATES = {
     "bottom": (0.06, 0.1, 0.14, 0.2),
     "top": (0.08, 0.14, 0.2, 0.26),
@@ -115,24 +115,28 @@ class Footbridge:
     seed: int
     states = states(FOOTBRIDGE_STATES)
     detectors = ("compensated",)
-    noise = NOISE
+    noise = Measured.noise
 
     def __post_init__(self):
-        self.bridge = Bridge(self.seed)
+        self.bridge = Measured(self.seed)
 
     def year(self):
         records = self.bridge.training(False)[::EVERY]
-        return records[SENSORS], records[MODES]
+        return split(records)
 
     def later(self, number, damage):
-        records = self.bridge.evaluated(damage, "as in training")[::EVERY]
-        return records[SENSORS], records[MODES]
+        records = self.bridge.evaluated(damage)[::EVERY]
+        return split(records)
 
     def models(self):
         random = np.random.default_rng(self.seed)
-        off = 1 + random.uniform(0.03, 0.05, len(GROUPS)) * random.choice([-1, 1], len(GROUPS))
-        structure = footbridge(stations=COARSE, stiffness=dict(zip(GROUPS, off, strict=True)))
-        return {"wrong": structure.assemble(GROUPS, n_modes=len(MODES), track=True).reduced(0.7, random_state=0)}
+        off = 1 + random.uniform(0.03, 0.05, len(FOOTBRIDGE_GROUPS)) * random.choice([-1, 1], len(FOOTBRIDGE_GROUPS))
+        structure = footbridge(stations=COARSE, stiffness=dict(zip(FOOTBRIDGE_GROUPS, off, strict=True)))
+        return {
+            "wrong": structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(Measured.modes), track=True).reduced(
+                0.7, random_state=0
+            )
+        }
 
 
 @dataclass
@@ -171,7 +175,7 @@ def detector(name, columns):
     """Of raw frequencies, or of what temperature leaves unexplained of them."""
     if name == "raw":
         return MahalanobisDetector()
-    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=columns), MahalanobisDetector())
+    return compensated(columns)
 
 
 def predicted(fem, T, F, real, measured, models, options):
@@ -276,20 +280,18 @@ STRUCTURES = {"truss": Truss, "footbridge": Footbridge, "girder": Girder}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--structures", nargs="*", default=[*STRUCTURES], choices=[*STRUCTURES])
-    parser.add_argument("--realisations", type=int, default=20, help="of each structure (default 20)")
-    parser.add_argument(
-        "--replicates", type=int, default=20, help="of each study, and models of each ensemble (default 20)"
+    options = arguments(
+        __doc__,
+        structures=STRUCTURES,
+        realisations=(20, "of each structure"),
+        replicates=(20, "of each study, and models of each ensemble"),
+        first_seed=0,
+        jobs=1,
+        quick=(False, "half of the states, and one detector"),
+        aligned=(False, "models as they are, without an ensemble"),
+        calibrated=(False, "calibrated models alone"),
+        without_ensemble=(False, "and no bands of all uncertainty"),
     )
-    parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--quick", action="store_true", help="half of the states, and one detector")
-    parser.add_argument("--aligned", action="store_true", help="models as they are, without an ensemble")
-    parser.add_argument("--calibrated", action="store_true", help="calibrated models alone")
-    parser.add_argument("--without-ensemble", action="store_true", help="and no bands of all uncertainty")
-    parser.add_argument("--save", help="a file for the table of all bands")
-    options = parser.parse_args()
     numbers = range(options.first_seed, options.first_seed + options.realisations)
     missed = 0
     for name in options.structures:
@@ -299,8 +301,6 @@ def main():
         print(
             f"\n{name}: {len(numbers)} realisations, {found['state'].nunique() - 1} states, bands of 90 %; in percent"
         )
-        if options.save:
-            found.to_csv(f"{options.save}_{name}.csv")
         shares = table(found)
         print(shares.round(1).to_string())
         print(f"  {time.perf_counter() - began:.0f} s in all")

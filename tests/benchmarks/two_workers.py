@@ -6,45 +6,32 @@ A tied-arch bridge of 3600 degrees of freedom, on a machine that does nothing el
 to one process, and the peak memory of each of Dask's workers; exit code 1 if a ratio is below 1.6 or the bits differ.
 """
 
-import argparse
-import resource
 import time
 
 import joblib
 import numpy as np
-from bridges import frame_bridge
 from dask.distributed import Client
+from harness import arguments, peak_megabytes, timed
+from structures import frame_bridge
 
 from skthermo.fem import sample
 
 BRIDGE, BOUNDS, TARGET = (16, 3, 4), 0.3, 1.6
 
 
-def timed(work):
-    start = time.perf_counter()
-    result = work()
-    return time.perf_counter() - start, result
-
-
-def peak_megabytes():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--samples", type=int, default=960)
-    options = parser.parse_args()
+    options = arguments(__doc__, samples=960)
     model = frame_bridge(*BRIDGE)
 
     def drawn(n_samples=options.samples, n_jobs=None):
         return sample(model, BOUNDS, n_samples, n_jobs=n_jobs, random_state=0).frequencies
 
-    alone, frequencies = timed(drawn)
+    alone, frequencies = timed(drawn, time.perf_counter)
     drawn(32, n_jobs=2)  # starts the processes
-    results = {"joblib's processes": timed(lambda: drawn(n_jobs=2))}
+    results = {"joblib's processes": timed(lambda: drawn(n_jobs=2), time.perf_counter)}
     with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client, joblib.parallel_config("dask"):
         drawn(32)
-        results["Dask's workers"] = timed(drawn)
+        results["Dask's workers"] = timed(drawn, time.perf_counter)
         peaks = client.run(peak_megabytes).values()
     print(f"{model}, {options.samples} samples: {alone:.1f} s in one process")
     for name, (seconds, found) in results.items():

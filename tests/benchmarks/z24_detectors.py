@@ -13,19 +13,14 @@ has to go on into weather that is warmer than all that it learned, and the choic
 equal.
 """
 
-import argparse
-import os
 import sys
 import tempfile
 import time
-import warnings
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parents[2] / "examples"))
+from harness import arguments, recipes
 
-import z24_damage_recipes as z24_damage
-import z24_detector_recipes as comparison
-import z24_recipes as z24
+z24_damage, comparison, z24 = map(recipes, ("z24_damage", "z24_detector", "z24"))
 
 TARGETS = {  # rank correlation, share in the band
     ("a", "damage found"): (0.95, 0.8),
@@ -80,12 +75,8 @@ def print_choice(study, measured):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("data", type=Path, nargs="?", default=os.environ.get("SKTHERMO_DATA"), help="file or folder")
-    parser.add_argument("--repeats", type=int, default=40, help="simulated campaigns (default 40)")
-    options = parser.parse_args()
-    warnings.filterwarnings("ignore")  # of weather outside the baseline's, of short baselines; the pages explain them
-    bridge, began = z24.Bridge(z24.find(options.data and Path(options.data))), time.perf_counter()
+    options = arguments(__doc__, folder=Path, repeats=(40, "simulated campaigns"))
+    bridge, began = z24.Bridge(z24.find(options.folder)), time.perf_counter()
     with tempfile.TemporaryDirectory() as memory:
         candidates, kept = comparison.detectors(), {"n_repeats": options.repeats, "memory": memory}
         print("(a) chain of all healthy records, identified damage\n")

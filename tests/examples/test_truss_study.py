@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.benchmarks.truss import NAMES, SingleRecords, best_theta, detectable, run, summary
+from tests.benchmarks.truss_tables import NAMES, SingleRecords, best_theta, detectable, run, summary
 from tests.examples.pages import recipes
 
 GROUPS = ["bottom", "top", "diagonal"]

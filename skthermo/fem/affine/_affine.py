@@ -50,7 +50,7 @@ Content = tuple[Hashable, tuple[str, ...]]
 Names = tuple[str, ...] | None
 Groups = dict[str, tuple[int, ...]] | None
 
-DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster (tests/benchmarks/dense_or_sparse.py)
+DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster
 DENSE_SHARE = 0.3  # share of nonzero entries above which a matrix counts as dense
 
 FULL_DENSE, FULL_SPARSE = (0.05, 1.6e-4), (6.0, 0.008)

@@ -1,0 +1,177 @@
+"""What the benchmarks share: command line, data, tables, targets, clocks, noise, regression with a detector."""
+
+import argparse
+import atexit
+import importlib
+import json
+import os
+import resource
+import statistics
+import sys
+import time
+import tracemalloc
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+from sklearn.pipeline import make_pipeline
+
+from skthermo.datasets import load_z24
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.surrogate import TemperatureMapper
+
+DATA = Path(os.environ["SKTHERMO_DATA"]) if os.environ.get("SKTHERMO_DATA") else None
+EXAMPLES = Path(__file__).parents[2] / "examples"
+sys.path.append(str(EXAMPLES))  # whose recipes some benchmarks measure, by imports after that of this module
+TABLES = {}  # what was shown, by title, as CSV
+KW51_NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
+
+
+def recipes(name):
+    """Recipes of the examples, where imports in their order would come before this module."""
+    return importlib.import_module(f"{name}_recipes")
+
+
+def arguments(text, **options):
+    """Options of the command line, by name: a default, or a tuple of it, a help, choices; warnings are off from here.
+
+    A mapping is the choices, all by default; a list takes several values, a type has no default, and False is a flag.
+    Without a flag: ``name``, and ``folder`` of the data, by default the one that SKTHERMO_DATA names.
+    """
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, given in options.items():
+        default, help_, choices = (*given, None, None)[:3] if isinstance(given, tuple) else (given, None, None)
+        flags, more = [f"--{name.replace('_', '-')}"], {"help": help_}
+        if name == "folder":
+            flags, more = ["folder"], more | {"nargs": "?", "type": Path, "default": DATA}
+        elif name == "name":
+            flags, more = ["name"], more | {"choices": choices}
+        elif default is False:
+            more["action"] = "store_true"
+        elif isinstance(default, type):
+            more |= {"type": default, "choices": choices}
+        elif isinstance(default, list | dict):
+            values = list(default)
+            choices = list(default if choices is None else choices) if isinstance(default, dict) or choices else None
+            more |= {"nargs": "+", "type": type(values[0]), "default": values, "choices": choices}
+        else:
+            more |= {"type": type(default), "default": default, "choices": choices}
+        parser.add_argument(*flags, **more)
+    parser.add_argument("--out", type=Path, help="a file for the tables that are printed, as JSON")
+    found = parser.parse_args()
+    if found.out is not None:
+        atexit.register(lambda: found.out.write_text(json.dumps(TABLES)))
+    warnings.simplefilter("ignore")  # of weather, gaps and models that are meant to be so
+    return found
+
+
+def shown(title, table, digits=2):
+    """Print a table, rounded or, as "3g", to some digits in all, and keep it for ``--out``."""
+    table = table.to_frame("") if isinstance(table, pd.Series) else table
+    table = (
+        table.map(lambda x: f"{x:.{digits}}" if isinstance(x, float) else x) if digits == "3g" else table.round(digits)
+    )
+    print(f"\n{title}\n{table.to_string(na_rep='')}", flush=True)
+    TABLES[title] = table.to_csv()
+
+
+def is_missed(what, found, target, *, known=False, quiet=False):
+    """Print whether a number is within its target, such as ">= 90"; whether it is missed and not known to be."""
+    relation, limit = target.split()
+    is_met = found >= float(limit) if relation == ">=" else found <= float(limit)
+    verdict = "met" if is_met else "missed as known" if known else "MISSED"
+    if not quiet:
+        print(f"{verdict:15} {what}: {found:.3g}, target {target}", flush=True)
+    return not (is_met or known)
+
+
+def median_seconds(ways, rounds, clock=time.perf_counter):
+    """Median over rounds, in each of which every way has its turn; `time.process_time` counts this process alone."""
+    seconds = {name: [] for name in ways}
+    for _ in range(rounds):
+        for name, way in ways.items():
+            seconds[name].append(timed(way, clock)[0])
+    return {name: statistics.median(values) for name, values in seconds.items()}
+
+
+def timed(way, clock=time.process_time):
+    """Seconds of a call, and what it gives."""
+    start = clock()
+    result = way()
+    return clock() - start, result
+
+
+def processor_seconds():
+    """Of this process and of those that it has waited for."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def peak_megabytes(way=None):
+    """What one call allocates beyond its input; without a call, the largest memory of this process so far."""
+    if way is None:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+    tracemalloc.start()
+    way()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def core_rates():
+    """Flops a second of a matrix product on this core, and bytes a second to and from memory."""
+    square, long = np.random.default_rng(0).standard_normal((1500, 1500)), np.zeros(20_000_000)
+    product, stream = (
+        min(timed(way)[0] for _ in range(5)) for way in (lambda: square @ square, lambda: np.add(long, 1.0, out=long))
+    )
+    return 2 * len(square) ** 3 / product, 16 * len(long) / stream
+
+
+def draw(model, n_samples, seed=0, bounds=0.3):
+    """Parameters that are uniform within bounds."""
+    return 1 + bounds * np.random.default_rng(seed).uniform(-1, 1, (n_samples, len(model.parameter_names)))
+
+
+def autoregression(random, shape, correlation, burn_in=0):
+    """Normal numbers of unit variance, whose neighbours along the first axis are correlated."""
+    shocks = random.standard_normal((shape[0] + burn_in, *shape[1:]))
+    shocks[0 if burn_in else 1 :] *= np.sqrt(1 - correlation**2)
+    return lfilter([1.0], [1.0, -correlation], shocks, axis=0)[burn_in:]
+
+
+def joined(campaign):
+    """Temperatures and frequencies side by side."""
+    return campaign.temperatures.join(campaign.frequencies)
+
+
+def split(records):
+    """Temperatures, and frequencies."""
+    modes = modes_of(records)
+    return records.drop(columns=modes), records[modes]
+
+
+def modes_of(records):
+    """Names of the frequencies among the columns."""
+    return [name for name in records if str(name).startswith("f")]
+
+
+def compensated(targets, last=None, regressor=None, **options):
+    """A detector, by default by the Mahalanobis distance, of what a regression on temperatures leaves."""
+    regressor, last = regressor or TemperatureMapper(), last or MahalanobisDetector()
+    return make_pipeline(TemperatureCompensator(regressor, targets=list(targets), **options), last)
+
+
+def z24_records(folder=DATA):
+    """Temperatures and frequencies of the bridge Z24, healthy and damaged."""
+    data = load_z24(Path(folder or ".") / "z24" / "z24_monitoring.csv")
+    healthy = (data.state == "undamaged").to_numpy()
+    return [(data.temperatures[rows], data.frequencies[rows]) for rows in (healthy, ~healthy)]
+
+
+def tower_records(folder=DATA):
+    """Temperatures and frequencies of a masonry tower, in order of time, no stamp twice."""
+    log = pd.read_csv(Path(folder or ".") / "tower" / "tower.csv", index_col=0, parse_dates=True).sort_index()
+    log = log[~log.index.duplicated()]
+    return log[["T1", "T2"]], log.filter(regex="^f")
