@@ -439,7 +439,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
         ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
-        ("false alarms that pay", "limit / max(self.false_alarms().lowest, limit)", "1.0"),
+        ("false alarms that pay", "limit / max(self.false_alarms().ci_low, limit)", "1.0"),
         (
             "records that are not evaluated",
             "np.mean(self.values[rows] < raised)",
@@ -466,7 +466,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
     ],
     ("plotting/_detectors.py", "plotting/test_detectors.py"): [
-        ("measured rates outside their bands", 'is_open=rates["inside"] == 0', 'is_open=rates["inside"] == 2'),
+        ("measured rates outside their bands", '(rates["mark"] < rates["low"]) |', '(rates["mark"] < rates["low"]) &'),
         ("measured records not evaluated", "if measured > 0:", "if measured > 1:"),
     ],
     ("monitoring/_status.py", "reporting/test_service.py"): [

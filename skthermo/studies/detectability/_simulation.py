@@ -385,17 +385,26 @@ class Simulation:
     measurement: Measurement
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None
 
-    def first_repeat(
-        self, measured: Mapping[str, Table], seeds: Sequence[int], errors: Mapping[str, Exception]
+    def evaluated(
+        self, repeats: Sequence[Repeat], errors: Mapping[str, Exception], measured: Mapping[str, Table] | None = None
     ) -> Evaluation:
-        """Evaluate the records of the first repeat and measured ones.
+        """Evaluate the records of some repeats, and healthy ones with noise of other seeds, by which thresholds are
+        moved; measured records beside those of the first repeat, whose damage indices are kept.
 
         Measured records have times of their own if they are a frame, or differ in number from the weather.
         """
-        records = itertools.chain(self.records(self.scenarios, 0, seeds), self._measured(measured))
-        found = self.evaluate(records, errors, with_indices=True)
+        some = (self.records(self.scenarios, number, seeds) for number, seeds in repeats)
+        records = itertools.chain(itertools.chain.from_iterable(some), self._measured(measured or {}))
+        found = self.evaluate(records, errors, with_indices=measured is not None)
+        healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
+        if not healthy:
+            return found
+        others = [(number, np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)) for number, seeds in repeats]
+        some = (self.records(healthy, number, seeds) for number, seeds in others)
         with without_warnings():
-            return self._calibrated(found, [(0, seeds)])
+            again = self.evaluate(itertools.chain.from_iterable(some), found.errors)
+        calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
+        return replace(found, errors=again.errors, calibration=calibration)
 
     @property
     def share_in_replicates(self) -> float:
@@ -426,8 +435,7 @@ class Simulation:
 
     def _some_repeats(self, repeats: Sequence[Repeat]) -> Evaluation:
         with without_warnings(), answers_kept(), single_blas_thread():
-            records = (self.records(self.scenarios, number, seeds) for number, seeds in repeats)
-            return self._calibrated(self.evaluate(itertools.chain.from_iterable(records), {}), repeats)
+            return self.evaluated(repeats, {})
 
     def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:
         for scenario in self.scenarios:
@@ -520,17 +528,6 @@ class Simulation:
         found = candidate.damage_indices(entering, [one.rows for one in records]) if with_indices else None
         decisions = candidate.decisions(entering, found)
         return list(zip(found or during, decisions, during, strict=True))
-
-    def _calibrated(self, found: Evaluation, repeats: Sequence[Repeat]) -> Evaluation:
-        """The evaluation with decisions on healthy records with noise of other seeds."""
-        healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
-        if not healthy:
-            return found
-        others = (np.random.RandomState(seeds).randint(LARGEST_SEED, size=2) for _, seeds in repeats)
-        records = (self.records(healthy, number, pair) for (number, _), pair in zip(repeats, others, strict=True))
-        again = self.evaluate(itertools.chain.from_iterable(records), found.errors)
-        calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
-        return replace(found, errors=again.errors, calibration=calibration)
 
 
 def _together(records: Iterable[Records]) -> Iterator[list[Records]]:

@@ -346,7 +346,7 @@ class DetectabilityStudy(BaseEstimator):
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
-                first = simulation.first_repeat(measured, seeds[0], errors)
+                first = simulation.evaluated([(0, seeds[0])], errors, measured)
         evaluation = self._with_repeats(simulation, first, replicates, seeds, stages, (tol, confidence))
         rates = None
         if replicates.parts:
