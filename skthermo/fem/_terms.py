@@ -13,7 +13,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Matrix
+from skthermo._tables.arrays import Array, Matrix, as_dense
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import Elimination, elimination
 
@@ -177,8 +177,7 @@ class DenseTerms(AffineTerms):
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
-        dense = [matrix if isinstance(matrix, np.ndarray) else matrix.toarray() for matrix in matrices]
-        return cls(np.ascontiguousarray(np.stack(dense)), exponents)
+        return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
 
     @property
     def n_entries(self) -> int:
