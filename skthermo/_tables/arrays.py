@@ -106,6 +106,11 @@ def as_columns(values: ArrayLike) -> Array:
     return array[:, np.newaxis] if array.ndim == 1 else array
 
 
+def as_dense(matrix: Matrix) -> Array:
+    """A matrix as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
 def positive_integer(value: Any, what: str) -> int:
     """A positive integer of any type as Python's ``int``; anything else is an error.
 

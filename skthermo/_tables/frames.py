@@ -111,6 +111,14 @@ def warn_of_markers(X: ArrayLike) -> None:
         )
 
 
+def first_disorder(X: Any) -> int:
+    """Position of the first row of a frame that is earlier than the row before it; 0 if there is none."""
+    times = getattr(X, "index", None)
+    if not isinstance(times, pd.DatetimeIndex) or times.is_monotonic_increasing:
+        return 0
+    return int(np.argmax(times[1:] < times[:-1])) + 1
+
+
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     """Raise an error if two tables differ in length or, where both are frames, in index."""
     for what, table in zip(names, (X, y), strict=True):

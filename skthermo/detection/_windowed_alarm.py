@@ -19,7 +19,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._estimators.warnings import reported_by_caller, without_warnings
 from skthermo._tables.arrays import Array, check_probability, patterns, range_sums
-from skthermo._tables.frames import correlation_time
+from skthermo._tables.frames import correlation_time, first_disorder
 from skthermo._validation import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import Changes, DamageDetector, Origin, conformal_threshold, with_origin
 from skthermo.detection._directional import (
@@ -468,9 +468,8 @@ class Windows:
     @classmethod
     def of(cls, X: Any, rows: Array, window: int | str) -> Windows:
         """Windows of a number of records, or of a time on the index of a frame."""
-        times = getattr(X, "index", None)
-        if isinstance(times, pd.DatetimeIndex) and not times.is_monotonic_increasing:
-            row = int(np.argmax(times[1:] < times[:-1])) + 1
+        row = first_disorder(X)
+        if row:
             raise ValueError(
                 f"row {row} ({X.index[row]}) is earlier than the row before it; expected records in order of time, as "
                 "X.sort_index() gives"
@@ -483,6 +482,7 @@ class Windows:
             duration = pd.NaT
         if not duration >= pd.Timedelta("1s"):
             raise ValueError(f"window is {window!r}; expected a number of records, or a time such as '24h'")
+        times = getattr(X, "index", None)
         if not isinstance(times, pd.DatetimeIndex) or times.hasnans:
             raise ValueError(
                 f"window is {window!r}, a time, but the records are not a frame with a stamp for each; expected a "

@@ -13,7 +13,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Matrix, as_mapping, is_real, real_array
+from skthermo._tables.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import Elimination, elimination
 
@@ -226,8 +226,7 @@ class DenseTerms(AffineTerms):
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
-        dense = [matrix if isinstance(matrix, np.ndarray) else matrix.toarray() for matrix in matrices]
-        return cls(np.ascontiguousarray(np.stack(dense)), exponents)
+        return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
 
     def assemble(self, theta: Array) -> Array:
         flat = self.matrices.reshape(len(self.matrices), -1)

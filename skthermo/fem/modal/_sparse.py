@@ -7,7 +7,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, Label, Matrix
+from skthermo._tables.arrays import Array, Label, Matrix, as_dense
 from skthermo.fem._factors import Factors, factorise
 from skthermo.fem._terms import SparseTerms
 
@@ -232,7 +232,7 @@ def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> i
     if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= FEW_DOFS:
         kept = np.flatnonzero(diagonal) if isinstance(mass, scipy.sparse.csc_array) else slice(None)
         part = mass[kept][:, kept]
-        eigenvalues = np.linalg.eigvalsh(part if isinstance(part, np.ndarray) else part.toarray())
+        eigenvalues = np.linalg.eigvalsh(as_dense(part))
         tolerance = 10 * len(eigenvalues) * EPS * abs(eigenvalues[-1])
         outside = abs(mass).sum() > (1 + 1e-12) * abs(part).sum()  # beside a diagonal of zero
         negative, count = outside or eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
