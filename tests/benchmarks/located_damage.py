@@ -165,8 +165,8 @@ def main():
                 fem = truth.chain(seed)
                 whole = locate_damage(fem, bridge.structure, *truth.frequencies(1, seed))
                 healthy[which].append(whole.probability_of_damage)
-                unseen = whole.found.separability.unobservable
-                places = {g: where for g, where in whole.places.items() if g not in unseen}
+                unobservable = whole.found.separability.unobservable
+                places = {g: where for g, where in whole.places.items() if g not in unobservable}
                 found[which].append(evaluated(truth, fem, places, seed, options.cases))
         for which, parts in found.items():
             cases = pd.concat(parts, ignore_index=True)
