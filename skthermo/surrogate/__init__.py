@@ -5,7 +5,7 @@ step.
 """
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
-from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain
+from skthermo.surrogate.chain import DataInformedFEM, FitReport, FittedChain, refitted, resampled, with_model
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
 __all__ = [
@@ -16,4 +16,7 @@ __all__ = [
     "PosteriorInverse",
     "TemperatureMapper",
     "paper_network",
+    "refitted",
+    "resampled",
+    "with_model",
 ]

@@ -204,7 +204,7 @@ def faults(structure, seed):
     found, options = ~np.isnan(fem.recorder_.service.outliers), {"noise": "fitted", "gaps": "fitted"}
     drawn = [fem.simulate(later, outliers="fitted", random_state=number, **options) for number in range(N_REPEATS)]
     noise = np.stack([(one / fem.simulate(later) - 1).to_numpy() for one in drawn])
-    is_far = np.abs(noise) > TOO_FAR * robust_deviation(fem.residuals().values)
+    is_far = np.abs(noise) > TOO_FAR * robust_deviation(fem.recorder_.residuals.values)
     n_values = raw.notna().to_numpy().sum()
     return {
         "structure": structure,

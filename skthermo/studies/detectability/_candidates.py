@@ -83,7 +83,7 @@ def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | N
 
     Only a detector with a part that has ``targets`` sees temperatures.
     """
-    T, F = fem.training_records_
+    T, F = fem.records_.temperatures, fem.records_.frequencies
     names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
     everything = SeenColumns(names, n_sensors, np.arange(len(names)), False)
     if baseline is None:
@@ -155,7 +155,7 @@ def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
 
 def _learned(memory: str | Memory | None, detector: Any, records: Table) -> Any:
     """A detector fitted to records, or one that was."""
-    return remembered(memory, "detector", lambda: detector.fit(records), lambda: (detector, records))
+    return remembered(memory, "detector", lambda: detector.fit(records), (detector, records))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +193,7 @@ class Candidate:
         begins = head.steps[:-1], healthy
 
         def learn() -> tuple[Pipeline, Table]:
-            return remembered(memory, "head", lambda: (head, head.fit_transform(healthy)), lambda: begins)
+            return remembered(memory, "head", lambda: (head, head.fit_transform(healthy)), begins)
 
         head, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
         fitted.steps = [*head.steps[:-1], (fitted.steps[-1][0], _learned(memory, fitted[-1], seen))]

@@ -256,7 +256,7 @@ class Measurement:
     def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
-        if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
+        if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.records_.temperatures)).any():
             return noise, weather.given
         missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
         T = np.where(missing, np.nan, as_floats(weather.given))

@@ -177,7 +177,7 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
         frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
         shift = measured_shift(fem, T, shifts, noise)
     _check_ratios(np.exp(shift.mean), fem.mode_names_)
-    records = ComparedRecords.of(left_out, shift, len(fem.residuals().values), latest(T, outliers))
+    records = ComparedRecords.of(left_out, shift, len(fem.recorder_.residuals.values), latest(T, outliers))
     return ObservedRecords(shift, records, T, theta, frequencies)
 
 

@@ -28,6 +28,7 @@ from skthermo.studies.identification import (
     screen,
 )
 from skthermo.studies.location._division import Division
+from skthermo.surrogate import with_model
 
 PLAUSIBLE = 0.01  # probability of several groups together from which on each of them is divided in turn
 
@@ -191,7 +192,7 @@ class MeasuredShift:
 
     def _curves(self, question: Question) -> tuple[Observed, Curves]:
         """What was measured, and the effects of all stretches on it."""
-        twin = self.fem.with_model(self.structure.divide(self.fem.model, question.parts))
+        twin = with_model(self.fem, self.structure.divide(self.fem.model, question.parts))
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
