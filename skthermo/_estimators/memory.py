@@ -35,9 +35,7 @@ def folder_of(memory: str | Memory | None) -> Path | None:
     return None if location is None else Path(location)
 
 
-def remembered(
-    memory: str | Memory | None, kind: str, make: Callable[[], Result], content: Callable[[], tuple[Any, ...]]
-) -> Result:
+def remembered(memory: str | Memory | None, kind: str, make: Callable[[], Result], content: tuple[Any, ...]) -> Result:
     """What ``make`` returns, which depends on the content alone: read from the memory if it is there.
 
     Warnings come again with it. If several processes need the same, one makes it and the others wait.
@@ -49,7 +47,7 @@ def remembered(
     folder = folder_of(memory)
     if folder is None:
         return make()
-    identity = identity_of(*content())
+    identity = identity_of(*content)
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / f"{kind}-{identity}.lock", "w") as file:
         lock(file)

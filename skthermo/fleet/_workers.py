@@ -277,7 +277,7 @@ def _facts(T: Table, F: Table) -> dict[str, float]:
 
 def _error(chain: BaseEstimator, T: Table, F: Table) -> float:
     report = getattr(chain, "report_", None)
-    errors = report.errors["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
+    errors = report.modes["MAPE"] if report is not None else mape(np.asarray(F), np.asarray(chain.predict(T)))
     return float(np.mean(errors))
 
 

@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator
 from skthermo._estimators.warnings import warnings_once
 from skthermo._tables.arrays import Array, as_columns
 from skthermo._tables.frames import check_same_rows
+from skthermo._validation import check_is_fitted
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
@@ -157,7 +158,9 @@ class PredictionDisplay(Display):
         UserWarning
             Once for each kind of doubt about the weather, such as rows without temperatures.
         """
-        X, y = estimator.training_records_ if X is None else (X, y)
+        if X is None:
+            check_is_fitted(estimator)
+            X, y = estimator.records_.temperatures, estimator.records_.frequencies
         check_same_rows(X, y, ("temperatures", "frequencies"))
         if what not in ("frequencies", "parameters"):
             raise ValueError(f"what is {what!r}; expected 'frequencies' or 'parameters'")

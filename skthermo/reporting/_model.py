@@ -35,7 +35,7 @@ def records_of(T: pd.DataFrame, F: pd.DataFrame) -> dict[str, Any]:
 
 def training_tables(fem: DataInformedFEM) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Temperatures and frequencies that the chain learned from, as frames."""
-    T, F = fem.training_records_
+    T, F = fem.records_.temperatures, fem.records_.frequencies
     index = next((table.index for table in (F, T) if isinstance(table, pd.DataFrame)), None)
     names = column_names(T, "T"), column_names(F, "f")
     first, second = (pd.DataFrame(as_floats(t), index, [str(n) for n in c]) for t, c in zip((T, F), names, strict=True))
@@ -48,7 +48,7 @@ def over_temperature(
     """Measured and predicted frequencies of some rows, evenly spread, and the temperature that they follow."""
     rows = spread_evenly(np.arange(len(T)), MOST_PREDICTED)
     with without_warnings():  # the report of the fit counts the gaps of these records
-        frequencies = as_floats(fem.predict(fem.training_records_[0]))[rows]
+        frequencies = as_floats(fem.predict(fem.records_.temperatures))[rows]
     measured = F.iloc[rows]
     predicted = pd.DataFrame(frequencies, measured.index, measured.columns)
     return measured, predicted, chosen_sensor(T, F).iloc[rows]

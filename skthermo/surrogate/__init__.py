@@ -5,7 +5,7 @@ step.
 """
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
-from skthermo.surrogate.chain import DataInformedFEM, FitReport
+from skthermo.surrogate.chain import DataInformedFEM, FitReport, refitted, resampled, with_model
 from skthermo.surrogate.chain import FittedChain as FittedChain  # what annotations of other packages name
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
@@ -16,4 +16,7 @@ __all__ = [
     "PosteriorInverse",
     "TemperatureMapper",
     "paper_network",
+    "refitted",
+    "resampled",
+    "with_model",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -253,7 +254,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         learned = self.inputs_.transform(X), targets[:, 0] if targets.shape[1] == 1 else targets, weights
         with single_blas_thread():
             self.regressor_ = remembered(
-                memory, "regressor", lambda: fit_outputs(regressor, *learned), lambda: (regressor, *learned)
+                memory, "regressor", partial(fit_outputs, regressor, *learned), (regressor, *learned)
             )
 
     @abstractmethod

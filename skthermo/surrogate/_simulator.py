@@ -80,13 +80,6 @@ ROWS_PER_SOLVE = 4  # rows for which frequencies are wanted, for each row that i
 MARGIN_OF_SEVERITY = 0.02  # margin of severities around those asked for, within which a reduced model is accurate
 
 
-def reason_of(model: FEModel, reduce: Reduce) -> str:
-    """Why a model is not reduced."""
-    if not is_auto(reduce):
-        return "reduce=False"
-    return NO_GAIN if hasattr(model, "reduction_pays") else "it has no reduced model"
-
-
 def box_around(theta: Array) -> Array:
     """Lowest and highest of each parameter in rows of theta, with a margin; (n_parameters, 2)."""
     lowest, highest = np.nanmin(theta, axis=0), np.nanmax(theta, axis=0)
@@ -164,12 +157,14 @@ class Simulator:
         auto, box = is_auto(reduce), box_around(theta)
         tol = tolerance(model, reduce, SOLVES_PER_ROW * (len(theta) if n_rows is None else n_rows))
         allowed = DEFAULT_TOLERANCE if auto else tol
-        is_known = known is not None and known.model is model and known.covers(box)
         usual = theta if reduce and isinstance(model, AffineModel | ReducedModel) else None
-        if known is not None and is_known and allowed is not None and known.tol <= allowed:
-            return replace(known, usual=usual)
+        if known is not None and known.model is model and known.box is not None and allowed is not None:
+            covers = (known.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= known.box[:, 1]).all()
+            if covers and known.tol <= allowed:
+                return replace(known, usual=usual)
         if tol is None:
-            return cls(model, reason=reason_of(model, reduce), usual=usual)
+            reason = NO_GAIN if hasattr(model, "reduction_pays") else "it has no reduced model"
+            return cls(model, reason=reason if auto else "reduce=False", usual=usual)
         if known is not None and known.model is model and known.reason == NO_BASIS:
             return replace(known, usual=usual)
         try:
@@ -210,12 +205,6 @@ class Simulator:
         """How many rows of frequencies came from surfaces, from reduced and from full models, of all structures."""
         counts = [self._known.solved, *(one.solved for one in self._known)]
         return {way: sum(count[way] for count in counts) for way in ("surface", "reduced", "full")}
-
-    def covers(self, box: Array) -> bool:
-        """Whether the reduced model is accurate within a whole box."""
-        if self.box is None:
-            return False
-        return bool((self.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= self.box[:, 1]).all())
 
     def extended(self, theta: Array) -> Simulator:
         """The simulator whose reduced model also covers a box around rows of theta.

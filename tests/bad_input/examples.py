@@ -1785,6 +1785,10 @@ NOT_CALLED |= {
     "fem.FEModel": "a protocol",
     "fem.LocalModes": "made by a model's local_modes",
     "surrogate.FitReport": "made by a chain's fit",
+    **dict.fromkeys(
+        ("surrogate.refitted", "surrogate.resampled", "surrogate.with_model"),
+        "called by studies, which check chains and models; refitted hands records to fit",
+    ),
     "preprocessing.RecordFindings": "made by check_records",
     "preprocessing.SetAside": "made by set_aside",
     "studies.IdentifiedDamage": "made by identify_damage",

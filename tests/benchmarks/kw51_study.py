@@ -45,7 +45,7 @@ def evaluated(records, fitted, draws):
     return {
         "largest MAPE of a mode, true, %": fitted.errors(records.clean).max(),
         "mean MAPE, measured, %": fitted.errors(fitted.records.frequencies).mean(),
-        "round trip, %": fitted.fem.report_.round_trip.abs().max(),
+        "round trip, %": fitted.fem.report_.modes["round trip"].abs().max(),
         "PFA, measured, %": healthy[ALARMS]["measured"],
         "PFA, simulated, %": healthy[ALARMS]["simulated"],
         "PFA, difference, points": healthy[ALARMS]["simulated"] - healthy[ALARMS]["measured"],

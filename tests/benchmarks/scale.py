@@ -90,7 +90,7 @@ def preprocessing(T, F):
 def chain(T, F):
     fem = quick_chain()
     yield "fit", lambda: fem.fit(T, F)
-    yield "residuals()", lambda: fem.residuals()
+    yield "residuals", lambda: fem.recorder_.residuals
     yield "predict", lambda: fem.predict(T)
     yield "predict_interval", lambda: fem.predict_interval(T)
     yield "simulate, fitted noise", lambda: fem.simulate(T, noise="fitted", random_state=0)

@@ -53,7 +53,7 @@ def test_updating_finds_the_scale_of_the_log(page, log):
     taught = page["read_log"](log)[1][: page["n_train"]]
     found = page["model"].frequencies(np.ones((1, 4)))[0]
     np.testing.assert_allclose(found, taught.mean(), rtol=0.002)
-    (left_out,) = page["fem"].report_.left_out.index
+    (left_out,) = page["fem"].report_.rows.left_out.index
     assert left_out.startswith("a lag reaches into a gap, in 2 periods")
 
 

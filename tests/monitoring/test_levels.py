@@ -78,7 +78,11 @@ def test_an_alarm_is_also_a_watch(whole):
 
 
 @settings(
-    max_examples=by_day(2, at_night=3), deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=by_day(2, at_night=3),
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[*HealthCheck],
 )
 @given(shares=st.lists(st.floats(0, 0.05), min_size=2, max_size=3, unique=True))
 def test_more_change_never_lowers_the_level(two_levels, records, shares):

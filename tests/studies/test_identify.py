@@ -42,7 +42,7 @@ class WithoutDerivatives:
 
 def simulated(fem, damage=None, T=WEATHER):
     """Records without noise, with what the fit leaves in such weather."""
-    return fem.simulate(T, damage=damage) * (1 + fem.residuals().expected(fem.weather(T).inputs))
+    return fem.simulate(T, damage=damage) * (1 + fem.recorder_.residuals.expected(fem.weather(T).inputs))
 
 
 def most_probable(found):
@@ -229,9 +229,9 @@ def test_known_standard_error_of_a_single_group(fem):
         higher, lower = (np.log(fem.simulate(WEATHER, damage={"top": severity + h})) for h in (step, -step))
         return np.linalg.norm(((higher - lower) / (2 * step)).mean())
 
-    number = fem.residuals().n_expected(fem.weather(WEATHER).inputs)[0]
+    number = fem.recorder_.residuals.n_expected(fem.weather(WEATHER).inputs)[0]
     deviation = noise * np.sqrt(1 / len(F) + 1 / number)
-    two_errors = student.isf(norm.sf(2), len(fem.residuals().values)) / 2  # Student's law, not the normal one
+    two_errors = student.isf(norm.sf(2), len(fem.recorder_.residuals.values)) / 2  # Student's law, not the normal one
     assert found.table.loc["top", "error_alone"] == pytest.approx(two_errors * deviation / slope_at(0.0), rel=0.01)
     assert found.table.loc["top", "standard_error"] == pytest.approx(deviation / slope_at(0.2), rel=0.05)
     assert found.table.loc["top", "if_damaged"] == pytest.approx(0.2, abs=2e-3)

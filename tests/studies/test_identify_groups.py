@@ -9,7 +9,7 @@ import pytest
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, Beam, CallableModel, Spring, Structure, add_noise
 from skthermo.studies import DamagePrior, identify_damage
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, with_model
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures[::10]
@@ -42,7 +42,7 @@ def symmetric():
 
 
 def simulated(fem, T, damage=None):
-    return fem.simulate(T, damage=damage) * (1 + fem.residuals().expected(fem.weather(T).inputs))
+    return fem.simulate(T, damage=damage) * (1 + fem.recorder_.residuals.expected(fem.weather(T).inputs))
 
 
 def test_mirrored_groups_are_named(symmetric):
@@ -210,7 +210,7 @@ def test_a_program_that_gives_frequencies_alone_has_its_parameters_as_groups(fem
     """Without matrices and derivatives, damage is identified as with them."""
     truss, F = make_truss(), simulated(fem, WEATHER, damage={"bottom": 0.15})
     program = CallableModel(truss.frequencies, truss.parameter_names, 6, vectorized=True)
-    chains = fem, fem.with_model(program)
+    chains = fem, with_model(fem, program)
     ours, theirs = (identify_damage(one, WEATHER, F, GROUPS, random_state=0) for one in chains)
     assert theirs.most_probable == ours.most_probable == ("bottom",)
     columns = ["probability", "severity"]

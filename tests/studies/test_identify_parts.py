@@ -63,7 +63,7 @@ def test_default_groups_are_the_smallest():
 
 def test_shift_of_known_records(fem):
     inputs = fem.weather(WEATHER).inputs
-    residuals, weights = fem.residuals().expected(inputs), fem.residuals().prediction_weights(inputs)
+    residuals, weights = fem.recorder_.residuals.expected(inputs), fem.recorder_.residuals.prediction_weights(inputs)
     number = 1 / (weights**2).sum(axis=0)
     F = (fem.predict(WEATHER) * (1 + residuals) * np.linspace(0.97, 1.02, 6)).to_numpy(copy=True)
     F[::2, 3] = np.nan
@@ -85,7 +85,7 @@ def test_shift_of_known_records(fem):
 
 def test_as_many_records_as_the_weights_say(fem):
     """Expected residuals of unit noise: their mean over rows varies as that of the number of records returned."""
-    residuals = fem.residuals()
+    residuals = fem.recorder_.residuals
     inputs = residuals.weather[::9]
     number = residuals.n_expected(inputs)
     noise = np.random.RandomState(0).standard_normal((len(residuals.own), 600))
@@ -95,7 +95,7 @@ def test_as_many_records_as_the_weights_say(fem):
 
 def test_predictions_err_as_least_squares_on_the_weather_do(fem):
     """What depends on the weather by its functions is predicted exactly, and noise as much as the weights say."""
-    residuals = fem.residuals()
+    residuals = fem.recorder_.residuals
     inputs = residuals.weather[:60]
     basis, weights = WeatherFunctions.of(residuals.weather), residuals.prediction_weights(inputs)
     functions = basis.values(inputs)

@@ -23,6 +23,7 @@ from skthermo.studies.detectability._replicates import (
     variances_of,
 )
 from skthermo.studies.detectability._simulation import Measurement
+from skthermo.surrogate import refitted, resampled
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -331,29 +332,29 @@ def test_replicates_have_the_outliers_of_other_training_records(fem):
 
 @pytest.mark.nightly
 def test_other_training_records_change_a_chain_as_its_error(fem):
-    year, chains = YEAR.temperatures, [fem.resampled(seed) for seed in range(4)]
+    year, chains = YEAR.temperatures, [resampled(fem, seed) for seed in range(4)]
     predicted = fem.predict(year)
     changes = np.array([(chain.predict(year) / predicted - 1).to_numpy() for chain in chains])
-    again = fem.refitted(year, fem.simulate(year, noise="fitted", random_state=0))
-    refitted = (again.predict(year) / predicted - 1).to_numpy()
-    ratio = np.sqrt((changes**2).mean() / (refitted**2).mean())
+    again = refitted(fem, year, fem.simulate(year, noise="fitted", random_state=0))
+    by_refitting = (again.predict(year) / predicted - 1).to_numpy()
+    ratio = np.sqrt((changes**2).mean() / (by_refitting**2).mean())
     assert 0.75 < ratio < 1.33
-    spread = [np.nanstd(chain.residuals().values, axis=0).mean() for chain in (fem, *chains)]
+    spread = [np.nanstd(chain.recorder_.residuals.values, axis=0).mean() for chain in (fem, *chains)]
     np.testing.assert_allclose(spread[1:], spread[0], rtol=0.06)
-    pd.testing.assert_frame_equal(fem.resampled(3).predict(year), chains[3].predict(year))
+    pd.testing.assert_frame_equal(resampled(fem, 3).predict(year), chains[3].predict(year))
     pd.testing.assert_frame_equal(fem.predict(year), predicted)
 
 
 def test_a_refitted_chain_finds_the_same_parameters(fem):
-    pd.testing.assert_frame_equal(fem.refitted().parameters_, fem.parameters_)
+    pd.testing.assert_frame_equal(refitted(fem).parameters_, fem.parameters_)
 
 
 @pytest.mark.filterwarnings("ignore:.*hidden-offsets")
 def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
-    plain = clone(fem).set_params(aligner="passthrough", inverse__prior=0.3).fit(*fem.training_records_)
-    refitted = plain.refitted(model=MODELS[0])
-    assert refitted.model is MODELS[0]
-    bottom = refitted.parameters_["bottom"] / plain.parameters_["bottom"]
+    plain = clone(fem).set_params(aligner="passthrough", inverse__prior=0.3).fit(YEAR.temperatures, YEAR.frequencies)
+    other = refitted(plain, model=MODELS[0])
+    assert other.model is MODELS[0]
+    bottom = other.parameters_["bottom"] / plain.parameters_["bottom"]
     np.testing.assert_allclose(bottom.median(), 1 / 1.03, rtol=3e-3)
 
 
@@ -374,6 +375,6 @@ def test_the_noise_of_replicates_is_as_uncertain_as_that_of_so_many_records(fem)
     assert np.mean(deviations) == pytest.approx(1 / np.sqrt(2 * n_records), rel=0.15)
     replicates = Replicates.of(fem, ("baseline",), WEATHER, None, 400, [1, 2])
     levels = np.log([replicates.noise_levels(number) for number in range(400)])
-    np.testing.assert_allclose(levels.std(axis=0), fem.residuals().level_errors, rtol=0.15)
+    np.testing.assert_allclose(levels.std(axis=0), fem.recorder_.residuals.level_errors, rtol=0.15)
     assert np.abs(levels.mean(axis=0)).max() < 4 * levels.std() / np.sqrt(400)
     np.testing.assert_array_equal(np.exp(levels[3]), replicates.noise_levels(3))

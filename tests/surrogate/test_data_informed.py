@@ -71,7 +71,7 @@ def test_noise_is_estimated_out_of_fold_whatever_the_outliers_and_the_memory():
         noise[random.random(noise.shape) < outliers] *= 20
         fem = chain().fit(T, YEAR.clean_frequencies * (1 + true * noise))
         np.testing.assert_allclose(fem.noise_, true, rtol=0.2)
-        np.testing.assert_array_equal(fem.report_.variation["noise"], 100 * fem.noise_)
+        np.testing.assert_array_equal(fem.report_.modes["noise"], 100 * fem.noise_)
 
 
 def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
@@ -80,7 +80,7 @@ def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
     for one in (inverse, trained):
         np.testing.assert_array_equal(chain(inverse=one(noise=0.02)).fit(T, F).inverse_.noise_, 0.02)
     learned = chain(inverse=inverse(noise="auto")).fit(T, F)
-    np.testing.assert_array_equal(learned.report_.variation["misfit"], 100 * learned.inverse_.noise_)
+    np.testing.assert_array_equal(learned.report_.modes["misfit"], 100 * learned.inverse_.noise_)
     assert (learned.inverse_.noise_ > 0.8 * learned.noise_).all()
 
 
@@ -90,7 +90,7 @@ def test_outliers_do_not_move_the_model():
     fem, cleaned = chain().fit(T, raw), chain().fit(T, F.where(raw == F))
     np.testing.assert_array_equal(fem.report_.findings.outliers, raw != F)
     np.testing.assert_allclose(fem.predict(LATER.temperatures), cleaned.predict(LATER.temperatures), rtol=1e-9)
-    np.testing.assert_array_equal(fem.training_records_[1], raw)
+    np.testing.assert_array_equal(fem.records_.frequencies, raw)
 
 
 @pytest.mark.one_case

@@ -33,7 +33,7 @@ def test_rows_that_never_had_frequencies_are_counted_and_weigh_a_number(place):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         fem = chain.fit(np.linspace(0, 30, 40)[:, np.newaxis], measured)
-    assert np.isfinite(fem.report_.errors["MAPE"]).all()
+    assert np.isfinite(fem.report_.modes["MAPE"]).all()
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -59,7 +59,7 @@ def test_mappers_of_one_parameter_each():
 def test_labels_that_have_no_order():
     labels = [f"r{row}" if row % 2 else row for row in range(365)]
     fem = DataInformedFEM(TRUSS, mapper=PLAIN, random_state=0)
-    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).residuals().values) == 365
+    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).recorder_.residuals.values) == 365
 
 
 @pytest.mark.filterwarnings("ignore:.*hidden-offsets")

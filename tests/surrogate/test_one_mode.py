@@ -13,7 +13,7 @@ from sklearn.model_selection import KFold, cross_val_score
 from skthermo.detection import TemperatureCompensator
 from skthermo.fem import CallableModel
 from skthermo.plotting import PredictionDisplay
-from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate import DataInformedFEM, refitted, resampled
 from tests.surrogate.chains import TRUSS, F, T
 
 ONE_MODE = CallableModel(lambda theta: 7.5 * np.sqrt(theta), ["stiffness"], 1, vectorized=True)
@@ -40,8 +40,8 @@ def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
         np.testing.assert_array_equal(vector, table["f1"])
     for one, other in (
         (of_vector(), of_table()),
-        (of_vector().refitted(), of_table().refitted()),
-        (of_vector().resampled(0), of_table().resampled(0)),
+        (refitted(of_vector()), refitted(of_table())),
+        (resampled(of_vector(), 0), resampled(of_table(), 0)),
     ):
         np.testing.assert_array_equal(one.predict(T), other.predict(T)["f1"])
     pd.testing.assert_frame_equal(of_vector().simulate(T), of_table().simulate(T))

@@ -105,10 +105,12 @@ def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_th
     frequencies, std = (table.to_numpy() for table in fem.predict(later, return_std=True))
     known = np.sqrt(np.einsum("ijj->ij", fem.predict_covariance(later)))
     scatter = np.sqrt(std**2 - known**2) / frequencies
-    spread = fem.residuals().spread(later.to_numpy())
+    spread = fem.recorder_.residuals.spread(later.to_numpy())
     np.testing.assert_allclose(scatter, spread, rtol=1e-6)
     assert spread.max() < 2.5 * NOISE  # of thirty records, and however far from their weather
-    assert (fem.residuals().spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()).all()  # beyond what anybody has seen
+    assert (
+        fem.recorder_.residuals.spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()
+    ).all()  # beyond what anybody has seen
 
 
 @pytest.mark.nightly

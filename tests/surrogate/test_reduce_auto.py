@@ -12,7 +12,7 @@ from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss
 from skthermo.fem import CallableModel
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper, _simulator
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper, _simulator, refitted
 from skthermo.surrogate._simulator import Simulator
 from tests.fem.frames import portal
 
@@ -117,7 +117,7 @@ def test_clones_memory_and_refits_decide_alike(tmp_path):
     stored = clone(fem).set_params(memory=str(tmp_path))
     for again in (clone(fem).fit(T, F), stored.fit(T, F), clone(stored).fit(T, F)):
         np.testing.assert_array_equal(predictions(again, T), predictions(fem, T))
-    np.testing.assert_allclose(fem.refitted().predict(T), fem.predict(T), rtol=1e-4)
+    np.testing.assert_allclose(refitted(fem).predict(T), fem.predict(T), rtol=1e-4)
 
 
 TRUSS = make_truss()

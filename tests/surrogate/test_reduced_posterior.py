@@ -77,7 +77,7 @@ def test_one_reduced_model_serves_the_inverse_and_predictions(made):
     assert fem.simulator_.reduced is fem.inverse_.simulator_.reduced
     assert len(made) == 1
     np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-5)
-    assert fem.report_.n_full_solves == 0
+    assert fem.report_.parameters.n_full_solves == 0
 
 
 @pytest.mark.nightly
@@ -120,7 +120,7 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     assert "after 4 rounds" in text
     found = fem.inverse_.invert(F)
     assert fem.inverse_.simulator_.reduced is fem.simulator_.reduced is None
-    assert fem.report_.n_full_solves == 0  # beside a reduced model
+    assert fem.report_.parameters.n_full_solves == 0  # beside a reduced model
     assert is_same(found, inverse(reduce=False).fit(F).invert(F))
     np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-9)
 

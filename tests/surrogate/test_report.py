@@ -55,18 +55,18 @@ def caught(function, *arguments):
 class TestTheReport:
     def test_clean_records_leave_nothing_to_say(self, fitted):
         report = fitted.report_
-        assert (report.n_rows, report.n_trained, len(report.left_out)) == (365, 365, 0)
+        assert (report.rows.given, report.rows.trained, len(report.rows.left_out)) == (365, 365, 0)
         nominal = TRUSS.frequencies(np.ones(4))[0]
-        np.testing.assert_allclose(report.offsets, 100 * (F.mean() / nominal - 1), rtol=1e-9)
-        np.testing.assert_allclose(report.errors["MAPE"], mape(F, fitted.predict(T)), rtol=1e-9)
-        np.testing.assert_allclose(report.errors["MAPE of the mean"], mape(F, F * 0 + F.mean()), rtol=1e-9)
-        assert report.prior is fitted.inverse_.prior_
-        moved = f"all stiffness together by {100 * report.prior.common:.2g} %"
+        np.testing.assert_allclose(report.modes["offset"], 100 * (F.mean() / nominal - 1), rtol=1e-9)
+        np.testing.assert_allclose(report.modes["MAPE"], mape(F, fitted.predict(T)), rtol=1e-9)
+        np.testing.assert_allclose(report.modes["MAPE of the mean"], mape(F, F * 0 + F.mean()), rtol=1e-9)
+        assert report.parameters.prior is fitted.inverse_.prior_
+        moved = f"all stiffness together by {100 * report.parameters.prior.common:.2g} %"
         assert moved in repr(report)
 
     def test_deviations_say_what_the_modes_cannot_tell(self, fitted):
-        assert fitted.report_.deviations.idxmax() == "vertical"
-        assert fitted.report_.deviations["vertical"] > 5 * fitted.report_.deviations["bottom"]
+        assert fitted.report_.parameters.deviations.idxmax() == "vertical"
+        assert fitted.report_.parameters.deviations["vertical"] > 5 * fitted.report_.parameters.deviations["bottom"]
 
     def test_reasons_for_rows_left_out_are_counted(self):
         air, measured = T.copy(), F.copy()
@@ -74,27 +74,27 @@ class TestTheReport:
         measured.iloc[20, 3] = measured.iloc[21, [3, 4]] = np.nan
         lagged = make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))
         refined = chain(mapper=lagged).fit(air, measured).report_
-        assert refined.n_trained == 365 - 3 - 1
+        assert refined.rows.trained == 365 - 3 - 1
         temperatures = {f"temperature {name!r} is missing, 2025-01-06 to 2025-01-08": 3 for name in T}
         lag = {"a lag reaches into a gap, 2025-01-09": 1}
-        assert refined.left_out.to_dict() == temperatures | lag
+        assert refined.rows.left_out.to_dict() == temperatures | lag
         report = chain(inverse=trained(), mapper=lagged).fit(air, measured).report_
-        assert report.left_out.to_dict() == temperatures | lag | {
+        assert report.rows.left_out.to_dict() == temperatures | lag | {
             "frequency 'f4' is missing, 2025-01-21 to 2025-01-22": 2,
             "frequency 'f5' is missing, 2025-01-22": 1,
         }
-        assert report.n_trained == 365 - 3 - 2 - 1
-        assert report.filled.empty
+        assert report.rows.trained == 365 - 3 - 2 - 1
+        assert report.rows.filled.empty
 
     def test_temperatures_filled_from_other_sensors_are_counted(self):
         air = T.copy()
         air.iloc[5:8, 1] = air.iloc[8:13, 0] = np.nan
         report = chain(mapper=make_pipeline(LagFeatures([0, 1]), TemperatureMapper(Ridge()))).fit(air, F).report_
-        assert report.n_trained == 365
-        assert report.filled["rows"].to_dict() == {"T1": 5, "T2": 3}
+        assert report.rows.trained == 365
+        assert report.rows.filled["rows"].to_dict() == {"T1": 5, "T2": 3}
         others = LinearRegression().fit(T[["T1", "T3"]], T["T2"])
         scatter = np.std(T["T2"] - others.predict(T[["T1", "T3"]]))
-        assert report.filled.loc["T2", "standard deviation"] == pytest.approx(scatter, rel=0.1)
+        assert report.rows.filled.loc["T2", "standard deviation"] == pytest.approx(scatter, rel=0.1)
         assert f"3 temperatures of 'T2' (standard deviation {scatter:.1f}" in repr(report)
 
     def test_a_sensor_that_is_mostly_filled_is_named(self):
@@ -107,7 +107,7 @@ class TestTheReport:
         girder = T.rename(columns={"T1": "girder"}).astype(float)
         girder.loc["2025-06", "girder"] = np.nan
         lagged = LagFeatures([0, 2]).fit_transform(girder)
-        filled = chain(mapper=TemperatureMapper(Ridge())).fit(lagged, F).report_.filled
+        filled = chain(mapper=TemperatureMapper(Ridge())).fit(lagged, F).report_.rows.filled
         assert filled.index.tolist() == ["girder"]
         assert filled.loc["girder", ["rows", "when"]].tolist() == [32, "2025-06-01 to 2025-07-02"]
 
@@ -167,7 +167,7 @@ class TestWarningsOfFit:
         gappy = T.mask(np.random.default_rng(0).random(T.shape) < 0.02)
         fem = chain(mapper=make_pipeline(LagFeatures(24), TemperatureMapper(Ridge())))
         assert not caught(fem.fit, gappy, F)
-        assert fem.report_.n_trained == 365
+        assert fem.report_.rows.trained == 365
 
     def test_implausible_records_are_named(self):
         implausible = F.copy()
@@ -208,7 +208,7 @@ class TestWarningsOfFit:
         model = make_z24()
         fem = DataInformedFEM(model, aligner=BiasAligner(model, method="scale"), reduce=True, random_state=0)
         assert not caught(fem.fit, z24.temperatures[healthy], z24.frequencies[healthy])
-        assert fem.report_.n_trained > 2500
+        assert fem.report_.rows.trained > 2500
 
     @pytest.mark.nightly
     def test_one_warning_for_all_folds(self):
@@ -290,7 +290,7 @@ def test_offsets_that_an_aligner_hides_are_named_unless_weather_or_a_common_fact
     assert fem.report_.has_hidden_offsets
     text = next(str(w.message) for w in given if w.message.kind == "hidden-offsets")
     assert text[1:] in repr(fem.report_)
-    np.testing.assert_allclose(fem.report_.hidden_offsets, fem.report_.offsets, atol=1e-9)
+    np.testing.assert_allclose(fem.report_.modes["hidden offset"], fem.report_.modes["offset"], atol=1e-9)
     calibrated = ModelUpdater(wrong, bounds=0.5, prior=0.3).fit(F, frequency_std=0.005 * F.mean()).model_
     assert not aligned(calibrated).report_.has_hidden_offsets
     right, alike = aligned(TRUSS).report_, aligned(TRUSS, factor=1.03).report_

@@ -68,11 +68,11 @@ def test_a_record_of_weight_0_counts_as_left_out():
     fit = chain().fit(T, F, sample_weight=kept)
     alone = TemperatureMapper(LinearRegression()).fit(T[kept], fit.parameters_[kept])
     np.testing.assert_allclose(fit.predict_parameters(T), alone.predict(T), rtol=1e-9)
-    assert fit.report_.n_trained == kept.sum()
-    ((reason, count),) = fit.report_.left_out.items()
+    assert fit.report_.rows.trained == kept.sum()
+    ((reason, count),) = fit.report_.rows.left_out.items()
     assert reason.startswith("their weight is 0, in ")
     assert count == (~kept).sum()
-    assert len(fit.residuals().values) == kept.sum()
+    assert len(fit.recorder_.residuals.values) == kept.sum()
     assert fit.training_range_.excess(T[kept]).max() == 0
     coldest = T["T1"].argsort().to_numpy()[0]
     warm = chain().fit(T, F, sample_weight=np.arange(len(T)) != coldest)

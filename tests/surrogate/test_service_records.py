@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from skthermo.preprocessing import HampelFilter
+from skthermo.surrogate import resampled
 from skthermo.surrogate.chain import _records
 from skthermo.surrogate.chain._records import ServiceRecords
 from tests.surrogate.chains import F, T, chain
@@ -179,7 +180,7 @@ def test_fitted_noise_without_gaps_or_outliers(in_service):
     complete = in_service.recorder_.noise(in_service.weather(T), gaps=0, outliers=0, random_state=0)
     assert np.abs(complete).max() < 0.08
     assert np.abs(in_service.recorder_.noise(in_service.weather(T), gaps=0, random_state=0)).max() > 0.1
-    usual = in_service.residuals().usual
+    usual = in_service.recorder_.residuals.usual
     ratio = complete.std(axis=0) / usual.std(axis=0, where=~np.isnan(usual))
     np.testing.assert_allclose(ratio, 1, atol=0.15)
 
@@ -210,7 +211,7 @@ def test_what_cleaning_took_comes_back(spoiled):
 
 
 def test_resampled_chains_have_the_gaps_and_outliers_of_the_records(in_service):
-    other = in_service.resampled(3)
+    other = resampled(in_service, 3)
     for name in ("missing", "outliers"):
         np.testing.assert_array_equal(
             getattr(other.recorder_.service, name), getattr(in_service.recorder_.service, name)

@@ -241,7 +241,7 @@ def test_the_chain_learns_weak_parameters_from_shapes():
     assert errors < 1.1 * others < 5e-4
     pd.testing.assert_frame_equal(chain.estimate_parameters(F, shapes), chain.parameters_)
     assert chain.estimate_parameters(F).notna().all(axis=None)  # from frequencies alone
-    assert len(chain.residuals().values) == len(F)
+    assert len(chain.recorder_.residuals.values) == len(F)
 
 
 def test_the_chain_names_shapes_that_are_missing_or_not_wanted():

@@ -190,7 +190,7 @@ def test_simulations_scatter_like_the_training_records():
     holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = chain().fit(T, holed)
     clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.residuals().values
+    records = fem.recorder_.residuals.values
     assert {tuple(row) for row in np.isnan(noisy.to_numpy())} <= {tuple(row) for row in np.isnan(records)}
     pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
     assert noisy.isna().mean(axis=None) == pytest.approx(0.1, abs=0.03)
@@ -213,11 +213,11 @@ def test_noise_of_shuffled_records_is_that_of_records_in_order_of_time():
 def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
     fem = any_chain(inverse=trained(), mapper=PLAIN, discrepancy=None).fit(T, F)
     folds = BlockedKFold(block="7D")
-    np.testing.assert_array_equal(fem.residuals().folds, folds.fold_of(T))
+    np.testing.assert_array_equal(fem.recorder_.residuals.folds, folds.fold_of(T))
     for fold, (train, test) in enumerate(folds.split(T)):
         theta = clone(fem.mapper_).fit(T.iloc[train], fem.parameters_.iloc[train]).predict(T.iloc[test])
         predicted = fem.aligner_.inverse_transform(fem.model.frequencies(theta))
-        values = fem.residuals().values[fem.residuals().folds == fold]
+        values = fem.recorder_.residuals.values[fem.recorder_.residuals.folds == fold]
         np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
 
 
@@ -225,7 +225,7 @@ def test_residuals_do_not_know_the_discrepancy_of_their_own_week():
     """A mode that one week alone moves: what is learned there is not in its residuals."""
     week = np.arange(365) // 7 == 20
     fem = chain().fit(T, F.assign(f2=F["f2"] * np.where(week, 1.02, 1.0)))
-    of_week = fem.residuals().values[week, 1] - fitted().residuals().values[week, 1]
+    of_week = fem.recorder_.residuals.values[week, 1] - fitted().recorder_.residuals.values[week, 1]
     np.testing.assert_allclose(of_week.mean(), 0.02, atol=0.002)
 
 
@@ -247,7 +247,9 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
 @pytest.mark.filterwarnings(r"ignore:.*\[trend\]", "ignore:.*sudden-change")
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
-    blocks = [np.diff(np.flatnonzero(np.diff(one.residuals().folds))) for one in (fitted(), chain().fit(T, lasting))]
+    blocks = [
+        np.diff(np.flatnonzero(np.diff(one.recorder_.residuals.folds))) for one in (fitted(), chain().fit(T, lasting))
+    ]
     assert set(blocks[0]) == {7}
     assert min(blocks[1]) > 20
 
@@ -256,7 +258,7 @@ def test_folds_in_unseen_weather_are_named(monkeypatch):
     short = chain().fit(T[:150], F[:150])
     monkeypatch.setattr(BlockedKFold, "fold_of", lambda self, X: np.arange(len(X)) // 30)  # contiguous ones
     with pytest.warns(UserWarning, match=r"\d+ of 30 .*weather-of-one-fold"):
-        short.residuals()
+        assert short.recorder_.residuals is not None
 
 
 @pytest.mark.nightly
@@ -265,8 +267,8 @@ def test_folds_in_unseen_weather_are_named(monkeypatch):
 def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
     order = np.random.default_rng(0).permutation(len(T))
     sorted_rows, shuffled = (chain(mapper=mapper).fit(T.iloc[rows], F.iloc[rows]) for rows in (slice(None), order))
-    np.testing.assert_allclose(shuffled.residuals().values, sorted_rows.residuals().values, atol=1e-6)
-    np.testing.assert_allclose(shuffled.residuals().weather, sorted_rows.residuals().weather)
+    np.testing.assert_allclose(shuffled.recorder_.residuals.values, sorted_rows.recorder_.residuals.values, atol=1e-6)
+    np.testing.assert_allclose(shuffled.recorder_.residuals.weather, sorted_rows.recorder_.residuals.weather)
 
 
 @pytest.mark.nightly
@@ -281,7 +283,7 @@ def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
 def test_any_mapper_has_residuals(mapper):
     fem = chain(mapper=mapper).fit(T, F)
     lagged = 1 if hasattr(mapper, "steps") else 0
-    assert fem.residuals().values.shape == (365 - lagged, 6)
+    assert fem.recorder_.residuals.values.shape == (365 - lagged, 6)
     with pytest.warns(UserWarning, match="1 of 365 .*not-predicted") if lagged else nullcontext():
         std = fem.predict(T, return_std=True)[1]
     np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
@@ -297,12 +299,12 @@ def test_few_records_have_no_residuals():
 
 def test_pickles_keep_residuals_and_clones_do_not():
     twin = pickle.loads(pickle.dumps(fitted()))
-    np.testing.assert_array_equal(twin.residuals().values, fitted().residuals().values)
+    np.testing.assert_array_equal(twin.recorder_.residuals.values, fitted().recorder_.residuals.values)
     for one, other in zip(twin.predict_interval(T), fitted().predict_interval(T), strict=True):
         pd.testing.assert_frame_equal(one, other)
     assert not hasattr(clone(fitted()), "_residuals")
     refitted = pickle.loads(pickle.dumps(fitted())).fit(T[:200], F[:200])
-    assert len(refitted.residuals().values) == 200
+    assert len(refitted.recorder_.residuals.values) == 200
 
 
 # Standard deviations and intervals
@@ -311,7 +313,7 @@ def test_pickles_keep_residuals_and_clones_do_not():
 def test_standard_deviations_are_spreads_in_hertz():
     frequencies, std = fitted().predict(T, return_std=True)
     pd.testing.assert_frame_equal(frequencies, fitted().predict(T))
-    np.testing.assert_allclose(std / frequencies, fitted().residuals().spread(T.to_numpy()))
+    np.testing.assert_allclose(std / frequencies, fitted().recorder_.residuals.spread(T.to_numpy()))
     assert (std > 0).all(axis=None)
     np.testing.assert_allclose((std / frequencies).mean(), 0.01, rtol=0.2)  # the noise of the campaign
     assert isinstance(chain().fit(T.to_numpy(), F.to_numpy()).predict(T[:3].to_numpy(), True)[1], np.ndarray)
@@ -409,7 +411,7 @@ def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadratur
         for side in (-deviations, deviations)
     ]
     change = np.sqrt(np.mean([np.log(one / predicted) ** 2 for one in moved], axis=0))
-    spread = fitted().residuals().spread(filled)
+    spread = fitted().recorder_.residuals.spread(filled)
     np.testing.assert_allclose(std, predicted * np.hypot(spread, change), rtol=1e-9)
 
 
@@ -421,7 +423,7 @@ def test_a_filled_temperature_costs_wherever_a_lag_reaches_it():
     std = lagged.predict(holed, True)[1]
     plain = lagged.predict(holed)
     inputs = lagged.mapper_[:-1].transform(pd.DataFrame(lagged.sensors_.fill(holed)[0], holed.index, holed.columns))
-    wider = (std > plain * lagged.residuals().spread(inputs.to_numpy()) * (1 + 1e-9)).any(axis=1)
+    wider = (std > plain * lagged.recorder_.residuals.spread(inputs.to_numpy()) * (1 + 1e-9)).any(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(wider), np.arange(100, 105))
 
 

@@ -55,7 +55,7 @@ assert_type(from_arrays.predict(t, return_std=True)[1], Array)
 assert_type(from_arrays.predict_interval(t)[0], Array)
 assert_type(from_arrays.predict_parameters(t), Array)
 assert_type(from_arrays.estimate_parameters(f), Array)
-assert_type(from_arrays.residuals().expected(from_arrays.weather(t).inputs), Array)
+assert_type(from_arrays.recorder_.residuals.expected(from_arrays.weather(t).inputs), Array)
 assert_type(from_arrays.simulate(t, noise="fitted", random_state=0), Array)
 assert_type(from_arrays.score(t, f), float)
 

@@ -123,7 +123,7 @@ class PageWriter:
             report = getattr(chain, "report_", None)
             facts |= {
                 "bridge": bridge,
-                "report": report if hasattr(report, "offsets") else None,
+                "report": report if hasattr(report, "modes") else None,
                 "settings": None if chain is None else settings_of({"model": chain}),
                 "versions": versions(),
             }

@@ -56,17 +56,17 @@ class CampaignSimulator:
     @property
     def names(self) -> list[Hashable]:
         """Columns of the tables: temperatures, measured modes, further modes."""
-        sensors = column_names(self.fem.training_records_[0], "T")
+        sensors = column_names(self.fem.records_.temperatures, "T")
         return [*sensors, *self.fem.mode_names_, *(mode_name(mode) for mode in self.modes)]
 
     def clean(self) -> tuple[Array, dict[tuple[str, float], Array]]:
         """Frequencies without noise: healthy in the weather of the training, and by family and severity in the new."""
-        weather = self.fem.training_records_[0]
+        weather = self.fem.records_.temperatures
         return self._clean(weather, {}), {key: self._clean(self.T, changes) for key, changes in self.changes.items()}
 
     def draw(self, clean: tuple[Array, Mapping[Any, Array]], seed: int) -> tuple[pd.DataFrame, dict]:
         """Records with noise: a baseline, and frames by family and severity, all of which have the same noise."""
-        (healthy, changed), weather = clean, self.fem.training_records_[0]
+        (healthy, changed), weather = clean, self.fem.records_.temperatures
         seeds = np.random.RandomState(seed).randint(LARGEST_SEED, size=(1 + -(-self.n_baseline // len(weather)), 2))
         factors, seen = self._measured(self.T, seeds[0])
         periods = []
@@ -393,7 +393,7 @@ def _warn_of_unknown_modes(fem: FittedChain, ranks: Sequence[int]) -> None:
 def _scatter(study: DetectabilityStudy) -> float:
     """Median relative scatter of the measured modes."""
     if isinstance(study.noise, str):
-        return float(np.median(np.sqrt(np.nanmean(study.fem.residuals().values ** 2, axis=0))))
+        return float(np.median(np.sqrt(np.nanmean(study.fem.recorder_.residuals.values**2, axis=0))))
     return float(np.median(check_noise(study.noise, len(study.fem.mode_names_), study.fem.mode_names_)))
 
 
@@ -407,7 +407,7 @@ def _with_sensors(
     """Trials for each further sensor, simulated by a chain that was fitted with it."""
     if sensors is None:
         return []
-    T, F = study.fem.training_records_
+    T, F = study.fem.records_.temperatures, study.fem.records_.frequencies
     if not isinstance(sensors, pd.DataFrame) or not sensors.shape[1]:
         raise ValueError(f"sensors is {sensors!r:.200}; expected a frame with a column for each candidate")
     if not set(column_names(T, "T")) & set(present.columns):

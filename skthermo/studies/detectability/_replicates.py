@@ -36,7 +36,7 @@ from skthermo.studies.detectability._simulation import (
     Simulation,
     clean_frequencies,
 )
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import FittedChain, refitted, resampled
 from skthermo.updating import ModelUpdater
 
 DEVIATION = 0.005  # relative, of measured mean frequencies from those of a perfect model
@@ -112,10 +112,10 @@ class Replicates:
             if part == "weather":
                 T = self.years[number % n_years] if n_years > 1 else resampled_days(T, np.random.RandomState(weather))
             elif part == "baseline":
-                chain = self.fem.resampled(int(records))
+                chain = resampled(self.fem, int(records))
             else:
-                chain = self.fem.refitted(model=self.models[number % len(self.models)])
-                chain = chain.resampled(int(records)) if "baseline" in self.parts else chain
+                chain = refitted(self.fem, model=self.models[number % len(self.models)])
+                chain = resampled(chain, int(records)) if "baseline" in self.parts else chain
             yield part, chain, T
 
     def predicted_time(self, seconds: float, n_repeats: int, share: float) -> str:
@@ -129,7 +129,7 @@ class Replicates:
 
     def noise_levels(self, number: int) -> Array:
         """Factors of the noise of each mode, (n_modes,), which the training records determine up to an error."""
-        errors = self.fem.residuals().level_errors
+        errors = self.fem.recorder_.residuals.level_errors
         return np.exp(errors * np.random.RandomState([self.seeds[number], 1]).standard_normal(len(errors)))
 
     def fault_stream(self, number: int) -> np.random.RandomState:
@@ -161,7 +161,7 @@ def checked_parts(uncertainty: str | Sequence[str], with_models: bool = False) -
 
 def drawn_models(fem: FittedChain, number: int, seed: int) -> list[FEModel]:
     """Models calibrated to the mean of the training records, as far as these determine stiffnesses."""
-    mean = np.nanmean(as_floats(fem.training_records_[1]), axis=0)
+    mean = np.nanmean(as_floats(fem.records_.frequencies), axis=0)
     with without_warnings():
         try:
             updater = ModelUpdater(fem.model, bounds=HALF_WIDTH, prior=SPREAD).fit(mean, frequency_std=DEVIATION * mean)

@@ -102,7 +102,7 @@ def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | N
 
     Only a detector with a part that has ``targets`` sees temperatures.
     """
-    T, F = fem.training_records_
+    T, F = fem.records_.temperatures, fem.records_.frequencies
     names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
     everything = SeenColumns(names, n_sensors, np.arange(len(names)), False)
     if baseline is None:
@@ -159,12 +159,12 @@ class Candidate:
             begins = before.steps[:-1], healthy
 
             def learn() -> tuple[Pipeline, Table]:
-                return remembered(memory, "head", lambda: (before, before.fit_transform(healthy)), lambda: begins)
+                return remembered(memory, "head", lambda: (before, before.fit_transform(healthy)), begins)
 
             before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
             head = tuple(step for _, step in before.steps[:-1])
         last = fitted[-1] if is_pipeline else fitted
-        last = remembered(memory, "detector", lambda: last.fit(seen), lambda: (last, seen))
+        last = remembered(memory, "detector", lambda: last.fit(seen), (last, seen))
         if is_pipeline:
             fitted.steps = [*before.steps[:-1], (fitted.steps[-1][0], last)]
         detector = fitted if is_pipeline else last
@@ -365,7 +365,7 @@ class Measurement:
     def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
-        if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.training_records_[0])).any():
+        if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.records_.temperatures)).any():
             return noise, weather.given
         missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
         T = np.where(missing, np.nan, as_floats(weather.given))

@@ -87,7 +87,7 @@ class DetectabilityStudy(BaseEstimator):
         What the prediction intervals include, in which the rate of a measured campaign should lie:
 
         - "noise": another draw of the noise;
-        - "baseline": the training records could have been others (`~skthermo.surrogate.DataInformedFEM.resampled`), so
+        - "baseline": the training records could have been others (`~skthermo.surrogate.resampled`), so
           that the structure is another one than the chain, and have had other gaps and outliers; the detectors stay as
           they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;

@@ -481,7 +481,7 @@ def _task(
     seeds: Sequence[int],
 ) -> DetectionTask:
     """A task with the noise of some seeds."""
-    names = [*column_names(fem.training_records_[0], "T"), *fem.mode_names_]
+    names = [*column_names(fem.records_.temperatures, "T"), *fem.mode_names_]
     positions = [names.index(name) for name in baseline.columns]
     labels = _labels(scenarios, T)
     n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
@@ -519,7 +519,7 @@ def _task(
 
 def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
     """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
-    T, F = fem.training_records_
+    T, F = fem.records_.temperatures, fem.records_.frequencies
     names, n_sensors = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_
     if baseline is None:
         stamped = T if has_stamps(T) else F

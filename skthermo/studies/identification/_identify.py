@@ -31,6 +31,7 @@ from skthermo.studies.identification._identified import (
 )
 from skthermo.studies.identification._shapes import ShapeEffects, shape_shift
 from skthermo.studies.identification._shift import ComparedRecords, FrequencyShift, observe
+from skthermo.surrogate import refitted
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
@@ -170,7 +171,7 @@ def identify_damage(
 
         def with_model(model: Any, seed: int) -> Posterior:
             with without_warnings():  # the chain itself has given them
-                chain = fem.refitted(model=model)
+                chain = refitted(fem, model=model)
                 scale = scale_of(beside(chain, as_floats(chain.predict_parameters(seen.temperatures))))
             return Posterior.of(scale, *explanations(scale), np.random.RandomState(seed))
 

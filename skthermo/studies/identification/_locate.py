@@ -26,6 +26,7 @@ from skthermo.studies.identification._identified import RARE, IdentifiedDamage
 from skthermo.studies.identification._identify import compared, identify_damage
 from skthermo.studies.identification._located import LIKELY, Explained, LocatedDamage, Places, fewest, located_damage
 from skthermo.studies.identification._shift import FrequencyShift, observe
+from skthermo.surrogate import with_model
 
 MOST_PIECES, MOST_SLOW_PIECES = 16, 8
 """Into how many pieces a group is divided first; fewer for models that are slow to solve."""
@@ -364,7 +365,7 @@ class MeasuredShift:
 
     def _curves(self, question: Question) -> tuple[Observed, Curves]:
         """What was measured, and the effects of all stretches on it."""
-        twin = self.fem.with_model(self.structure.divide(self.fem.model, question.parts))
+        twin = with_model(self.fem, self.structure.divide(self.fem.model, question.parts))
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)

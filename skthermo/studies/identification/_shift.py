@@ -57,7 +57,7 @@ class FrequencyShift:
 
 def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
     """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
-    residuals = fem.residuals().expected(fem.weather(T).inputs)
+    residuals = fem.recorder_.residuals.expected(fem.weather(T).inputs)
     return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals))) - fem.discrepancy_(T)
 
 
@@ -79,14 +79,14 @@ def measured_shift(fem: Any, T: Any, shifts: Array, noise: ArrayLike | Literal["
     """The mean of shifts of records at temperatures T, and its covariance from the training records."""
     scatter = scatter_of(fem, noise)
     shifts = np.where(scatter.variances > 0, shifts, np.nan)
-    order, places = _places(fem.training_records_[0], T)
+    order, places = _places(fem.records_.temperatures, T)
     n_records, mean = (~np.isnan(shifts)).sum(axis=0), means_of_known(shifts)
     new = scatter.of_sums(~np.isnan(shifts[order]) / np.maximum(n_records, 1), places)
     n_independent, variance_of_mean = scatter.n_independent(new), np.diag(new.sum(axis=0))
     within = np.maximum(scatter.variances - variance_of_mean, np.finfo(float).tiny)
     spread = np.sqrt(means_of_known((shifts - mean) ** 2) / within)
     inputs = fem.weather(T).inputs[(~np.isnan(shifts)).any(axis=1)]
-    trained, measured, factor = fem.residuals().prediction_weights(inputs), ~np.isnan(mean), 1.0
+    trained, measured, factor = fem.recorder_.residuals.prediction_weights(inputs), ~np.isnan(mean), 1.0
     wider = np.ones(len(mean))
     if isinstance(noise, str):
         limit = stats.f.isf(WIDER / len(mean), np.maximum(n_independent - 1, 1), np.maximum(scatter.numbers[1], 1))
@@ -118,7 +118,7 @@ def stated_deviations(noise: Any, n_modes: int, *, what: str, **options: Any) ->
 
 def scatter_of(fem: Any, noise: ArrayLike | Literal["fitted"]) -> Any:
     """How records scatter: as in training, or as stated."""
-    names, residuals = fem.mode_names_, fem.residuals()
+    names, residuals = fem.mode_names_, fem.recorder_.residuals
     deviations = stated_deviations(noise, len(names), what="noise", mode_names=names)
     return residuals.scatter if deviations is None else Scatter.independent(deviations, len(residuals.values))
 
@@ -286,7 +286,7 @@ def observe(fem: Any, T: ArrayLike, F: ArrayLike, noise: ArrayLike | Literal["fi
         frequencies, shifts = (np.where(outliers[:, np.newaxis], np.nan, array) for array in (frequencies, shifts))
         shift = measured_shift(fem, T, shifts, noise)
     _check_ratios(np.exp(shift.mean), fem.mode_names_)
-    records = ComparedRecords.of(left_out, shift, len(fem.residuals().values), latest(T, outliers))
+    records = ComparedRecords.of(left_out, shift, len(fem.recorder_.residuals.values), latest(T, outliers))
     return ObservedRecords(shift, records, T, theta, frequencies)
 
 

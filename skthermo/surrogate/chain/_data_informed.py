@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
@@ -29,7 +30,6 @@ from skthermo._tables.arrays import (
     check_model,
     is_auto,
     is_real,
-    refuse_no_table,
 )
 from skthermo._tables.frames import (
     Table,
@@ -64,19 +64,20 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, set_aside
-from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange, misplaced_columns
 from skthermo.surrogate._regression import TemperatureMapper
 from skthermo.surrogate._simulator import Simulator, tolerance
-from skthermo.surrogate.chain._fit_report import mode_warnings, report_of
+from skthermo.surrogate.chain._fit_report import FittedChain, mode_warnings, report_of
 from skthermo.surrogate.chain._records import (
     RecordSimulator,
     TrainingRecords,
+    frequency_table,
     measurement_noise,
     without_outliers,
 )
 from skthermo.surrogate.chain._stages import (
     ChainInverse,
+    Discrepancy,
     ThermalModel,
     Weather,
     frequencies_of,
@@ -84,7 +85,7 @@ from skthermo.surrogate.chain._stages import (
     possible,
     ratio_regressor,
 )
-from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
+from skthermo.surrogate.inverse import PosteriorInverse
 
 
 class Simulated(TypedDict, total=False):
@@ -160,6 +161,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         modes that were not measured.
     recorder_ : RecordSimulator
         What draws noise, gaps and outliers as the training records have them (``noise``, ``gaps`` and ``service_of``).
+        ``residuals`` are those of the records, out of fold and relative: measured frequency over the prediction, minus
+        1; ``residuals.expected(weather(T).inputs)`` is their mean in weather like that of each row.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -284,10 +287,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             One, with counts, for each kind of doubtful data in ``report_``, and for what
             `~skthermo.preprocessing.check_records` finds.
         """
-        given = self._read_records(X, y)
+        check_model(self.model)
+        options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
+        T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
+        F, self.y_is_vector_ = frequency_table(y)
+        given = T, frame_like(F, check_array(F, **options))
         found = set_aside(*given, model=self.model, needs_all=True)
         T, F = found.temperatures, found.frequencies
-        inverse = self._begin(F, shapes)
+        self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
+        inverse = self._clone_parts(shapes)
         weights = row_weights(sample_weight, X)
         if weights is not None:
             check_takes_weights(self.mapper_)
@@ -299,112 +307,16 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with stages.stage("inverse", self.inverse_):
             aligned = self._fit_inverse(inverse, T, usable, shapes)
         with stages.stage("parameters of the records"):
-            estimates = inverse.estimates(aligned, self.parameter_names_)
-            warn_each(() if shapes is None else inverse.shape_warnings(aligned, estimates.theta))
+            parameters = inverse.invert(aligned, self.parameter_names_)
+            warn_each(() if shapes is None else inverse.shape_warnings(aligned, parameters.theta))
         with stages.stage("temperature mapper", self.mapper_):
-            fit_weighted(self.mapper_, filled, named(filled, estimates.theta, self.parameter_names_), weights)
+            fit_weighted(self.mapper_, filled, named(filled, parameters.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
-            self._learn_discrepancy(inverse, T, F, filled, usable, estimates.theta, weights)
-            self.report_ = report_of(self, estimates, findings)
+            hold(self, recorder_of(self, inverse, T, F, filled, usable, parameters.theta, weights))
+            self.report_ = report_of(self, parameters, findings)
         stages.end()
         warn_each(self.report_.warnings())
         return self
-
-    def refitted(
-        self,
-        X: ArrayLike | None = None,
-        y: ArrayLike | None = None,
-        *,
-        model: FEModel | None = None,
-        random_state: int = 0,
-    ) -> DataInformedFEM:
-        """A chain of the same parts that has learned other records, or has another FE model.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors), optional
-            Temperatures in degrees Celsius; by default those of `fit`.
-        y : array-like or DataFrame of shape (n_samples, n_modes), optional
-            Frequencies in Hz; by default those of `fit`.
-        model : FE model, optional
-            With the parameters, damage groups and modes of this one's, such as
-            `~skthermo.updating.ModelUpdater.sample_models` gives; by default the same.
-        random_state : int, default=0
-            Seed of every part that has no seed of its own.
-
-        Returns
-        -------
-        DataInformedFEM
-            Fitted; this chain is unchanged.
-
-        Notes
-        -----
-        Prior and noise are learned anew. A `PosteriorInverse` sees frequencies alone, also where `fit` had shapes.
-        Records whose weight was 0 in `fit` are left out, and other weights are 1.
-        """
-        T, F = self.training_records_
-        counted = self.records_.counted
-        chain = clone(self)
-        models = {name: model for name, part in chain.get_params().items() if part is self.model}
-        chain.set_params(**({} if model is None else models), random_state=random_state, verbose=0, memory=None)
-        if isinstance(self.inverse_, PosteriorInverse):
-            chain.set_params(inverse__dofs=None, inverse__memory=None)  # others than its own are hardly asked for again
-        weights = None if counted.all() or X is not None else counted.astype(float)
-        if self.y_is_vector_:
-            F = F.squeeze(axis=1)
-        return chain.fit(T if X is None else X, F if y is None else y, sample_weight=weights)
-
-    def resampled(self, random_state: int | np.random.RandomState | None = None) -> DataInformedFEM:
-        """A chain that has learned other records, as this structure could have given them in the training weather.
-
-        Such chains differ from this one as it differs from the structure, if its model is right.
-
-        Parameters
-        ----------
-        random_state : int, RandomState or None, default=None
-            Seed of the records.
-
-        Returns
-        -------
-        DataInformedFEM
-            With a temperature mapper, a discrepancy, ``records_``, ``parameters_`` and fitted noise of its own; all
-            else, such as ``report_``, is this chain's.
-
-        Notes
-        -----
-        A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
-        weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
-        correlated. Nothing is inverted, and what the discrepancy learns counts as much as in this chain.
-        """
-        check_is_fitted(self)
-        records = self.records_.resampled(self.residuals(), self.discrepancy_, as_random_state(random_state))
-        filled = frame_like(records.temperatures, self.sensors_.fill(records.temperatures)[0])
-        targets = named(filled, records.targets, self.parameter_names_)
-        mapper = fit_weighted(clone(self.mapper_), filled, targets, records.weights)
-        learned = possible(mapper.predict(filled))[0]
-        records = replace(records, learned=learned, modelled=self.thermal_.frequencies(learned))
-        discrepancy = self.discrepancy_.again(records.ratios, mapper)
-        thermal = replace(self.thermal_, mapper=mapper, discrepancy=discrepancy)
-        return copy(self)._hold(thermal, RecordSimulator(thermal, records, self.recorder_.service))
-
-    def with_model(self, model: FEModel) -> DataInformedFEM:
-        """This fitted chain with another model of the same frequencies, such as one with divided damage groups.
-
-        Parameters
-        ----------
-        model : FE model
-            With the parameters and modes of this one's. It is not reduced.
-
-        Returns
-        -------
-        DataInformedFEM
-            All that was learned is this chain's, and so are the records.
-        """
-        check_is_fitted(self)
-        simulator = replace(self.simulator_, model=model, reduced=None, box=None, usual=None)
-        twin = copy(self)
-        twin.model = model
-        return twin._hold(replace(self.thermal_, simulator=simulator), self.recorder_)
 
     @overload
     def estimate_parameters(self, F: pd.DataFrame, shapes: ArrayLike | None = None) -> pd.DataFrame: ...
@@ -502,7 +414,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         predicted = self._as_targets(X, frequencies)
         if not return_std:
             return predicted
-        deviations = np.hypot(self.residuals().spread(weather.inputs), self.thermal_.known_deviations(weather))
+        deviations = np.hypot(self.recorder_.residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
         return predicted, self._as_targets(X, frequencies * deviations)
 
     def predict_covariance(self, X: ArrayLike) -> Array:
@@ -517,8 +429,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         ndarray of shape (n_samples, n_modes, n_modes)
             In Hz squared, in the measured domain, to first order: G C G' with the covariance C of the parameters that
-            the mapper states, such as a `~skthermo.fleet.FleetMapper`, and G = d f / d theta, times the discrepancy.
-            Without the scatter of the measurement. Errors of records in similar weather do not average out.
+            the mapper states, and G = d f / d theta, times the discrepancy, without the scatter of the measurement.
+            Errors of records in similar weather do not average out.
 
         Raises
         ------
@@ -531,9 +443,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 f"{type(last_step(self.mapper_)).__name__} does not state how uncertain it is; expected a mapper with "
                 "predict_covariance, such as FleetPrior().fit(bridges).mapper()"
             )
-        weather = self.weather(X)
-        predicted, relative = self.thermal_.predicted(weather), self.thermal_.covariances_of_mapper(weather)
-        return relative * predicted[:, :, np.newaxis] * predicted[:, np.newaxis]
+        return self.thermal_.predicted_covariance(self.weather(X))
 
     @overload
     def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
@@ -563,7 +473,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
         Notes
         -----
-        Split-conformal intervals [LGR18]_ from `residuals`, in multiples of their spread in similar weather
+        Split-conformal intervals [LGR18]_ from ``recorder_.residuals``, in multiples of their spread in similar weather
         (:doc:`/guide/uncertainty`). If new records are exchangeable with the training records, an interval holds a mode
         with about the probability asked; the share of a short period varies more, because records are serially
         correlated. Beyond the training range, and where a temperature was filled, it is wider.
@@ -579,16 +489,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         >>> bool(0.85 < held.to_numpy().mean() < 0.95)
         True
         """
-        check_is_fitted(self)
         if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         weather = self.weather(X)
-        frequencies, residuals = self.thermal_.simulated(weather), self.residuals()
+        frequencies, residuals = self.thermal_.simulated(weather), self.recorder_.residuals
         margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
         margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
-        bounds = (frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin))
-        lowest, highest = (self._as_targets(X, bound) for bound in bounds)
-        return lowest, highest
+        lowest, highest = frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin)
+        return self._as_targets(X, lowest), self._as_targets(X, highest)
 
     @overload
     def simulate(self, X: pd.DataFrame, **options: Unpack[Simulated]) -> pd.DataFrame: ...
@@ -661,7 +569,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return frame_like(X, frequencies, self.mode_names_)
 
     def weather(self, X: ArrayLike) -> Weather:
-        """Temperatures, checked and filled, as ``thermal_``, ``recorder_`` and `residuals` take them.
+        """Temperatures, checked and filled, as ``thermal_`` and ``recorder_`` take them.
 
         Parameters
         ----------
@@ -677,26 +585,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         values = validate_data(self, X, dtype=np.float64, reset=False)
         filled, deviations = self.sensors_.fill(values)
         return Weather(X, frame_like(X, filled), deviations, self.mapper_)
-
-    def residuals(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records by weather.
-
-        The first call fits the mapper and the discrepancy in each of five folds.
-
-        Returns
-        -------
-        BaselineResiduals
-            Relative: measured frequency over the prediction, minus 1. ``expected(weather(T).inputs)`` is their mean in
-            weather like that of each row, and ``n_expected`` the effective number of records that it is based on.
-        """
-        check_is_fitted(self)
-        return self.recorder_.residuals
-
-    @property
-    def training_records_(self) -> tuple[Table, Table]:
-        """Temperatures and frequencies that `fit` was given."""
-        check_is_fitted(self)
-        return self.records_.temperatures, self.records_.frequencies
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.
@@ -776,50 +664,28 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         part = getattr(self, name)
         return self._default_part(name) if part is None or is_auto(part) else clone(part)
 
-    def _cloned_parts(self) -> tuple[Any, Any, Any, Any]:
-        """Clones of inverse, mapper, aligner and imputer, with the model, and seeds where they have none."""
+    def _clone_parts(self, shapes: ArrayLike | None) -> ChainInverse:
+        """Clone inverse, mapper, aligner and imputer, with the model, and seeds where they have none; the inverse."""
+        tolerance(self.model, self.reduce)
         unchanged = FunctionTransformer().set_output(transform="default")
-        inverse, mapper = self._part("inverse"), self._part("mapper")
-        aligner = unchanged if self.aligner == "passthrough" else self._part("aligner")
-        imputer = None if self.imputer == "passthrough" else clone(self.imputer)
-        for part in (aligner, *aligner.get_params().values()):
+        self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
+        self.aligner_ = unchanged if self.aligner == "passthrough" else self._part("aligner")
+        self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
+        for part in (self.aligner_, *self.aligner_.get_params().values()):
             if isinstance(part, BiasAligner) and part.reference is None:
                 part.set_params(reference=self.model)
-        ChainInverse(inverse).prepare(self.model, self.memory, self.reduce)
+        inverse = ChainInverse(self.inverse_)
+        inverse.prepare(self.model, self.memory, self.reduce, has_shapes=shapes is not None)
         random_state = seeded(self.random_state)
-        for part in (inverse, mapper, aligner, imputer):
+        for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
-        return inverse, mapper, aligner, imputer
-
-    def _read_records(self, X: Table, y: Any) -> tuple[Table, Table]:
-        """Copies of temperatures and frequencies, checked; frames stay frames."""
-        check_model(self.model)
-        if y is None:
-            raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
-        options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
-        T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
-        refuse_no_table(y, "y", or_vector=True)
-        self.y_is_vector_ = np.ndim(y) == 1
-        if self.y_is_vector_:
-            y = y.to_frame("f1" if y.name is None else y.name) if isinstance(y, pd.Series) else np.reshape(y, (-1, 1))
-        F = frame_like(y, check_array(y, **options))
-        return T, F
-
-    def _begin(self, F: Table, shapes: ArrayLike | None) -> ChainInverse:
-        """Clone the parts for frequencies and, perhaps, shapes; the inverse."""
-        tolerance(self.model, self.reduce)
-        self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
-        self.inverse_, self.mapper_, self.aligner_, self.imputer_ = self._cloned_parts()
-        inverse = ChainInverse(self.inverse_)
-        if shapes is None and inverse.shape_inputs is not None:
-            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
         return inverse
 
     def _look_at(self, T: Table, F: Table, given: tuple[Table, Table]) -> RecordFindings:
         """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
         mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
-        findings = findings_of(self._findings, *given, mended=mended)
+        findings = findings_of(partial(known_findings, self.memory), *given, mended=mended)
         warn_each(misplaced_columns(T, F))
         warn_each(mode_warnings(self.model, F))
         self.sensors_ = SensorRegression.of(T)
@@ -828,67 +694,211 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             self.mapper_ = make_pipeline(means, self.mapper_)
         return findings
 
-    def _findings(self, T: Table, F: Table) -> RecordFindings:
-        """What `check_records` finds, read from the memory if these records were checked before."""
-        return remembered(self.memory, "checks", lambda: check_records(T, F), lambda: (T, F))
-
     def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Table:
         """Fill gaps, fit aligner and M1; the aligned records."""
         if self.imputer_ is not None:
             values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
             F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
         aligned = inverse.with_shapes(self.aligner_.fit(F).transform(F), shapes)
-        for part in inverse.inverses:
-            if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
-                part.set_params(noise=self.noise_)
-        self.inverse_.fit(aligned)
+        inverse.fit(aligned, self.noise_)
         return aligned
-
-    def _learn_discrepancy(
-        self, inverse: ChainInverse, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Any
-    ) -> None:
-        """Learn what the model cannot follow, and hold all that predicts."""
-        inputs, learned = inputs_of_last_step(self.mapper_, filled), possible(self.mapper_.predict(filled))[0]
-        known = next((getattr(part, "simulator_", None) for part in inverse.inverses), None)
-        simulator = Simulator.around(self.model, learned, self.reduce, known)
-        records = TrainingRecords(
-            temperatures=T,
-            frequencies=F,
-            inputs=as_floats(inputs),
-            targets=theta,
-            learned=learned,
-            usable=as_floats(usable),
-            modelled=frequencies_of(simulator, self.aligner_, learned, self.n_jobs),
-            weights=weights,
-            parameter_names=self.parameter_names_,
-        )
-        thermal = ThermalModel(
-            mapper=self.mapper_,
-            simulator=simulator,
-            aligner=self.aligner_,
-            discrepancy=records.learns(self._part("discrepancy"), self.mapper_, self.sensors_),
-            sensors=self.sensors_,
-            training_range=TrainingRange.of(inputs, records.trained),
-            limits=limits_in_weather(theta),
-            parameter_names=self.parameter_names_,
-            mode_names=self.mode_names_,
-            n_jobs=self.n_jobs,
-        )
-        self._hold(thermal, RecordSimulator(thermal, records))
-
-    def _hold(self, thermal: ThermalModel, recorder: RecordSimulator) -> Self:
-        """Hold what was learned, and its parts by the names that users know."""
-        self.thermal_, self.recorder_, self.records_ = thermal, recorder, recorder.records
-        self.mapper_, self.aligner_, self.simulator_ = thermal.mapper, thermal.aligner, thermal.simulator
-        self.discrepancy_, self.training_range_ = thermal.discrepancy, thermal.training_range
-        self.parameters_ = frame_like(self.records_.temperatures, self.records_.targets, self.parameter_names_)
-        return self
 
     def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
 
+def known_findings(memory: str | Memory | None, T: Table, F: Table) -> RecordFindings:
+    """What `check_records` finds, read from the memory if these records were checked before."""
+    return remembered(memory, "checks", partial(check_records, T, F), (T, F))
+
+
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
+
+
+def recorder_of(
+    chain: DataInformedFEM,
+    inverse: ChainInverse,
+    T: Table,
+    F: Table,
+    filled: Table,
+    usable: Table,
+    theta: Array,
+    weights: Array | None,
+) -> RecordSimulator:
+    """What predicts and draws records, of a chain whose mapper has learned theta."""
+    mapper, aligner, names = chain.mapper_, chain.aligner_, chain.parameter_names_
+    inputs, learned = inputs_of_last_step(mapper, filled), possible(mapper.predict(filled))[0]
+    known = getattr(inverse.posterior, "simulator_", None)
+    simulator = Simulator.around(chain.model, learned, chain.reduce, known)
+    records = TrainingRecords(
+        temperatures=T,
+        frequencies=F,
+        inputs=as_floats(inputs),
+        targets=theta,
+        learned=learned,
+        usable=as_floats(usable),
+        modelled=frequencies_of(simulator, aligner, learned, chain.n_jobs),
+        weights=weights,
+        parameter_names=names,
+    )
+    parts = {"mapper": mapper, "sensors": chain.sensors_}
+    thermal = ThermalModel(
+        simulator=simulator,
+        aligner=aligner,
+        discrepancy=Discrepancy.of(chain._part("discrepancy"), records.ratios, records.folds, **parts),
+        training_range=TrainingRange.of(inputs, records.trained),
+        limits=limits_in_weather(theta),
+        parameter_names=names,
+        mode_names=chain.mode_names_,
+        n_jobs=chain.n_jobs,
+        **parts,
+    )
+    return RecordSimulator(thermal, records)
+
+
+def hold(chain: DataInformedFEM, recorder: RecordSimulator) -> DataInformedFEM:
+    """Let a chain hold what was learned, and its parts by the names that users know."""
+    thermal, records = recorder.model, recorder.records
+    chain.thermal_, chain.recorder_, chain.records_ = thermal, recorder, records
+    chain.mapper_, chain.aligner_, chain.simulator_ = thermal.mapper, thermal.aligner, thermal.simulator
+    chain.discrepancy_, chain.training_range_ = thermal.discrepancy, thermal.training_range
+    chain.parameters_ = frame_like(records.temperatures, records.targets, chain.parameter_names_)
+    return chain
+
+
+def refitted(
+    fem: FittedChain,
+    X: ArrayLike | None = None,
+    y: ArrayLike | None = None,
+    *,
+    model: FEModel | None = None,
+    random_state: int = 0,
+) -> DataInformedFEM:
+    """A chain of the same parts that has learned other records, or has another FE model.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted; it is unchanged.
+    X : array-like or DataFrame of shape (n_samples, n_sensors), optional
+        Temperatures in degrees Celsius; by default those of `DataInformedFEM.fit`.
+    y : array-like or DataFrame of shape (n_samples, n_modes), optional
+        Frequencies in Hz; by default those of `DataInformedFEM.fit`.
+    model : FE model, optional
+        With the parameters, damage groups and modes of the chain's, such as
+        `~skthermo.updating.ModelUpdater.sample_models` gives; by default the same.
+    random_state : int, default=0
+        Seed of every part that has no seed of its own.
+
+    Returns
+    -------
+    DataInformedFEM
+        A fitted one.
+
+    Notes
+    -----
+    Prior and noise are learned anew. A `PosteriorInverse` sees frequencies alone, also where the chain was fitted to
+    shapes. Records whose weight was 0 are left out, and other weights are 1.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM, refitted
+    >>> year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> other = refitted(fem, later.temperatures, later.frequencies)
+    >>> bool(abs(other.predict(year.temperatures) / fem.predict(year.temperatures) - 1).max().max() < 0.02)
+    True
+    """
+    check_is_fitted(fem)
+    records = fem.records_
+    T, F, counted = records.temperatures, records.frequencies, records.counted
+    chain = clone(fem)
+    models = {name: model for name, part in chain.get_params().items() if part is fem.model}
+    chain.set_params(**({} if model is None else models), random_state=random_state, verbose=0, memory=None)
+    if isinstance(fem.inverse_, PosteriorInverse):
+        chain.set_params(inverse__dofs=None, inverse__memory=None)  # others than its own are hardly asked for again
+    weights = None if counted.all() or X is not None else counted.astype(float)
+    if fem.y_is_vector_:
+        F = F.squeeze(axis=1)
+    return chain.fit(T if X is None else X, F if y is None else y, sample_weight=weights)
+
+
+def resampled(fem: FittedChain, random_state: int | np.random.RandomState | None = None) -> DataInformedFEM:
+    """A chain that has learned other records, as its structure could have given them in the training weather.
+
+    Such chains differ from this one as it differs from the structure, if its model is right.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted; it is unchanged.
+    random_state : int, RandomState or None, default=None
+        Seed of the records.
+
+    Returns
+    -------
+    DataInformedFEM
+        With a temperature mapper, a discrepancy, ``records_``, ``parameters_`` and fitted noise of its own; all else,
+        such as ``report_``, is that of the chain.
+
+    Notes
+    -----
+    A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
+    weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
+    correlated. Nothing is inverted, and what the discrepancy learns counts as much as in the chain.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM, resampled
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> other = resampled(fem, random_state=1)
+    >>> bool(abs(other.predict(year.temperatures) / fem.predict(year.temperatures) - 1).max().max() < 0.02)
+    True
+    """
+    check_is_fitted(fem)
+    records = fem.records_.resampled(fem.recorder_.residuals, fem.discrepancy_, as_random_state(random_state))
+    filled = frame_like(records.temperatures, fem.sensors_.fill(records.temperatures)[0])
+    targets = named(filled, records.targets, fem.parameter_names_)
+    mapper = fit_weighted(clone(fem.mapper_), filled, targets, records.weights)
+    learned = possible(mapper.predict(filled))[0]
+    records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
+    discrepancy = fem.discrepancy_.again(records.ratios, mapper)
+    thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
+    return hold(copy(fem), RecordSimulator(thermal, records, fem.recorder_.service))
+
+
+def with_model(fem: FittedChain, model: FEModel) -> DataInformedFEM:
+    """A fitted chain with another model of the same frequencies, such as one with divided damage groups.
+
+    Parameters
+    ----------
+    fem : DataInformedFEM
+        Fitted; it is unchanged.
+    model : FE model
+        With the parameters and modes of the chain's. It is not reduced.
+
+    Returns
+    -------
+    DataInformedFEM
+        All that was learned is the chain's, and so are the records.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.surrogate import DataInformedFEM, with_model
+    >>> year, truss = make_truss_campaign(random_state=0), make_truss()
+    >>> fem = DataInformedFEM(truss, random_state=0).fit(year.temperatures, year.frequencies)
+    >>> damaged = with_model(fem, truss.damaged({"bottom": 0.1})).predict(year.temperatures)
+    >>> bool((damaged < fem.predict(year.temperatures)).all().all())
+    True
+    """
+    check_is_fitted(fem)
+    twin, simulator = copy(fem), replace(fem.simulator_, model=model, reduced=None, box=None, usual=None)
+    twin.model, twin.simulator_, twin.thermal_ = model, simulator, replace(fem.thermal_, simulator=simulator)
+    return twin

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
+from sklearn.utils import Bunch
 
 from skthermo._tables.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
 from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
@@ -21,12 +22,11 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning,
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
-from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import SensorRegression, TrainingRange
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._records import RecordSimulator, TrainingRecords
-from skthermo.surrogate.chain._stages import Discrepancy, Estimates, ThermalModel, Weather
-from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior
+from skthermo.surrogate.chain._stages import Discrepancy, ThermalModel, Weather
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
 
 
 class FittedChain(Protocol):
@@ -46,6 +46,8 @@ class FittedChain(Protocol):
         What the chain has learned, as `DataInformedFEM` describes it.
     parameters_, noise_, records_, report_
         What it has found in the training records.
+    y_is_vector_ : bool
+        Whether the training frequencies were a vector.
 
     See Also
     --------
@@ -70,13 +72,7 @@ class FittedChain(Protocol):
     recorder_: RecordSimulator
     records_: TrainingRecords
     report_: Any
-
-    @property
-    def training_records_(self) -> tuple[Table, Table]:
-        """Temperatures and frequencies that ``fit`` was given."""
-
-    def residuals(self) -> BaselineResiduals:
-        """Out-of-fold residuals of the training records, as `DataInformedFEM.residuals` gives them."""
+    y_is_vector_: bool
 
     def weather(self, X: ArrayLike) -> Weather:
         """Temperatures, checked and filled, as `DataInformedFEM.weather` gives them."""
@@ -122,50 +118,176 @@ CLEARLY_BETTER = 0.25  # modes count as swapped if another order reduces the squ
 
 
 @dataclass(frozen=True, repr=False)
+class FittedRows(SavesFrames):
+    """Which rows of the records trained a chain; see `FitReport`."""
+
+    given: int
+    trained: int
+    scored: int
+    left_out: pd.Series
+    filled: pd.DataFrame
+
+    @classmethod
+    def of(cls, records: TrainingRecords, sensors: SensorRegression) -> FittedRows:
+        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found."""
+        T, trained = records.temperatures, records.trained
+        inputs, F = as_floats(T), as_floats(records.frequencies)
+        deviations, filled, missing = sensors.fill(T)[1], {}, {}
+        for sensor, columns in columns_by_sensor(T).items():
+            missing[f"temperature {sensor!r} is missing"] = np.isnan(inputs[:, columns]).any(axis=1) & ~trained
+            values = deviations[:, columns]
+            if (rows := (values > 0).any(axis=1)).any():
+                filled[sensor] = [int(rows.sum()), float(values[values > 0].mean()), periods(T, rows)]
+        without_theta = np.isnan(records.targets).any(axis=1)  # a posterior needs some modes only
+        for name, column in zip(column_names(records.frequencies, "f"), F.T, strict=True):
+            missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
+        has_lags = ~np.isnan(inputs).any(axis=1) & np.isnan(records.inputs).any(axis=1)
+        missing["a lag reaches into a gap"] = has_lags
+        missing["their weight is 0"] = ~records.counted
+        missing["no parameters were found"] = ~np.isnan(F).any(axis=1) & without_theta
+        left_out = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
+        n_trained = int(trained.sum())
+        return cls(
+            given=len(F),
+            trained=n_trained,
+            scored=min(n_trained, MOST_SCORED),
+            left_out=pd.Series(left_out, dtype=int),
+            filled=pd.DataFrame.from_dict(filled, orient="index", columns=["rows", "standard deviation", "when"]),
+        )
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences)
+
+    @property
+    def sentences(self) -> list[str]:
+        """How many rows trained, and what was left out and filled."""
+        lines = [f"{self.trained} of {self.given} rows trained the temperature mapper."]
+        lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
+        lines += [
+            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
+            f"{when}."
+            for name, rows, deviation, when in self.filled.itertuples()
+        ]
+        return lines
+
+    def warnings(self, n_parameters: int, *, knows_fleet: bool) -> Iterator[SkthermoWarning]:
+        """Warnings that few rows train, or that most have a sensor that was filled."""
+        if 2 * self.trained < self.given:
+            reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
+            yield FewRecordsWarning(
+                f"only {self.trained} of {self.given} rows trained the temperature mapper ({reasons}). The chain has "
+                "learned little of the others' weather. Fill gaps of temperatures, use fewer lags, or fill missing "
+                "modes by imputer=KNNGapImputer()",
+                "rows-left-out",
+            )
+        if self.trained < ROWS_PER_PARAMETER * n_parameters and not knows_fleet:
+            yield FewRecordsWarning(
+                f"{self.trained} complete rows train {n_parameters} parameters (expected "
+                f"{ROWS_PER_PARAMETER * n_parameters} or more). The fit is unreliable. Give a season or a year of "
+                "records",
+                "few-rows",
+            )
+        mostly = self.filled[2 * self.filled["rows"] > self.given]
+        if len(mostly):
+            listed = ", ".join(
+                f"{name!r} is missing in {rows} of {self.given} rows ({when}; standard deviation {deviation:.2g} "
+                "degrees)"
+                for name, rows, deviation, when in mostly.itertuples()
+            )
+            yield RecordsWarning(
+                f"temperatures were filled from the other sensors in more than half of the rows: {listed}. Repair "
+                "these sensors, or leave them out",
+                "mostly-filled",
+            )
+
+
+@dataclass(frozen=True, repr=False)
+class FittedParameters(SavesFrames):
+    """How well the parameters are determined, and how they were found; see `FitReport`."""
+
+    deviations: pd.Series
+    prior: ThermalPrior | None
+    n_unconverged: int | None
+    n_by_full_model: int
+    n_full_solves: int
+
+    @classmethod
+    def of(cls, chain: FittedChain, found: Bunch, scatter: Array) -> FittedParameters:
+        """Those of a chain whose inverse has found parameters of the records, given the scatter of each mode."""
+        theta = found.theta[~np.isnan(found.theta).any(axis=1)]
+        sensitivity = linearise(chain.model, np.median(theta, axis=0), relative=True)[1][0]
+        information = (sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity
+        full_solves = found.get("full_solves", np.zeros(0))
+        return cls(
+            deviations=pd.Series(np.sqrt(np.diagonal(cramer_rao(information))), index=chain.parameter_names_),
+            prior=getattr(last_step(chain.inverse_), "prior_", None),
+            n_unconverged=int(unconverged(found).sum()) if "converged" in found else None,
+            n_by_full_model=int((full_solves > 0).sum()),
+            n_full_solves=int(full_solves.sum()),
+        )
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Smallest deviation, and what temperature does, in percent, by parameter."""
+        percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
+        if self.prior is not None:
+            percent["moved by itself (%)"] = (100 * self.prior.own).round(2)
+        return percent
+
+    def __repr__(self) -> str:
+        return "\n".join([*self.sentences, self.table.to_string()])
+
+    @property
+    def sentences(self) -> list[str]:
+        """What temperature does to the parameters, and which rows were hard to solve."""
+        lines = [] if self.prior is None else [f"{capital(str(self.prior))}."]
+        if self.n_unconverged:
+            lines.append(f"The parameters of {self.n_unconverged} rows have not converged.")
+        if self.n_by_full_model:
+            lines.append(
+                f"The parameters of {self.n_by_full_model} rows are outside the box of the reduced model; the full "
+                f"model was solved {self.n_full_solves} times."
+            )
+        return lines
+
+
+@dataclass(frozen=True, repr=False)
 class FitReport(SavesFrames):
     """Findings of `DataInformedFEM.fit` about the records.
 
     Parameters
     ----------
-    n_rows, n_trained : int
-        Rows given, and rows that trained the temperature mapper.
-    left_out : Series
-        Rows that did not train the mapper, by reason; a row may have several reasons.
-    filled : DataFrame
-        Sensors with missing temperatures, in how many ``rows`` these were filled from the other sensors, the ``standard
-        deviation`` of what was filled, in degrees, and ``when`` they are missing.
-    offsets : Series
-        Mean measured frequency against the model's nominal one, by mode, in percent.
-    hidden_offsets : Series
-        Part of the offsets that the aligner removes, so that the model need not explain it, by mode, in percent; zero
-        without an aligner.
+    rows : FittedRows
+        Numbers of rows: ``given``, ``trained``, those that trained the temperature mapper, and ``scored``, those of
+        the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did not train by
+        reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows`` temperatures
+        were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and ``when`` they
+        are missing.
+    modes : DataFrame
+        By mode, in percent:
+
+        - ``offset``: mean measured frequency against the model's nominal one;
+        - ``hidden offset``: the part of it that the aligner removes, so that the model need not explain it; zero
+          without an aligner;
+        - ``MAPE``, ``MAPE of the mean``: in-sample error of the chain and of the training mean;
+        - ``scatter``: standard deviation of measured over predicted frequencies, by the median of the distances;
+        - ``noise`` of the records about a regression, and ``misfit``, that about the FE model, by which a
+          `PosteriorInverse` weights the mode;
+        - ``weather``: standard deviation of what it does to the FE model's frequencies;
+        - ``discrepancy``: its root mean square over the training records;
+        - ``round trip``, with an `InverseSurrogate` only: relative error of the nominal frequencies after inversion by
+          it and another solution.
     unexplained_offset : float
         Size of the hidden offsets as a share of what weather and calibration may leave; above 1, the model is not
         calibrated to these records.
-    prior : ThermalPrior or None
-        With a `PosteriorInverse`: how much temperature moves the parameters, as the records teach it or as it was
-        given.
-    deviations : Series
-        Smallest possible relative standard deviation of each parameter estimated from one record (Cramer-Rao bound);
-        infinite where the modes do not determine a parameter.
-    errors : DataFrame
-        In-sample MAPE of the chain and of the training mean, by mode, in percent.
-    n_scored : int
-        Number of rows used for ``errors``, spread evenly over the training rows.
-    n_unconverged : int or None
-        Rows whose parameters have not converged; None without a `PosteriorInverse`.
-    n_by_full_model, n_full_solves : int
-        Rows whose parameters are outside the box of the reduced model, and how often the full model was solved for
-        them.
-    round_trip : Series or None
-        With an `InverseSurrogate`: relative error of the nominal frequencies after inversion by it and another
-        solution, by mode, in percent.
-    scatter : Series
-        Standard deviation of measured over predicted frequencies, by mode, in percent, by the median of the distances.
-    variation : DataFrame
-        By mode, in percent: ``noise`` of the records about a regression, ``misfit``, that about the FE model, by which
-        a `PosteriorInverse` weights the mode, ``weather``, the standard deviation of what it does to the FE model's
-        frequencies, and ``discrepancy``, its root mean square over the training records.
+    parameters : FittedParameters
+        ``deviations``, a series: smallest possible relative standard deviation of each parameter estimated from one
+        record (Cramer-Rao bound), infinite where the modes do not determine it. With a `PosteriorInverse`: ``prior``,
+        how much temperature moves the parameters, as the records teach it or as it was given; ``n_unconverged``, rows
+        whose parameters have not converged; ``n_by_full_model`` and ``n_full_solves``, rows whose parameters are
+        outside the box of the reduced model, and how often the full model was solved for them.
+    solved : str
+        Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     fleet : DataFrame or None
@@ -173,8 +295,6 @@ class FitReport(SavesFrames):
         fleet's.
     pooling_probability : mapping or None
         Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
-    solved : str
-        Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
 
     Examples
     --------
@@ -183,64 +303,38 @@ class FitReport(SavesFrames):
     >>> year = make_truss_campaign(random_state=0)
     >>> year.temperatures.iloc[10:15, 0] = float("nan")
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    >>> fem.report_.n_trained, fem.report_.filled["rows"].to_dict()
-    (365, {'T1': 5})
+    >>> print(fem.report_.rows)
+    365 of 365 rows trained the temperature mapper.
+    Filled from the other sensors: 5 temperatures of 'T1' (standard deviation 3.3), 2025-01-11 to 2025-01-15.
     """
 
-    n_rows: int
-    n_trained: int
-    left_out: pd.Series
-    filled: pd.DataFrame
-    offsets: pd.Series
-    hidden_offsets: pd.Series
+    rows: FittedRows
+    modes: pd.DataFrame
     unexplained_offset: float
-    prior: ThermalPrior | None
-    deviations: pd.Series
-    errors: pd.DataFrame
-    n_scored: int
-    n_unconverged: int | None
-    n_by_full_model: int
-    n_full_solves: int
-    round_trip: pd.Series | None
-    scatter: pd.Series
-    variation: pd.DataFrame
+    parameters: FittedParameters
+    solved: str
     findings: RecordFindings
     fleet: pd.DataFrame | None
     pooling_probability: Mapping[Any, float] | None
-    solved: str
 
     def __repr__(self) -> str:
-        tables = self._modes().to_string(), self._parameters().to_string()
-        return "\n".join([*self._sentences(), "", *tables])
+        return "\n".join([*self._sentences(), "", self._printed_modes().to_string(), self.parameters.table.to_string()])
 
     def _repr_html_(self) -> str:
         text = "".join(f"<p>{escape(line)}</p>" for line in self._sentences())
-        return text + self._modes().to_html() + self._parameters().to_html()
+        return text + self._printed_modes().to_html() + self.parameters.table.to_html()
 
     def _sentences(self) -> list[str]:
-        lines = [f"{self.n_trained} of {self.n_rows} rows trained the temperature mapper.", self.solved]
-        lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
-        lines += [
-            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
-            f"{when}."
-            for name, rows, deviation, when in self.filled.itertuples()
-        ]
+        trained, *others = self.rows.sentences
+        lines = [trained, self.solved, *others]
         lines += [f"{text[0].upper()}{text[1:]}." for text in map(str, self.warnings())]
-        n_modes, n_parameters = len(self.offsets), len(self.deviations)
+        n_parameters, n_modes = len(self.parameters.deviations), len(self.modes)
         if n_parameters > n_modes:
             lines.append(
                 f"{n_parameters} parameters, {n_modes} modes: a record of frequencies alone cannot distinguish all "
                 "of them."
             )
-        if self.prior is not None:
-            lines.append(f"{capital(str(self.prior))}.")
-        if self.n_unconverged:
-            lines.append(f"The parameters of {self.n_unconverged} of {self.n_rows} rows have not converged.")
-        if self.n_by_full_model:
-            lines.append(
-                f"The parameters of {self.n_by_full_model} of {self.n_rows} rows are outside the box of the reduced "
-                f"model; the full model was solved {self.n_full_solves} times."
-            )
+        lines += self.parameters.sentences
         if self.fleet is not None:
             lines.append(
                 f"Outside the weather of these records, predictions are based on the fleet: {self._listed_weather()}."
@@ -252,7 +346,11 @@ class FitReport(SavesFrames):
             lines.append(self.findings.memory.summary())
         if len(self.findings.table):
             lines.append(self.findings.summary())
-        return [*lines, f"MAPE is in-sample, of {self.n_scored} rows spread evenly over the training rows."]
+        return [*lines, f"MAPE is in-sample, of {self.rows.scored} rows spread evenly over the training rows."]
+
+    def _printed_modes(self) -> pd.DataFrame:
+        printed = self.modes.drop(columns=["hidden offset", "scatter"]).round({"offset": 2}).round(3) + 0.0  # not -0.0
+        return printed.add_suffix(" (%)")
 
     @property
     def has_hidden_offsets(self) -> bool:
@@ -269,191 +367,107 @@ class FitReport(SavesFrames):
             for name, own_lowest, own_highest, lowest, highest in widest.itertuples()
         )
 
-    def _modes(self) -> pd.DataFrame:
-        table = pd.DataFrame({"offset (%)": self.offsets.round(2)})
-        table = table.join([part.round(3).add_suffix(" (%)") for part in (self.errors, self.variation)])
-        if self.round_trip is not None:
-            table = table.assign(**{"round trip (%)": self.round_trip.round(3) + 0.0})  # not -0.0
-        return table
-
-    def _parameters(self) -> pd.DataFrame:
-        percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
-        if self.prior is not None:
-            percent["moved by itself (%)"] = (100 * self.prior.own).round(2)
-        return percent
-
     def warnings(self) -> Iterator[SkthermoWarning]:
-        """Warnings about the rows.
+        """Warnings about the rows, the modes and the outliers.
 
         Yields
         ------
         SkthermoWarning
             Its text stands in the report, too.
         """
-        yield from self._few_trained()
-        yield from self._few_for_parameters()
-        yield from self._mostly_filled()
-        yield from self._worse_than_mean()
-        yield from self._hidden()
-        yield from self._many_outliers()
-        yield from self._large_discrepancy()
-        yield from self._poor_round_trip()
-
-    def _few_trained(self) -> Iterator[SkthermoWarning]:
-        if 2 * self.n_trained >= self.n_rows:
-            return
-        reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
-        yield FewRecordsWarning(
-            f"only {self.n_trained} of {self.n_rows} rows trained the temperature mapper ({reasons}). The chain has "
-            "learned little of the others' weather. Fill gaps of temperatures, use fewer lags, or fill missing modes "
-            "by imputer=KNNGapImputer()",
-            "rows-left-out",
-        )
-
-    def _few_for_parameters(self) -> Iterator[SkthermoWarning]:
-        n_parameters = len(self.deviations)
-        if self.n_trained >= ROWS_PER_PARAMETER * n_parameters or self.fleet is not None:
-            return
-        yield FewRecordsWarning(
-            f"{self.n_trained} complete rows train {n_parameters} parameters (expected "
-            f"{ROWS_PER_PARAMETER * n_parameters} or more). The fit is unreliable. Give a season or a year of records",
-            "few-rows",
-        )
-
-    def _mostly_filled(self) -> Iterator[SkthermoWarning]:
-        mostly = [
-            f"{name!r} is missing in {rows} of {self.n_rows} rows ({when}; standard deviation {deviation:.2g} degrees)"
-            for name, rows, deviation, when in self.filled[2 * self.filled["rows"] > self.n_rows].itertuples()
-        ]
-        if mostly:
-            yield RecordsWarning(
-                f"temperatures were filled from the other sensors in more than half of the rows: {', '.join(mostly)}. "
-                "Repair these sensors, or leave them out",
-                "mostly-filled",
-            )
-
-    def _worse_than_mean(self) -> Iterator[SkthermoWarning]:
-        chain, mean = self.errors.mean()
-        if not chain > WORSE_THAN_MEAN * mean:
-            return
-        worst = (self.errors["MAPE"] / self.errors["MAPE of the mean"]).idxmax()
-        yield ModelWarning(
-            f"the chain misses its own training frequencies by {chain:.2g} % on average, their mean by only {mean:.2g} "
-            f"% (the worst mode is {worst!r}). Its parameters cannot follow these modes. See report_.offsets, update "
-            "the model, or use the default aligner and discrepancy",
-            "worse-than-mean",
-        )
-
-    def _hidden(self) -> Iterator[SkthermoWarning]:
-        if not self.has_hidden_offsets:
-            return
-        large = self.hidden_offsets[self.hidden_offsets.abs() >= SMALLEST_OFFSET]
-        offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
-        yield ModelWarning(
-            f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}). "
-            "Simulated damage moves the modes too much or too little, so that detection rates and severities are "
-            "wrong by more than their noise. Update the model to these records (ModelUpdater). Give studies "
-            "models=updater.sample_models(20) or uncertainty=(..., 'model')",
-            "hidden-offsets",
-        )
-
-    def _many_outliers(self) -> Iterator[SkthermoWarning]:
-        far = self.findings.outliers.to_numpy()
-        if far.sum() <= MANY_OUTLIERS * far.size:
-            return
-        yield RecordsWarning(
-            f"{far.sum()} of {far.size} frequencies are outliers and train nothing (expected at most "
-            f"{MANY_OUTLIERS:.0%}). They may be of other modes, or of another state. See report_.findings",
-            "many-outliers",
-        )
-
-    def _large_discrepancy(self) -> Iterator[SkthermoWarning]:
-        weather, discrepancy = self.variation["weather"], self.variation["discrepancy"]
-        large = discrepancy[discrepancy > np.maximum(LARGE_DISCREPANCY * weather, SMALL_DISCREPANCY)]
-        modes = ", ".join(
-            f"{name!r} ({weather[name]:.2g} % by the model, discrepancy {size:.2g} %)" for name, size in large.items()
-        )
-        if modes:
+        yield from self.rows.warnings(len(self.parameters.deviations), knows_fleet=self.fleet is not None)
+        modes, far = self.modes, self.findings.outliers.to_numpy()
+        chain, mean = modes["MAPE"].mean(), modes["MAPE of the mean"].mean()
+        if chain > WORSE_THAN_MEAN * mean:
+            worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {modes}. Predictions rely on the discrepancy, "
+                f"the chain misses its own training frequencies by {chain:.2g} % on average, their mean by only "
+                f"{mean:.2g} % (the worst mode is {worst!r}). Its parameters cannot follow these modes. See the "
+                "offsets in report_.modes, update the model, or use the default aligner and discrepancy",
+                "worse-than-mean",
+            )
+        if self.has_hidden_offsets:
+            hidden = modes["hidden offset"]
+            large = hidden[hidden.abs() >= SMALLEST_OFFSET]
+            offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+            yield ModelWarning(
+                f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}). "
+                "Simulated damage moves the modes too much or too little, so that detection rates and severities are "
+                "wrong by more than their noise. Update the model to these records (ModelUpdater). Give studies "
+                "models=updater.sample_models(20) or uncertainty=(..., 'model')",
+                "hidden-offsets",
+            )
+        if far.sum() > MANY_OUTLIERS * far.size:
+            yield RecordsWarning(
+                f"{far.sum()} of {far.size} frequencies are outliers and train nothing (expected at most "
+                f"{MANY_OUTLIERS:.0%}). They may be of other modes, or of another state. See report_.findings",
+                "many-outliers",
+            )
+        is_large = modes["discrepancy"] > np.maximum(LARGE_DISCREPANCY * modes["weather"], SMALL_DISCREPANCY)
+        if is_large.any():
+            listed = ", ".join(
+                f"{name!r} ({weather:.2g} % by the model, discrepancy {size:.2g} %)"
+                for name, weather, size in modes.loc[is_large, ["weather", "discrepancy"]].itertuples()
+            )
+            yield ModelWarning(
+                f"the FE model cannot follow what the weather does to {listed}. Predictions rely on the discrepancy, "
                 "and simulated damage on a model that is not calibrated. Update the model (ModelUpdater), or give it "
                 "parameters that this weather changes",
                 "large-discrepancy",
             )
-
-    def _poor_round_trip(self) -> Iterator[SkthermoWarning]:
-        if self.round_trip is None:
-            return
-        shares = self.round_trip.abs() / self.scatter.clip(lower=RESOLUTION)
-        if not (shares > 1).any():
-            return
-        worst = shares.idxmax()
-        yield ModelWarning(
-            f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
-            f"{self.round_trip[worst]:+.2g} %. Measurements scatter around the predictions by only "
-            f"{self.scatter[worst]:.2g} %, so that detectors take this error for damage. Raise n_samples, or use "
-            "the default inverse",
-            "round-trip-error",
-        )
+        if "round trip" in modes:
+            shares = modes["round trip"].abs() / modes["scatter"].clip(lower=RESOLUTION)
+            worst = shares.idxmax()
+            if shares[worst] > 1:
+                yield ModelWarning(
+                    f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
+                    f"{modes.loc[worst, 'round trip']:+.2g} %. Measurements scatter around the predictions by only "
+                    f"{modes.loc[worst, 'scatter']:.2g} %, so that detectors take this error for damage. Raise "
+                    "n_samples, or use the default inverse",
+                    "round-trip-error",
+                )
 
 
-def report_of(chain: FittedChain, estimates: Estimates, findings: RecordFindings) -> FitReport:
-    """The report of a chain of which all else is fitted."""
-    records, theta = chain.records_, estimates.theta
-    names, modes, F = chain.parameter_names_, chain.mode_names_, as_floats(records.frequencies)
-    measured, of_model, predicted = _in_sample(chain)
-    hidden = hidden_offsets(chain.aligner_, records.frequencies)
-    errors_of_means = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
-    means = np.broadcast_to(np.nanmean(F, axis=0), measured.shape)
-    errors = {"MAPE": mape(measured, predicted), "MAPE of the mean": mape(measured, means)}
-    full_solves = np.zeros(0) if estimates.full_solves is None else estimates.full_solves
-    known, scatter = ~np.isnan(theta).any(axis=1), np.nan_to_num(robust_deviation(measured / predicted))
-    last = last_step(chain.inverse_)
-    round_trip = last.round_trip() if isinstance(last, InverseSurrogate) else None
+def report_of(chain: FittedChain, found: Bunch, findings: RecordFindings) -> FitReport:
+    """The report of a chain of which all else is fitted; ``found`` is what its inverse gave for the records."""
+    modes, unexplained = modes_of(chain)
     return FitReport(
-        n_rows=len(theta),
-        n_trained=int(records.trained.sum()),
-        left_out=left_out(records, theta),
-        filled=filled(records.temperatures, chain.sensors_),
-        offsets=mode_offsets(chain.model, records.frequencies),
-        hidden_offsets=hidden,
-        unexplained_offset=unexplained_offset(hidden, of_model, records.temperatures, errors_of_means),
-        prior=getattr(last, "prior_", None),
-        deviations=pd.Series(smallest_deviations(chain.model, theta[known], scatter), index=names),
-        errors=pd.DataFrame(errors, index=modes),
-        n_scored=len(measured),
-        n_unconverged=estimates.n_unconverged,
-        n_by_full_model=int((full_solves > 0).sum()),
-        n_full_solves=int(full_solves.sum()),
-        round_trip=None if round_trip is None else pd.Series(100 * round_trip, index=modes),
-        scatter=pd.Series(100 * scatter, index=modes),
-        variation=_variation(chain),
+        rows=FittedRows.of(chain.records_, chain.sensors_),
+        modes=modes,
+        unexplained_offset=unexplained,
+        parameters=FittedParameters.of(chain, found, modes["scatter"].to_numpy() / 100),
+        solved=chain.simulator_.described,
         findings=findings,
         fleet=weather_of_fleet(chain),
         pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
-        solved=chain.simulator_.described,
     )
 
 
-def _in_sample(chain: FittedChain) -> tuple[Array, Array, Array]:
-    """Frequencies of some training rows: measured, of the model itself, and predicted by the chain."""
-    records = chain.records_
+def modes_of(chain: FittedChain) -> tuple[pd.DataFrame, float]:
+    """What `FitReport` says of each mode, and the share of the hidden offsets that nothing explains."""
+    records, last, F = chain.records_, last_step(chain.inverse_), as_floats(chain.records_.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
     of_model = chain.simulator_.frequencies(records.learned[rows], chain.n_jobs, warn=False)
+    measured = F[rows]
     predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
-    return as_floats(records.frequencies)[rows], of_model, predicted
-
-
-def _variation(chain: FittedChain) -> pd.DataFrame:
-    """What noise, the weather and the discrepancy do to each mode, in percent."""
-    records = chain.records_
-    weather, last = np.nanstd(np.log(records.modelled[records.trained]), axis=0), last_step(chain.inverse_)
-    misfit = last.noise_ if isinstance(last, PosteriorInverse) else np.full_like(weather, np.nan)
-    discrepancy = np.sqrt((chain.discrepancy_.at(records.inputs[records.trained]) ** 2).mean(axis=0))
-    return 100 * pd.DataFrame(
-        {"noise": chain.noise_, "misfit": misfit, "weather": weather, "discrepancy": discrepancy},
-        index=chain.mode_names_,
-    )
+    mean, seen = np.nanmean(F, axis=0), np.nanmean(as_floats(chain.aligner_.transform(records.frequencies)), axis=0)
+    discrepancy = chain.discrepancy_.at(records.inputs[records.trained])
+    table = {
+        "offset": mode_offsets(chain.model, records.frequencies),
+        "hidden offset": 100 * (mean / seen - 1),
+        "MAPE": mape(measured, predicted),
+        "MAPE of the mean": mape(measured, np.broadcast_to(mean, measured.shape)),
+        "scatter": 100 * np.nan_to_num(robust_deviation(measured / predicted)),
+        "noise": 100 * chain.noise_,
+        "misfit": 100 * last.noise_ if isinstance(last, PosteriorInverse) else np.nan,
+        "weather": 100 * np.nanstd(np.log(records.modelled[records.trained]), axis=0),
+        "discrepancy": 100 * np.sqrt((discrepancy**2).mean(axis=0)),
+    }
+    if isinstance(last, InverseSurrogate):
+        table["round trip"] = 100 * last.round_trip()
+    errors = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
+    unexplained = unexplained_offset(table["hidden offset"], of_model, records.temperatures, errors)
+    return pd.DataFrame(table, index=chain.mode_names_), unexplained
 
 
 def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
@@ -463,40 +477,6 @@ def weather_of_fleet(chain: FittedChain) -> pd.DataFrame | None:
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
     limits = np.column_stack([own.lowest, own.highest, fleet.lowest, fleet.highest])
     return pd.DataFrame(limits, index=list(own.names), columns=["lowest", "highest", "fleet lowest", "fleet highest"])
-
-
-def smallest_deviations(model: FEModel, theta: Array, scatter: Array) -> Array:
-    """Cramer-Rao deviations of ln theta from one record at the median parameters, given the scatter of each mode."""
-    sensitivity = linearise(model, np.median(theta, axis=0), relative=True)[1][0]
-    return np.sqrt(np.diagonal(cramer_rao((sensitivity.T / np.maximum(scatter, LEAST_SCATTER) ** 2) @ sensitivity)))
-
-
-def filled(T: Table, sensors: SensorRegression) -> pd.DataFrame:
-    """In how many rows temperatures were filled, with which standard deviation, and when, by sensor."""
-    deviations, found = sensors.fill(T)[1], {}
-    for sensor, columns in columns_by_sensor(T).items():
-        values = deviations[:, columns]
-        if (rows := (values > 0).any(axis=1)).any():
-            found[sensor] = [int(rows.sum()), float(values[values > 0].mean()), periods(T, rows)]
-    return pd.DataFrame.from_dict(found, orient="index", columns=["rows", "standard deviation", "when"])
-
-
-def left_out(records: TrainingRecords, theta: Array) -> pd.Series:
-    """Rows that do not train the mapper, by reason: a sensor or a mode that is missing, with the periods."""
-    T, F, trained = records.temperatures, records.frequencies, records.trained
-    without_theta = np.isnan(theta).any(axis=1)  # a posterior needs some modes only
-    complete_T, complete_F = (~np.isnan(as_floats(table)).any(axis=1) for table in (T, F))
-    missing = {
-        f"temperature {sensor!r} is missing": np.isnan(as_floats(T)[:, columns]).any(axis=1) & ~trained
-        for sensor, columns in columns_by_sensor(T).items()
-    }
-    for name, column in zip(column_names(F, "f"), as_floats(F).T, strict=True):
-        missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
-    missing["a lag reaches into a gap"] = complete_T & np.isnan(records.inputs).any(axis=1)
-    missing["their weight is 0"] = ~records.counted
-    missing["no parameters were found"] = complete_F & without_theta
-    counts = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
-    return pd.Series(counts, dtype=int)
 
 
 def periods(T: Table, rows: NDArray[np.bool_]) -> str:
@@ -525,15 +505,9 @@ def mode_offsets(model: FEModel, F: Table) -> pd.Series:
     return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), index=column_names(F, "f"))
 
 
-def hidden_offsets(aligner: BaseEstimator, F: Table) -> pd.Series:
-    """Mean measured frequency against the mean that the model sees behind an aligner, by mode, in percent."""
-    seen = np.nanmean(as_floats(aligner.transform(F)), axis=0)
-    return pd.Series(100 * (np.nanmean(as_floats(F), axis=0) / seen - 1), index=column_names(F, "f"))
-
-
-def unexplained_offset(hidden: pd.Series, predicted: Array, T: Table, errors: Array) -> float:
+def unexplained_offset(hidden: Array, predicted: Array, T: Table, errors: Array) -> float:
     """Size of hidden offsets as a share of what weather, errors of the means and a calibrated model may leave."""
-    offsets = 100 * np.log1p(hidden.to_numpy() / 100)
+    offsets = 100 * np.log1p(hidden / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]
     weather = np.cov(100 * np.log(known.T)) if len(known) > 1 else np.zeros(1)
     covariance = np.atleast_2d(weather) + COMMON**2 + np.diag(LEFT_BY_CALIBRATION**2 + errors**2)

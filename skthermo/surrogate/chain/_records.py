@@ -25,6 +25,7 @@ from skthermo._tables.arrays import (
     is_real,
     median,
     patterns,
+    refuse_no_table,
     robust_deviation,
     spread_evenly,
 )
@@ -34,7 +35,7 @@ from skthermo._validation import fit_weighted, last_step, offers, predicted_cova
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS
-from skthermo.residuals.weather import SensorRegression, warn_of_unseen_weather
+from skthermo.residuals.weather import warn_of_unseen_weather
 from skthermo.surrogate.chain._stages import Discrepancy, Ratios, ThermalModel, Weather, ratio_regressor
 
 MOST_NOISE = 0.1  # relative standard deviation of records, at most, that counts as noise
@@ -78,10 +79,10 @@ class TrainingRecords(SavesFrames):
         """Measured over modelled frequencies, which a discrepancy learns."""
         return Ratios(self.inputs, self.usable / self.modelled, self.weights)
 
-    def learns(self, regressor: BaseEstimator, mapper: BaseEstimator, sensors: SensorRegression) -> Discrepancy:
-        """The discrepancy that a regressor learns of these records, beside a fitted mapper."""
-        folds = BlockedKFold(N_FOLDS).fold_of(as_frame(self.temperatures))
-        return Discrepancy.of(regressor, self.ratios, folds, mapper=mapper, sensors=sensors)
+    @property
+    def folds(self) -> NDArray[np.intp]:
+        """The fold of each row for what learns of the records, out of fold."""
+        return BlockedKFold(N_FOLDS).fold_of(as_frame(self.temperatures))
 
     def resampled(
         self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
@@ -162,6 +163,18 @@ def _remembering_folds(records: pd.DataFrame, inputs: Array, own: Array) -> NDAr
     return BlockedKFold(N_FOLDS).remembering(records, CORRELATION_TIMES * in_sample.correlation_time).fold_of(records)
 
 
+def frequency_table(y: Any) -> tuple[Table, bool]:
+    """Frequencies as a table, and whether they were a vector of one mode."""
+    if y is None:
+        raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+    refuse_no_table(y, "y", or_vector=True)
+    if np.ndim(y) != 1:
+        return y, False
+    if isinstance(y, pd.Series):
+        return y.to_frame("f1" if y.name is None else y.name), True
+    return np.reshape(y, (-1, 1)), True
+
+
 def without_outliers(findings: RecordFindings, F: Table) -> Table:
     """Frequencies without the outliers among them; findings may be of longer tables, of which these are rows."""
     far = findings.outliers
@@ -186,12 +199,12 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
     ratios = Ratios(inputs, np.exp(residuals))
     folds = BlockedKFold(N_FOLDS).fold_of(as_frame(T).iloc[rows]) if len(rows) >= N_FOLDS else np.zeros(len(rows))
     known = ~np.isnan(inputs).any(axis=1)
-    for one in ratios.learned_by(ratio_regressor()):
+    for modes, of_modes in ratios.groups():
         for fold in range(N_FOLDS):
-            learned = one.refitted(ratio_regressor(), ratios, one.rows[folds[one.rows] != fold])
+            learned = ratios.learned(ratio_regressor(), modes, of_modes[folds[of_modes] != fold])
             test = np.flatnonzero((folds == fold) & known)
-            if learned.regressor is not None and len(test):
-                residuals[np.ix_(test, one.modes)] -= learned.logs(inputs[test])
+            if learned is not None and len(test):
+                residuals[np.ix_(test, modes)] -= learned.logs(inputs[test])
     return np.minimum(robust_deviation(residuals), MOST_NOISE)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
+from sklearn.utils import Bunch
 
 from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo._tables.arrays import (
@@ -54,22 +55,12 @@ from skthermo.fem import FEModel, shape_components
 from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ShapeInputs, unconverged
+from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ShapeInputs
 
 SCARCE = 0.25  # mean weight of records with gaps below which a warning is given: four of six modes missing in each, say
 FEW_SHAPES = 0.5  # share of measured modes with a complete shape below which a warning is given
 SHAPES_COMPARED = 100  # rows of parameters at which the model's shapes are compared with the measured ones
 UNLIKE = 5.0  # distance of median components from those of the model, in deviations of the noise, that gives a warning
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """What M1 finds for each training record: parameters and, of a `PosteriorInverse`, how the steps ended, and how
-    often the full model was solved because they left the box of the reduced one."""
-
-    theta: Array
-    n_unconverged: int | None = None
-    full_solves: NDArray[np.intp] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +87,7 @@ class ChainInverse:
         part = self.posterior
         return None if part is None or part.dofs is None else ShapeInputs.of(part.model, part.dofs, part.shape_noise)
 
-    def prepare(self, model: FEModel, memory: str | Memory | None, reduce: Reduce) -> None:
+    def prepare(self, model: FEModel, memory: str | Memory | None, reduce: Reduce, *, has_shapes: bool) -> None:
         """Give every inverse what it has not: the chain's model, memory and choice of a reduced model."""
         names = list(model.parameter_names)
         for part in self.inverses:
@@ -112,15 +103,27 @@ class ChainInverse:
             may_reduce = isinstance(part, PosteriorInverse) and is_auto(part.reduce)
             if may_reduce and (not reduce or hasattr(part.model, "reduced")):
                 part.set_params(reduce=reduce)
+        if self.shape_inputs is not None and not has_shapes:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
 
-    def estimates(self, aligned: Table, parameter_names: list[str]) -> Estimates:
-        """What the fitted inverse finds for aligned records, with warnings where they determine little."""
+    def fit(self, aligned: Table, noise: Array) -> None:
+        """Fit M1 to aligned records; an `InverseSurrogate` with ``noise="auto"`` takes the noise of the records."""
+        for part in self.inverses:
+            if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
+                part.set_params(noise=noise)
+        self.estimator.fit(aligned)
+
+    def invert(self, aligned: Table, parameter_names: list[str]) -> Bunch:
+        """``theta`` of aligned records and, of a `PosteriorInverse`, all that its ``invert`` gives.
+
+        It warns where records determine little.
+        """
         last = self.posterior
         if last is None:
             theta = as_floats(self.estimator.transform(aligned))
             if theta.shape[1] != len(parameter_names):
                 raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {parameter_names}")
-            return Estimates(theta)
+            return Bunch(theta=theta)
         found = last.invert(inputs_of_last_step(self.estimator, aligned))
         last.warn_of(found)
         weight = found.weight[found.weight > 0].mean() if found.weight.any() else 1.0
@@ -132,7 +135,7 @@ class ChainInverse:
                 FewRecordsWarning,
                 "sparse-modes",
             )
-        return Estimates(as_floats(found.theta), int(unconverged(found).sum()), found.full_solves)
+        return Bunch(**{**found, "theta": as_floats(found.theta)})
 
     def with_shapes(self, F: Table, shapes: ArrayLike | None) -> Table:
         """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
@@ -199,6 +202,63 @@ MOST = 20_000  # records, spread evenly, that a discrepancy is learned from
 
 
 @dataclass(frozen=True, eq=False)
+class Ratios:
+    """Ratios of measured over modelled frequencies, (n_rows, n_modes), beside inputs of M2, and weights of the rows."""
+
+    inputs: Array
+    values: Array
+    weights: Array | None = None
+
+    def weights_of(self, rows: NDArray[np.intp]) -> Array | None:
+        return None if self.weights is None else self.weights[rows]
+
+    def groups(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Modes that are there in the same rows, and these rows, without those in which a mode is far from its
+        median."""
+        usable = ~np.isnan(self.inputs).any(axis=1) & (True if self.weights is None else self.weights > 0)
+        logs = np.log(np.where(usable[:, np.newaxis], self.values, np.nan))
+        with np.errstate(invalid="ignore"):
+            far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
+        present, of_mode = patterns(~np.isnan(logs).T)
+        for number, mask in enumerate(present):
+            modes = np.flatnonzero(of_mode == number)
+            yield modes, spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
+
+    def learned(
+        self, regressor: BaseEstimator, modes: NDArray[np.intp], rows: NDArray[np.intp]
+    ) -> LearnedRatios | None:
+        """What a regressor learns of some modes in some rows; None where these are too few."""
+        inputs, weights = self.inputs[rows], self.weights_of(rows)
+        if len(rows) < FEWEST or not np.ptp(inputs, axis=0).all():
+            return None
+        values = self.values[np.ix_(rows, modes)]
+        level = np.average(np.log(values), axis=0, weights=weights)
+        values = values[:, 0] if len(modes) == 1 else values
+        return LearnedRatios(modes, rows, level, fit_outputs(regressor, inputs, values, weights))
+
+    def learned_by(self, regressor: BaseEstimator | None) -> tuple[LearnedRatios, ...]:
+        """What a regressor learns of each group of modes that has enough rows."""
+        if regressor is None:
+            return ()
+        found = [self.learned(regressor, *group) for group in self.groups()]
+        return tuple(filter(None, found))
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedRatios:
+    """A regressor of ratios, fitted to some ``modes`` in some ``rows``; ``level`` is the mean of their logarithms."""
+
+    modes: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    level: Array
+    regressor: BaseEstimator
+
+    def logs(self, inputs: Array) -> Array:
+        """Logarithms of the ratios at complete inputs, (n_samples, n_modes)."""
+        return np.log(as_columns(self.regressor.predict(inputs)))
+
+
+@dataclass(frozen=True, eq=False)
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
@@ -217,20 +277,19 @@ class Discrepancy:
     @classmethod
     def of(cls, regressor: BaseEstimator, ratios: Ratios, folds: NDArray[np.intp], **chain: Any) -> Discrepancy:
         """Learn from ratios of measured over modelled frequencies, and the folds of their rows."""
-        n_modes = ratios.values.shape[1]
-        learned = () if regressor is None else ratios.learned_by(regressor)
-        found = cls(regressor, learned, np.zeros(n_modes), np.zeros(n_modes), **chain)
+        levels, shares = np.zeros((2, ratios.values.shape[1]))
+        learned = ratios.learned_by(regressor)
         for one in learned:
-            logs, level = ratios.logs(one), ratios.level(one)
+            logs = np.log(ratios.values[np.ix_(one.rows, one.modes)]) - one.level
             change = np.zeros_like(logs)
             for fold in np.unique(folds[one.rows]):
                 test = folds[one.rows] == fold
-                other = one.refitted(regressor, ratios, one.rows[~test])
-                if other.regressor is not None:
-                    change[test] = other.logs(ratios.inputs[one.rows[test]]) - level
-            slopes = (change * (logs - level)).sum(axis=0) / np.maximum((change**2).sum(axis=0), TINY)
-            found.levels[one.modes], found.shares[one.modes] = level, np.clip(slopes, 0, 1)
-        return found
+                other = ratios.learned(regressor, one.modes, one.rows[~test])
+                if other is not None:
+                    change[test] = other.logs(ratios.inputs[one.rows[test]]) - one.level
+            slopes = (change * logs).sum(axis=0) / np.maximum((change**2).sum(axis=0), TINY)
+            levels[one.modes], shares[one.modes] = one.level, np.clip(slopes, 0, 1)
+        return cls(regressor, learned, levels, shares, **chain)
 
     def relearned(self, ratios: Ratios) -> Discrepancy:
         """The same with regressors that have learned other ratios."""
@@ -240,7 +299,7 @@ class Discrepancy:
         """What the regressor learns of other ratios beside another mapper; changes count by the same shares."""
         found, levels = self.relearned(ratios), self.levels.copy()
         for one in found.learned:
-            levels[one.modes] = ratios.level(one)
+            levels[one.modes] = one.level
         return replace(found, levels=levels, mapper=mapper)
 
     def __call__(self, X: Table) -> Array:
@@ -257,65 +316,6 @@ class Discrepancy:
             change = one.logs(inputs[known]) - self.levels[one.modes]
             delta[np.ix_(known, one.modes)] += self.shares[one.modes] * change
         return delta
-
-
-@dataclass(frozen=True, eq=False)
-class Ratios:
-    """Ratios of measured over modelled frequencies, (n_rows, n_modes), beside inputs of M2, and weights of the rows."""
-
-    inputs: Array
-    values: Array
-    weights: Array | None = None
-
-    def weights_of(self, rows: NDArray[np.intp]) -> Array | None:
-        return None if self.weights is None else self.weights[rows]
-
-    def logs(self, one: LearnedRatios) -> Array:
-        """Logarithms of what a regressor has learned."""
-        return np.log(self.values[np.ix_(one.rows, one.modes)])
-
-    def level(self, one: LearnedRatios) -> Array:
-        """Their means."""
-        return np.average(self.logs(one), axis=0, weights=self.weights_of(one.rows))
-
-    def learned_by(self, regressor: BaseEstimator) -> tuple[LearnedRatios, ...]:
-        """Regressors of the modes, of which those that are there in the same rows are learned together.
-
-        Rows in which a mode is far from its median are left out.
-        """
-        usable = ~np.isnan(self.inputs).any(axis=1) & (True if self.weights is None else self.weights > 0)
-        logs = np.log(np.where(usable[:, np.newaxis], self.values, np.nan))
-        with np.errstate(invalid="ignore"):
-            far = np.abs(logs - median(logs)) > FAR * robust_deviation(logs)
-        present, of_mode = patterns(~np.isnan(logs).T)
-        learned = []
-        for number, mask in enumerate(present):
-            modes = np.flatnonzero(of_mode == number)
-            rows = spread_evenly(np.flatnonzero(mask & ~far[:, modes].any(axis=1)), MOST)
-            learned.append(LearnedRatios(modes, rows, None).refitted(regressor, self, rows))
-        return tuple(one for one in learned if one.regressor is not None)
-
-
-@dataclass(frozen=True, eq=False)
-class LearnedRatios:
-    """A regressor of ratios, fitted to some ``modes`` that are there in the same rows; None where these are too few."""
-
-    modes: NDArray[np.intp]
-    rows: NDArray[np.intp]
-    regressor: BaseEstimator
-
-    def refitted(self, regressor: BaseEstimator, ratios: Ratios, rows: NDArray[np.intp]) -> LearnedRatios:
-        """The same modes learned from other rows."""
-        inputs = ratios.inputs[rows]
-        if len(rows) < FEWEST or not np.ptp(inputs, axis=0).all():
-            return replace(self, rows=rows, regressor=None)
-        values = ratios.values[np.ix_(rows, self.modes)]
-        values = values[:, 0] if len(self.modes) == 1 else values
-        return replace(self, rows=rows, regressor=fit_outputs(regressor, inputs, values, ratios.weights_of(rows)))
-
-    def logs(self, inputs: Array) -> Array:
-        """Logarithms of the ratios at complete inputs, (n_samples, n_modes)."""
-        return np.log(as_columns(self.regressor.predict(inputs)))
 
 
 def ratio_regressor() -> TemperatureMapper:
@@ -382,7 +382,16 @@ class ThermalModel(SavesFrames):
 
     def parameters(self, weather: Weather) -> Array:
         """Parameters, with warnings of what was filled, unknown weather and impossible parameters."""
-        self._warn_of(weather)
+        filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
+        consequence = "Standard deviations and intervals of predictions include the error of that"
+        message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
+        warn_user(message, RecordsWarning, "filled-temperatures")
+        warn_user(unpredicted_text(unknown, as_floats(filled)), UnevaluatedRowsWarning, "not-predicted")
+        learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
+        warn_user(learned.warning(inputs), WeatherWarning, "outside-training-weather")
+        consequence = "Standard deviations and intervals include that uncertainty"
+        warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
+        warn_user(self.sensors.warning(weather.given), RecordsWarning, "sensor-disagrees")
         theta, impossible = possible(self.learned(weather.filled))
         if impossible.any():
             row = np.flatnonzero(impossible)[0]
@@ -395,31 +404,13 @@ class ThermalModel(SavesFrames):
             )
         return theta
 
-    def _warn_of(self, weather: Weather) -> None:
-        """Say what is unusual about weather."""
-        filled, unknown = weather.filled, np.isnan(weather.inputs).any(axis=1)
-        consequence = "Standard deviations and intervals of predictions include the error of that"
-        message = filled_text(weather.deviations, column_names(filled, "T"), consequence)
-        warn_user(message, RecordsWarning, "filled-temperatures")
-        warn_user(unpredicted_text(unknown, as_floats(filled)), UnevaluatedRowsWarning, "not-predicted")
-        learned, inputs = reach_of(self.mapper, filled) or (self.training_range, weather.columns)
-        warn_user(learned.warning(inputs), WeatherWarning, "outside-training-weather")
-        consequence = "Standard deviations and intervals include that uncertainty"
-        warn_of_fleet(rows_from_fleet(self.mapper, filled), consequence)
-        warn_user(self.sensors.warning(weather.given), RecordsWarning, "sensor-disagrees")
-
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy and warnings."""
         return frequencies_of(self.simulator, self.aligner, theta, self.n_jobs)
 
-    def predicted(self, weather: Weather) -> Array:
-        """Frequencies of the healthy structure, without warnings."""
-        theta = self.learned(weather.filled)
-        return self.frequencies(theta) * np.exp(self.discrepancy.at(weather.inputs))
-
     def simulated(self, weather: Weather, modes: Sequence[int] | None = None, **changes: Any) -> Array:
         """Frequencies of the structure as `StructureInWeather` simulates it in this weather."""
-        return self.in_weather(weather).simulated(modes, **changes)
+        return StructureInWeather(self, weather).simulated(modes, **changes)
 
     def in_weather(self, weather: Weather, n_rows: int | None = None) -> StructureInWeather:
         """The structure in this weather, in which several changes can be simulated, each in so many rows in all."""
@@ -457,6 +448,12 @@ class ThermalModel(SavesFrames):
             return np.zeros((len(weather), len(self.mode_names), len(self.mode_names)))
         theta = self.learned(weather.filled)
         return self.propagated(theta, predicted_covariance(self.mapper, weather.filled))
+
+    def predicted_covariance(self, weather: Weather) -> Array:
+        """Covariance of predicted frequencies in Hz squared, (n_rows, n_modes, n_modes), as the mapper states it."""
+        ratio = np.exp(self.discrepancy.at(weather.inputs))
+        predicted = self.frequencies(self.learned(weather.filled)) * ratio
+        return self.covariances_of_mapper(weather) * predicted[:, :, np.newaxis] * predicted[:, np.newaxis]
 
 
 @dataclass(frozen=True, eq=False)

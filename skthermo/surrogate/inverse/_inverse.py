@@ -328,7 +328,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         """Samples in the box; read from the memory if they are there."""
         settings = (self.box_.bounds, n_samples, random.randint(np.iinfo(np.int32).max))
         draw = partial(sample, self.model, *settings[:2], n_jobs=self.n_jobs, random_state=settings[2])
-        return remembered(self.memory, "simulations", draw, lambda: (self.model, settings))
+        return remembered(self.memory, "simulations", draw, (self.model, settings))
 
     def _check_columns(self, X: ArrayLike | None) -> None:
         """Check number and names of the columns; without X, they are those of an array."""

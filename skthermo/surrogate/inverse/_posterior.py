@@ -518,7 +518,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
         teach = partial(first.learned, in_order, self.reduce, learns_prior=learns_prior, learns_noise=learns_noise)
         content = (replace(first, n_jobs=None), inputs, self.reduce, learns_prior, learns_noise)
-        known = remembered(self.memory, "prior", teach, lambda: content)
+        known = remembered(self.memory, "prior", teach, content)
         simulator = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=simulator, n_jobs=self.n_jobs)
         self.simulator_, self.prior_ = simulator, known.prior
@@ -593,7 +593,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         inputs = self._read(X)
         invert = partial(self.posterior_.invert, inputs)
-        found = remembered(self.memory, "inversion", invert, lambda: (replace(self.posterior_, n_jobs=None), inputs))
+        found = remembered(self.memory, "inversion", invert, (replace(self.posterior_, n_jobs=None), inputs))
         names = self.get_feature_names_out()
         return Bunch(**{**found, "theta": frame_like(X, found.theta, names), "std": frame_like(X, found.std, names)})
 
