@@ -21,13 +21,14 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
-from skthermo._io._nastran import read_dmig, read_op4
 from skthermo._io._text_matrices import (
     BYTES_FOR_EACH_ROW,
     numbers_of,
+    read_dmig,
     read_dofs,
     read_entries,
     read_harwell_boeing,
+    read_op4,
 )
 
 Bytes = bytes | memoryview

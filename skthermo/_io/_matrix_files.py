@@ -17,8 +17,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 import scipy.sparse
 
-from skthermo._io._nastran import HEADING
-from skthermo._io._text_matrices import Labelled
+from skthermo._io._text_matrices import OP4_HEADING, Labelled
 from skthermo._tables.arrays import Label, Matrix
 
 CHILD = Path(__file__).with_name("_child.py")
@@ -98,7 +97,7 @@ FORMS = {
     "Matrix Market": rb"%|(?i:[^\n]*MatrixMarket)",
     "Harwell-Boeing": rb"[^\n]*\n(?:[ \t]*\d+){4,5}[ \t]*\n(?i:[A-Z]{3})(?:[ \t]+\d+){4}[^\n]*\n[^\n]*\(",
     "Nastran's DMIG": rb"(?i:(?:.*\n)?DMIG[ *,])",
-    "Nastran's OUTPUT4": HEADING.pattern + rb"\n|[\x18\x30]\0{3}|\0{3}[\x18\x30]",
+    "Nastran's OUTPUT4": OP4_HEADING.pattern + rb"\n|[\x18\x30]\0{3}|\0{3}[\x18\x30]",
     "labels of rows": rb"\s*Matrix Eqn|(?:\s*\d+\.\d\s)+\s*(?:\d+(?:\.\d?)?)?\Z",
     "lines of entries": rb"(?:[ \t]*(?![ \t\d+\-.])[^\n]*\n)*[ \t]*" + ENTRIES + rb"[ \t]*(?:\n|\Z)",
 }

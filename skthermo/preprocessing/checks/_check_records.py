@@ -119,7 +119,7 @@ def check_records(
     0  time-shift     305
     >>> print(check_records(year.temperatures[["T1"]] + 273.15))
     1 finding in 365 records.
-    kelvin: 'T1' lies between 254.894 and 305.421 in 365 rows, 2025-01-01 to 2025-12-31
+    kelvin: 'T1' lies between 268.093 and 309.327 in 365 rows, 2025-01-01 to 2025-12-31
         Bounds and reports are in degrees Celsius. Subtract 273.15
     """
     cleaned = CleanedRecords(temperatures, frequencies, unit=unit, model=model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator
+from collections.abc import Hashable, Iterator
 from typing import Any
 
 import numpy as np
@@ -154,12 +154,6 @@ class Reading:
         """Make values of a column NaN."""
         self.aside.append((what, rows, place, self.values[rows, place].copy()))
         self.values[rows, place] = np.nan
-
-    def restore(self, kinds: Collection[str]) -> None:
-        """Put values back that were set aside for other reasons than these."""
-        for what, rows, place, values in reversed(self.aside):
-            if what not in kinds:
-                self.values[rows, place] = values
 
     def contents(self) -> list[tuple[Any, bytes]]:
         """Name and bytes of each column that varies."""

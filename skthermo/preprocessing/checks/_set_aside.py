@@ -189,7 +189,9 @@ def set_aside(
             name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
             reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
             reading.set_aside(what, rows, place)
-        reading.restore(kinds)
+        for kind, rows, place, before in reversed(reading.aside):
+            if kind not in kinds:  # these values are used as they are
+                reading.values[rows, place] = before
         own = dict(_left_out(reading, exclude))
         if own and len(own) == len(reading.columns):
             raise ValueError(
