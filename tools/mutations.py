@@ -104,7 +104,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
-    ("monitoring/sensors/_expected.py", "monitoring/sensors/test_changes.py"): [
+    ("monitoring/sensors/_expected.py", "monitoring/sensors/test_expected.py"): [
         ("weather that the baseline does not have", "1 / BEYOND**2", "1e12"),
         ("memory of daily noise", "np.sqrt(1 - memory**2)", "np.sqrt(1 + memory**2)"),
     ],

@@ -4,26 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skthermo._tables.arrays import Array
+from skthermo.residuals.scatter import Scatter
 
-LASTING = np.geomspace(1.5, 99, 16)
-"""Factors by which the fading part raises the variance of a mean of many days that are tried."""
-
-MEMORIES = (LASTING - 1) / (LASTING + 1)
-"""Correlations of the fading part from one day to the next that belong to them."""
-
-SHARES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.0)
-"""Shares of the fading part in the variance of a usual day that are tried; none is tried, too."""
-
-DAYS_AT_ONCE = 200
-PSEUDO_DAYS = 20  # weight of no correlation of modes beside that of the days
 SMALLEST = 1e-8  # standard deviation of a daily mean of the logarithm of a frequency
+LEAST_WORTH = 4.0  # independent days as which those of a baseline count at least
+
+
+@dataclass(frozen=True)
+class DailyResiduals:
+    """Daily means, (n_days, n_modes), NaN where a mode is missing, of which regressors explain a part.
+
+    `Scatter` learns from them; the regressors, (n_days, n_regressors), are fitted to the days themselves.
+    """
+
+    values: Array
+    regressors: Array
+    is_overfitted: ClassVar[bool] = True
+
+    def less_similar(self, values: Array) -> Array:
+        """Values of the days, (n_days, n_columns), less what the regressors explain of each column."""
+        rest, known = np.full(values.shape, np.nan), ~np.isnan(values)
+        for days in np.unique(known, axis=1).T:
+            part = np.ix_(days, (known == days[:, np.newaxis]).all(axis=0))
+            inputs = self.regressors[days]
+            rest[part] = values[part] - inputs @ np.linalg.lstsq(inputs, values[part], rcond=1e-10)[0]
+        return rest
 
 
 @dataclass(frozen=True)
@@ -60,77 +72,28 @@ class DailyNoise:
 
     @classmethod
     def of(cls, values: Array, regressors: Array, counts: Array) -> DailyNoise:
-        """Restricted maximum likelihood for each mode on a grid, given regressors (n_days, n_modes, n_regressors).
+        """Learned as `Scatter` learns from residuals, given regressors (n_days, n_modes, n_regressors).
 
-        Days on which a mode is missing have a NaN in ``values``, (n_days, n_modes).
+        Days on which a mode is missing have a NaN in ``values``, (n_days, n_modes). Modes of too few days scatter as
+        independent ones.
         """
-        candidates = np.array([(0.0, 0.0), *((memory, share) for memory in MEMORIES for share in SHARES)])
-        usual = np.array([np.median(column[column > 0]) if (column > 0).any() else 1.0 for column in counts.T])
-        thinness = usual / np.maximum(counts, 1)
-        columns = np.concatenate([np.nan_to_num(values)[:, :, np.newaxis], regressors], axis=2)
         known = ~np.isnan(values)
-        products, logarithms, _ = _innovations(columns, known, thinness, candidates[:, np.newaxis])
-        n_days, n_regressors = known.sum(axis=0), regressors.shape[2]
-        gram, cross = products[:, :, 1:, 1:], products[:, :, 1:, 0]
-        size = np.trace(gram, axis1=2, axis2=3)[:, :, np.newaxis, np.newaxis]
-        ridge = np.where(size > 0, 1e-10 * size, 1.0) * np.eye(n_regressors)  # 0 for a mode that was not measured
-        coefficients = np.linalg.solve(gram + ridge, cross[..., np.newaxis])[..., 0]
-        rest = np.maximum(products[:, :, 0, 0] - (cross * coefficients).sum(axis=2), 0.0)
-        freedom = np.maximum(n_days - n_regressors, 1)
-        variances = np.maximum(rest / freedom, SMALLEST**2)
-        likelihood = -(logarithms + np.linalg.slogdet(gram + ridge)[1] + freedom * np.log(variances)) / 2
-        best, modes = likelihood.argmax(axis=0), np.arange(values.shape[1])
-        chosen, deviations = candidates[best], np.sqrt(variances[best, modes])
-        whitened = _innovations(columns, known, thinness, chosen[np.newaxis], keep=True)[2][:, 0]
-        residuals = whitened[:, :, 0] - np.einsum("tmk,mk->tm", whitened[:, :, 1:], coefficients[best, modes])
-        residuals = np.where(known, residuals / deviations, 0.0)
-        together = known.T.astype(float) @ known
-        correlation = residuals.T @ residuals / (together + PSEUDO_DAYS)
+        common = (regressors * known[:, :, np.newaxis]).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, np.newaxis]
+        residuals = DailyResiduals(values, common)
+        scatter = Scatter.of(residuals)
+        freedom = np.maximum(scatter.n_records - common.shape[1], 1)
+        alone = np.nansum(residuals.less_similar(values) ** 2, axis=0) / freedom
+        fresh, fading = np.diagonal(scatter.parts, axis1=1, axis2=2)
+        fresh = np.maximum(np.where(fresh + fading > 0, fresh, alone), SMALLEST**2)
+        deviations = np.sqrt(np.outer(scatter.variances, scatter.variances))
+        correlation = np.eye(len(fresh))
+        np.divide(scatter.parts.sum(axis=0), deviations, out=correlation, where=deviations > 0)
         np.fill_diagonal(correlation, 1.0)
-        lowest, vectors = np.linalg.eigh(correlation)
-        if lowest[0] < 0.02:
-            correlation = (vectors * np.maximum(lowest, 0.02)) @ vectors.T
-            scale = np.sqrt(np.diag(correlation))
-            correlation = correlation / np.outer(scale, scale)
-        memory, share = chosen.T
-        times = (1 - memory) / (1 + memory)
-        worth = np.median(freedom * ((1 - share) + share * times))
-        fresh = deviations * np.sqrt((1 - share) * usual)
-        return cls(memory, deviations * np.sqrt(share), fresh, correlation, float(max(worth, 4.0)))
-
-
-def _innovations(
-    columns: Array, known: Array, thinness: Array, candidates: Array, keep: bool = False
-) -> tuple[Array, Array, Array]:
-    """Sums of products of whitened columns, (n_candidates, n_modes, n_columns, n_columns), and of log variances.
-
-    The columns, (n_days, n_modes, n_columns), are whitened by the scalar Kalman filter of each candidate, which has a
-    memory and a share for all modes, (n_candidates, 1, 2), or for each, (n_candidates, n_modes, 2).
-    """
-    n_days, n_modes, n_columns = columns.shape
-    memory, share = candidates[..., 0], candidates[..., 1]
-    expected = np.zeros((len(candidates), n_modes, n_columns))
-    spread = np.broadcast_to(share, (len(candidates), n_modes)).copy()
-    products = np.zeros((len(candidates), n_modes, n_columns, n_columns))
-    logarithms, kept = np.zeros_like(spread), []
-    for first in range(0, n_days, DAYS_AT_ONCE):
-        part = slice(first, min(first + DAYS_AT_ONCE, n_days))
-        whitened = np.empty((part.stop - first, len(candidates), n_modes, n_columns))
-        for place, day in enumerate(range(first, part.stop)):
-            there = known[day]
-            total = spread + (1 - share) * thinness[day]
-            total = np.where(total > 0, total, 1.0)
-            innovation = columns[day] - expected
-            gain = np.where(there, spread / total, 0.0)
-            whitened[place] = innovation * (there / np.sqrt(total))[:, :, np.newaxis]
-            logarithms += np.where(there, np.log(total), 0.0)
-            expected = memory[:, :, np.newaxis] * (expected + gain[:, :, np.newaxis] * innovation)
-            spread = memory**2 * (spread - gain * spread) + (1 - memory**2) * share
-        rows = np.moveaxis(whitened, 0, 3)
-        products += rows @ rows.swapaxes(2, 3)
-        if keep:
-            kept.append(whitened)
-    return products, logarithms, np.concatenate(kept) if keep else np.empty(0)
+        share, faded = fading / (fresh + fading), (1 - scatter.memory) / (1 + scatter.memory)
+        worth = float(np.median(freedom * (1 - share + share * faded)))
+        usual = np.array([np.median(column[column > 0]) if (column > 0).any() else 1.0 for column in counts.T])
+        memory = np.full(len(fresh), scatter.memory)
+        return cls(memory, np.sqrt(fading), np.sqrt(fresh * usual), correlation, max(worth, LEAST_WORTH))
 
 
 class State(NamedTuple):
