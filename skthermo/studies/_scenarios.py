@@ -1,4 +1,4 @@
-"""States of the structure in simulated records: damage, strengthening and other changes."""
+"""States of the structure in simulated records: damage, strengthening and other changes; checks that studies share."""
 
 from __future__ import annotations
 

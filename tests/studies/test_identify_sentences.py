@@ -265,3 +265,11 @@ def test_only_a_severity_may_be_at_the_bound_of_severities(amount, kind, is_at_b
 @pytest.mark.parametrize(("amount", "text"), [(0.0812, "8.1"), (0.3, "30"), (-0.996, "100"), (2.12, "212")])
 def test_amounts_of_explanations_have_no_exponents(amount, text):
     assert explanation_text(["snow", "something else"], [amount]) == f"snow {text}{SPACE}%, something else"
+
+
+def test_parts_print_what_they_say():
+    found = identified(PIERS, alike=[("pier_1", "pier_2")], unobservable=["deck"])
+    for part in (found.separability, found.records):
+        assert repr(part).split("\n") == list(part.sentences())
+        assert all(sentence.replace(SPACE, " ") in found.summary() for sentence in part.sentences())
+    assert f"misfit_p_value={found.probabilities.misfit_p_value:.2g}" in repr(found.probabilities)

@@ -29,7 +29,7 @@ from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._scenarios import Scenario
 from skthermo.studies.detectability._pod_curve import pod_curve
-from skthermo.studies.detectability._simulation import LARGEST_SEED, Candidate, Measurement
+from skthermo.studies.detectability._simulation import LARGEST_SEED, Candidate, Measurement, SeenColumns
 from skthermo.studies.detectability._study import DetectabilityStudy
 from skthermo.surrogate import FittedChain
 
@@ -56,8 +56,7 @@ class CampaignSimulator:
     @property
     def names(self) -> list[Hashable]:
         """Columns of the tables: temperatures, measured modes, further modes."""
-        sensors = column_names(self.fem.records_.temperatures, "T")
-        return [*sensors, *self.fem.mode_names_, *(mode_name(mode) for mode in self.modes)]
+        return [*SeenColumns.all_of(self.fem).names, *(mode_name(mode) for mode in self.modes)]
 
     def clean(self) -> tuple[Array, dict[tuple[str, float], Array]]:
         """Frequencies without noise: healthy in the weather of the training, and by family and severity in the new."""

@@ -50,6 +50,12 @@ class SeenColumns:
     positions: Any
     is_frame: bool
 
+    @classmethod
+    def all_of(cls, fem: FittedChain) -> SeenColumns:
+        """All columns of a chain."""
+        names = [*column_names(fem.records_.temperatures, "T"), *fem.mode_names_]
+        return cls(names, fem.n_features_in_, np.arange(len(names)), False)
+
     def table(self, T: Table, F: Array) -> Table:
         """Temperatures and frequencies of all modes as the detector sees them."""
         return self._seen(np.hstack([as_floats(T), F]), T)
@@ -103,17 +109,18 @@ def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | N
     Only a detector with a part that has ``targets`` sees temperatures.
     """
     T, F = fem.records_.temperatures, fem.records_.frequencies
-    names, n_sensors, compensates = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_, has_targets(detector)
-    everything = SeenColumns(names, n_sensors, np.arange(len(names)), False)
+    everything, compensates = SeenColumns.all_of(fem), has_targets(detector)
+    n_sensors = everything.n_sensors
     if baseline is None:
         positions = everything.positions if compensates else everything.positions[n_sensors:]
-        view = SeenColumns(names, n_sensors, positions, isinstance(T, pd.DataFrame) or isinstance(F, pd.DataFrame))
+        is_frame = isinstance(T, pd.DataFrame) or isinstance(F, pd.DataFrame)
+        view = replace(everything, positions=positions, is_frame=is_frame)
         return view, view.table(T if isinstance(T, pd.DataFrame) else frame_like(F, as_floats(T)), as_floats(F))
     known = everything.positions_of(baseline, "the baseline")
     if compensates and not (known < n_sensors).any():
         raise ValueError("the detector compensates for temperature, and the baseline has none; expected both")
     seen = np.flatnonzero(compensates | (known >= n_sensors))
-    view = SeenColumns(names, n_sensors, known[seen], isinstance(baseline, pd.DataFrame))
+    view = replace(everything, positions=known[seen], is_frame=isinstance(baseline, pd.DataFrame))
     return view, baseline.iloc[:, seen] if view.is_frame else as_columns(baseline)[:, seen]
 
 

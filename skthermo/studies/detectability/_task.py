@@ -25,7 +25,7 @@ from skthermo._tables.arrays import (
     check_size,
     positive_integer,
 )
-from skthermo._tables.frames import Table, column_names, has_stamps, row_times, time_of
+from skthermo._tables.frames import Table, has_stamps, row_times, time_of
 from skthermo._validation import BaseSearchCV, _num_samples, last_step
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
@@ -481,7 +481,7 @@ def _task(
     seeds: Sequence[int],
 ) -> DetectionTask:
     """A task with the noise of some seeds."""
-    names = [*column_names(fem.records_.temperatures, "T"), *fem.mode_names_]
+    names = list(SeenColumns.all_of(fem).names)
     positions = [names.index(name) for name in baseline.columns]
     labels = _labels(scenarios, T)
     n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
@@ -520,12 +520,13 @@ def _task(
 def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
     """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
     T, F = fem.records_.temperatures, fem.records_.frequencies
-    names, n_sensors = [*column_names(T, "T"), *fem.mode_names_], fem.n_features_in_
+    every = SeenColumns.all_of(fem)
+    names, n_sensors = every.names, every.n_sensors
     if baseline is None:
         stamped = T if has_stamps(T) else F
         index = stamped.index if has_stamps(stamped) else None
         return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
-    known = SeenColumns(names, n_sensors, np.arange(len(names)), False).positions_of(baseline, "the baseline")
+    known = every.positions_of(baseline, "the baseline")
     index = baseline.index if has_stamps(baseline) else None
     records = pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
     is_sensor = np.asarray(known) < n_sensors
