@@ -85,13 +85,9 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         warn_each(found.others.warnings(exclude=OF_ORDER))
         return as_floats(found.frequencies)
 
-    def _records(self, X: Any, F: Array) -> Any:
-        """Hook: preprocess validated rows."""
+    def _records(self, X: Any, F: Array, is_baseline: bool = False) -> Any:
+        """Hook: preprocess validated rows, also those of a baseline before `_learn` sees them."""
         return F
-
-    def _baseline(self, X: Any, F: Array) -> Any:
-        """Hook: preprocess validated rows of a baseline; by default as any others."""
-        return self._records(X, F)
 
     @abstractmethod
     def _learn(self, F: Any, times: Array) -> Array:
@@ -148,7 +144,7 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
             the indices that the fitted detector gives the baseline, with the shift that it still sees.
         """
         F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
-        records = self._baseline(X, self._measurements(frame_like(X, F)))
+        records = self._records(X, self._measurements(frame_like(X, F)), is_baseline=True)
         self.baseline_index_ = self._learn(records, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_

@@ -167,14 +167,12 @@ class DirectionalDetector(MahalanobisDetector):
         own = self.get_params(deep=False)
         return type(self)(**own | {"covariance": clone(self.covariance, safe=False)})  # a fitted chain is shared
 
-    def _baseline(self, X: Any, F: Array) -> Records:
-        vars(self).pop("levels_", None)  # of an earlier fit
-        if origin_of(X) is None:
-            self.levels_ = self._levels(F)
-        return self._records(X, F)
-
-    def _records(self, X: Any, F: Array) -> Records:
+    def _records(self, X: Any, F: Array, is_baseline: bool = False) -> Records:
         origin = origin_of(X)
+        if is_baseline:
+            vars(self).pop("levels_", None)  # of an earlier fit
+            if origin is None:
+                self.levels_ = self._levels(F)
         if origin is not None:
             return Records(F, origin.changes())
         matrix = np.diag(self.levels_) if hasattr(self, "levels_") else self.typical_changes_

@@ -83,7 +83,7 @@ class FusedDetector(DamageDetector, _BaseComposition):
         """Its detectors check what they are given, which may hold temperatures, too."""
         return as_floats(F)
 
-    def _records(self, X: ArrayLike, F: Array) -> ArrayLike:
+    def _records(self, X: ArrayLike, F: Array, is_baseline: bool = False) -> ArrayLike:
         return X
 
     def _learn(self, X: ArrayLike, times: Array) -> Array:

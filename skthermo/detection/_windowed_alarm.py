@@ -155,17 +155,16 @@ class WindowedAlarm(DamageDetector):
         check_is_fitted(self)
         return pd.Timedelta(self.window).to_timedelta64() if isinstance(self.window, str) else self.window - 1
 
-    def _records(self, X: Any, F: Array) -> Windows:
+    def _records(self, X: Any, F: Array, is_baseline: bool = False) -> Windows:
         if self.m is not None and self.rule != "m-of-n":
             raise ValueError(f"m is {self.m}, but rule is {self.rule!r}; expected m only with the rule 'm-of-n'")
-        return Windows.of(X, F, self.window)
-
-    def _baseline(self, X: Any, F: Array) -> Windows:
-        windows, self.detector_ = self._records(X, F), None
-        if isinstance(self.detector, DirectionalDetector):
-            check_not_empty(F)
-            with without_warnings():  # of single records
-                self.detector_ = clone(self.detector).set_params(contamination=self.contamination).fit(X)
+        windows = Windows.of(X, F, self.window)
+        if is_baseline:
+            self.detector_ = None
+            if isinstance(self.detector, DirectionalDetector):
+                check_not_empty(F)
+                with without_warnings():  # of single records
+                    self.detector_ = clone(self.detector).set_params(contamination=self.contamination).fit(X)
         return windows
 
     def _learn(self, windows: Windows, times: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from skthermo._tables.arrays import Array, piecewise_linear, rows_by_pattern
-from skthermo._tables.frames import correlation_time
+from skthermo._tables.frames import correlation_times
 from skthermo.fleet.prior._posterior import CoefficientPosterior, OwnPrior
 from skthermo.fleet.prior._records import BridgeRecords
 from skthermo.preprocessing import HampelFilter
@@ -150,7 +150,7 @@ class RowNoise:
             count = PSEUDO_ROWS * fleet_memory
         scatter = (products + count * expected) / (n_rows + count)
         scatter += np.diag(JITTER * np.diag(scatter) + SMALLEST_VARIANCE)
-        own = float(np.mean([correlation_time(column) for column in (scaled * np.sqrt(robust)[:, np.newaxis]).T]))
+        own = float(correlation_times(scaled * np.sqrt(robust)[:, np.newaxis]).mean())
         memory = max((n_rows * own + count * fleet_memory) / (n_rows + count), 1.0)
         return RowNoise(scatter, memory, robust)
 
