@@ -56,8 +56,8 @@ def by_lapack(reduced, theta, *, derivatives=False):
     for rows in np.array_split(theta, max(1, len(theta) // 400)):
         if derivatives:
             shapes = np.linalg.eigh(standard.assemble(rows))[1]
-            columns = shapes[:, :, : core.n_modes]
-            standard.gradients(rows, columns)
+            columns = shapes[:, :, : len(core.ranks)]
+            standard.quadratic_forms(columns) @ standard.coefficient_gradients(rows)
         else:
             np.linalg.eigvalsh(standard.assemble(rows))
 
