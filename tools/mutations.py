@@ -119,7 +119,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("fem/_factors.py", "fem/test_factors.py"): [
         ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
-        ("order of elimination", "solution[self._order] =", "solution[:] ="),
+        ("order of elimination", "solution[order] =", "solution[:] ="),
     ],
     ("fem/modal/_sparse.py", "fem/test_factors.py"): [
         ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
@@ -181,8 +181,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
+    ("updating/_residuals.py", "updating/test_ensemble.py"): [
+        ("models that are all the most probable one", "* self.values - residuals.noise", "* self.values"),
+    ],
     ("updating/_ensemble.py", "updating/test_ensemble.py"): [
-        ("models that are all the most probable one", "weights * point.values - self.noise", "weights * point.values"),
         ("stiffness that a parameter scales drawn twice", "if terms <= own)) == own", "if terms < own)) == own"),
     ],
     ("surrogate/chain/_fit_report.py", "surrogate/test_report.py"): [

@@ -6,8 +6,9 @@ package that is faster where factors fill.
 
 import os
 from collections.abc import Callable
+from functools import partial
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import scipy.sparse.linalg
@@ -20,18 +21,15 @@ SYMMETRIC = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 MINIMUM_DEGREE = "MMD_AT_PLUS_A"
 
 
-class Factors(Protocol):
-    """The factors of a positive definite matrix K."""
-
-    def solve(self, columns: Array) -> Array:
-        """The solution x of K x = columns, one vector or several side by side."""
+Solve: TypeAlias = Callable[[Array], Array]
+"""Gives the solution x of K x = b by the factors of a positive definite K, for one vector b or several side by side."""
 
 
 class Elimination(Protocol):
     """Factorises matrices of one sparsity pattern, whose order of elimination is computed once."""
 
-    def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:
-        """Factors of a matrix of the pattern, or None where it is not positive definite."""
+    def factorise(self, matrix: scipy.sparse.csc_array) -> Solve | None:
+        """Solves with a matrix of the pattern; None where it is not positive definite."""
 
 
 def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimination:
@@ -42,10 +40,11 @@ def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimina
     return SOLVERS[name](rows, pointers)
 
 
-def factorise(matrix: scipy.sparse.csc_array) -> Factors | None:
-    """Factors of a single matrix, or None where it is not positive definite."""
+def factorise(matrix: scipy.sparse.csc_array) -> Solve | None:
+    """Solves with a single matrix; None where it is not positive definite."""
     if os.environ.get(VARIABLE, "superlu") == "superlu":
-        return superlu(matrix, MINIMUM_DEGREE)
+        factors = superlu(matrix, MINIMUM_DEGREE)
+        return None if factors is None else factors.solve
     matrix = matrix.sorted_indices()
     return elimination(matrix.indices, matrix.indptr).factorise(matrix)
 
@@ -67,25 +66,19 @@ class SuperLUElimination:
         ordered.sort_indices()
         self._places, self._rows, self._pointers = ordered.data - 1, ordered.indices, ordered.indptr
 
-    def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:
-        """Factors of a matrix of the pattern, or None where it is not positive definite."""
+    def factorise(self, matrix: scipy.sparse.csc_array) -> Solve | None:
+        """Solves with a matrix of the pattern; None where it is not positive definite."""
         entries = matrix.data[self._places], self._rows, self._pointers
         ordered = scipy.sparse.csc_array(entries, shape=matrix.shape)
         factors = superlu(ordered, "NATURAL", panel_size=1, relax=1)
-        return None if factors is None else _Reordered(factors, self._order)
+        return None if factors is None else partial(solve_reordered, factors, self._order)
 
 
-class _Reordered:
-    """Factors of a matrix whose rows and columns were put in another order."""
-
-    def __init__(self, factors: Factors, order: NDArray[np.intp]):
-        self._factors = factors
-        self._order = order
-
-    def solve(self, columns: Array) -> Array:
-        solution = np.empty_like(columns)
-        solution[self._order] = self._factors.solve(columns[self._order])
-        return solution
+def solve_reordered(factors: scipy.sparse.linalg.SuperLU, order: NDArray[np.intp], columns: Array) -> Array:
+    """Solve with the factors of a matrix whose rows and columns were put in another order."""
+    solution = np.empty_like(columns)
+    solution[order] = factors.solve(columns[order])
+    return solution
 
 
 def superlu(matrix: scipy.sparse.csc_array, order: str, **options: int) -> scipy.sparse.linalg.SuperLU | None:
@@ -115,8 +108,8 @@ class RslabElimination:
     def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"_analysis": None}  # it cannot be sent to a worker, which makes its own
 
-    def factorise(self, matrix: scipy.sparse.csc_array) -> Factors | None:
-        """Factors of a matrix of the pattern, or None where it is not positive definite."""
+    def factorise(self, matrix: scipy.sparse.csc_array) -> Solve | None:
+        """Solves with a matrix of the pattern; None where it is not positive definite."""
         data = matrix.data[self._lower]
         if self._analysis is None:
             pattern = scipy.sparse.csc_array((data, self._rows, self._pointers), shape=matrix.shape)
@@ -125,18 +118,13 @@ class RslabElimination:
             factors = self._analysis.factor(data)
         except RuntimeError:  # a pivot is zero
             return None
-        return _RslabFactors(factors) if factors.inertia == (len(self._pointers) - 1, 0, 0) else None
+        return partial(solve_by_rslab, factors) if factors.inertia == (len(self._pointers) - 1, 0, 0) else None
 
 
-class _RslabFactors:
-    """Factors by rslab, which has one method for a vector and another for several."""
-
-    def __init__(self, factors: Any):
-        self._factors = factors
-
-    def solve(self, columns: Array) -> Array:
-        solve = self._factors.solve if columns.ndim == 1 else self._factors.solve_many
-        return np.asarray(solve(np.ascontiguousarray(columns)))
+def solve_by_rslab(factors: Any, columns: Array) -> Array:
+    """Solve by rslab, which has one method for a vector and another for several."""
+    solve = factors.solve if columns.ndim == 1 else factors.solve_many
+    return np.asarray(solve(np.ascontiguousarray(columns)))
 
 
 SOLVERS: dict[str, Callable[[NDArray[np.int32], NDArray[np.int32]], Elimination]] = {

@@ -1,7 +1,6 @@
 """Models drawn from what calibration leaves open, by randomised maximum a posteriori."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,7 +13,7 @@ from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel, ReducedModel
 from skthermo.updating._diagnostics import at_bounds, false_matches
-from skthermo.updating._residuals import Measured, Outcome, Point, Residuals, optimise
+from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise
 
 WIDEST = 4.0
 """Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays
@@ -24,55 +23,6 @@ SOFTEST = 0.1  # lowest multiplier of a group's stiffness
 MOST_AT_BOUND = 0.1
 """Share of models at a bound up to which these models differ nearly as much as the prior allows: at a bound of two
 standard deviations of the prior it is 5 %."""
-
-
-@dataclass(frozen=True)
-class RandomisedResiduals:
-    """Residuals in units of their standard deviations, each less a standard normal number.
-
-    That is what they would be with another measurement and another mean of the prior, as likely as the given ones.
-    """
-
-    residuals: Residuals
-    noise: Array
-
-    @classmethod
-    def draw(cls, residuals: Residuals, n: int, random: np.random.RandomState) -> "list[RandomisedResiduals]":
-        """Draw n times. Noise of a shape is orthogonal to the shape, whose scale is free."""
-        unit = residuals.measured.shapes[:, residuals.weighted]
-        noise = random.standard_normal((n, residuals.n_plain + unit.size))
-        across = noise[:, residuals.n_plain :].reshape(n, *unit.T.shape)
-        along = np.einsum("smd,dm,em->sme", across, unit, unit)
-        noise[:, residuals.n_plain :] -= along.reshape(n, -1)
-        return [cls(residuals, row) for row in noise]
-
-    def at(self, theta: Array) -> "RandomisedPoint":
-        point = self.residuals.at(theta)
-        weights = np.sqrt(np.repeat(self.residuals.precisions, len(self.residuals.measured.dofs)))
-        weights = np.append(np.ones(self.residuals.n_plain), weights)
-        return RandomisedPoint(point, weights, weights * point.values - self.noise)
-
-    def loss(self, squares: Array) -> Array:
-        return np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
-
-
-@dataclass(frozen=True)
-class RandomisedPoint:
-    """Randomised residuals at one theta."""
-
-    point: Point
-    weights: Array
-    values: Array
-
-    @property
-    def objective(self) -> float:
-        """Sum of the squares; infinite where the model has no modes."""
-        total = float((self.values**2).sum())
-        return total if np.isfinite(total) else np.inf
-
-    def jacobian(self) -> Array:
-        """Derivatives of ``values``, (n_values, n_parameters)."""
-        return self.weights[:, np.newaxis] * self.point.jacobian()
 
 
 class Ensemble:
@@ -107,8 +57,8 @@ class Ensemble:
         """Most probable multipliers of n randomised problems, each from the same start; options are joblib's."""
         first = np.append(start, np.ones(len(self.groups)))
         search = partial(optimise, bounds=self.bounds, start=first, method="least_squares", max_iter=max_iter)
-        drawn = RandomisedResiduals.draw(self.residuals, n, random)
-        return run_jobs((delayed(search)(randomised) for randomised in drawn), n, unit="models", **options)
+        drawn = self.residuals.randomised(n, random)
+        return run_jobs((delayed(search)(residuals) for residuals in drawn), n, unit="models", **options)
 
     def model_at(self, multipliers: Array) -> FEModel:
         """The model whose theta = 1 has these multipliers; its damage groups are those of the model."""

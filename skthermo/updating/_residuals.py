@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -239,22 +239,36 @@ def _by_shape(model: Any, measured: Measured, theta: Array) -> PairedModes:
 
 
 class Residuals:
-    """Residuals of frequencies, of the prior and of shapes, in one vector with one loss.
+    """Residuals of frequencies, of the prior and of shapes, in one vector with one loss: what a search minimises.
 
     A shape's residuals are its `tangents` e, of squared length E = 1 / MAC - 1. Together they have the loss
     ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2, whose slope weights them in the Gauss-Newton matrix.
     (1 - sqrt(MAC)) / sqrt(MAC) itself is quadratic in e: its derivative vanishes at the optimum.
+
+    With ``noise``, residuals are in units of their standard deviations, each less a standard normal number, and their
+    loss is their square: what they would be with another measurement and another mean of the prior, as likely as the
+    given ones.
     """
 
-    def __init__(self, model: FEModel, measured: Measured, prior: Array | None):
+    def __init__(self, model: FEModel, measured: Measured, prior: Array | None, noise: Array | None = None):
         self.model = model
         self.measured = measured
         self.prior = prior
+        self.noise = noise
         self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
         self.n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
     def at(self, theta: Array) -> "Point":
         return Point(self, theta, paired_modes(self.model, self.measured, theta))
+
+    def randomised(self, n: int, random: np.random.RandomState) -> "list[Residuals]":
+        """These with noise, drawn n times. Noise of a shape is orthogonal to the shape, whose scale is free."""
+        unit = self.measured.shapes[:, self.weighted]
+        noise = random.standard_normal((n, self.n_plain + unit.size))
+        across = noise[:, self.n_plain :].reshape(n, *unit.T.shape)
+        along = np.einsum("smd,dm,em->sme", across, unit, unit)
+        noise[:, self.n_plain :] -= along.reshape(n, -1)
+        return [Residuals(self.model, self.measured, self.prior, row) for row in noise]
 
     @property
     def precisions(self) -> Array:
@@ -269,6 +283,8 @@ class Residuals:
     def loss(self, squares: Array) -> Array:
         """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
         rho = np.array([squares, np.ones_like(squares), np.zeros_like(squares)])
+        if self.noise is not None:
+            return rho
         weights = self.measured.shape_weights[self.weighted] ** 2
         per_mode = len(self.measured.dofs)
         E = squares[self.n_plain :].reshape(len(self.weighted), per_mode).sum(axis=1)
@@ -294,7 +310,11 @@ class Point:
             parts.append((theta - 1) / prior)
         if len(weighted):
             parts.append(tangents(modes.shapes[:, weighted], measured.shapes[:, weighted]).T.ravel())
-        self.values = np.concatenate(parts)
+        self.values, self._scales = np.concatenate(parts), np.ones(1)
+        if residuals.noise is not None:
+            of_shapes = np.sqrt(np.repeat(residuals.precisions, len(measured.dofs)))
+            self._scales = np.append(np.ones(residuals.n_plain), of_shapes)
+            self.values = self._scales * self.values - residuals.noise
 
     @property
     def objective(self) -> float:
@@ -305,7 +325,8 @@ class Point:
     def jacobian(self) -> Array:
         """Derivatives of ``values``, (n_values, n_parameters)."""
         plain, slopes = self.blocks()
-        return np.vstack([plain, slopes.swapaxes(0, 1).reshape(-1, len(self._theta))])
+        rows = np.vstack([plain, slopes.swapaxes(0, 1).reshape(-1, len(self._theta))])
+        return self._scales[:, np.newaxis] * rows
 
     def gradient(self) -> Array:
         """Derivative of ``objective``, (n_parameters,)."""
@@ -334,16 +355,6 @@ class Point:
 TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
 
 
-class Searched(Protocol):
-    """What a search minimises: residuals at each theta, and the loss of their squares."""
-
-    def at(self, theta: Array) -> Any:
-        """Residuals at one theta: ``values``, ``objective``, ``jacobian()`` and ``gradient()``."""
-
-    def loss(self, squares: Array) -> Array:
-        """Loss of squared residuals, its slope and its curvature, as `scipy.optimize.least_squares` asks."""
-
-
 class Outcome(NamedTuple):
     """The result of one start; ``n_failed`` of its evaluations met theta without modes."""
 
@@ -358,14 +369,14 @@ class Outcome(NamedTuple):
 class SearchHistory:
     """Record of one optimisation: its last and its best point, and how many theta had no modes."""
 
-    def __init__(self, residuals: Searched, start: Array):
+    def __init__(self, residuals: Residuals, start: Array):
         self._residuals = residuals
         self._theta = self.theta = start
         self._point = self.best = residuals.at(start)
         self.n_evaluations = 1
         self.n_failed = 0 if np.isfinite(self.best.objective) else 1
 
-    def at(self, theta: Array) -> Any:
+    def at(self, theta: Array) -> Point:
         """Residuals at theta. Those at the last and at the best theta are remembered."""
         if np.array_equal(theta, self.theta):
             return self.best
@@ -384,7 +395,7 @@ class NoDerivatives(Exception):
     """The model has no finite derivatives at some theta."""
 
 
-def optimise(residuals: Searched, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
+def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
     """Minimise the residuals' loss within bounds.
 
     Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
@@ -409,7 +420,7 @@ def optimise(residuals: Searched, bounds: Array, start: Array, method: str, max_
 
 
 def _least_squares(
-    history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float
 ) -> OptimizeResult:
     def jacobian(theta: Array) -> Array:
         return _finite(history.at(theta).jacobian())
@@ -427,7 +438,7 @@ def _least_squares(
     )
 
 
-def _lbfgs(history: SearchHistory, residuals: Searched, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.

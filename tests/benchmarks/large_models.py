@@ -202,7 +202,7 @@ def work(elimination, matrix):
         fronts = np.array(elimination._analysis.front_dims, dtype=float)
         lengths = np.concatenate([rows - np.arange(columns) for columns, rows in fronts])
     else:
-        lengths = np.diff(elimination.factorise(matrix)._factors.L.indptr).astype(float)
+        lengths = np.diff(elimination.factorise(matrix).args[0].L.indptr).astype(float)
     return (lengths**2).sum(), 8 * lengths.sum()
 
 

@@ -30,7 +30,7 @@ def solver(request, monkeypatch):
 
 
 def factorised(matrix):
-    """The factors of a single matrix, and those by the elimination of its pattern."""
+    """What solves with a single matrix, and what does by the elimination of its pattern."""
     matrix = scipy.sparse.csc_array(matrix)
     matrix.sort_indices()
     return [factorise(matrix), elimination(matrix.indices, matrix.indptr).factorise(matrix)]
@@ -47,9 +47,9 @@ def test_factors_solve_as_lapack_does(solver, seed):
     matrix = random_stiffness(seed)
     columns = np.random.default_rng(seed).standard_normal((60, 5))
     expected = scipy.linalg.solve(matrix.toarray(), columns, assume_a="pos")
-    for factors in factorised(matrix):
-        np.testing.assert_allclose(factors.solve(columns), expected, rtol=1e-9, atol=1e-11)
-        np.testing.assert_allclose(factors.solve(columns[:, 0]), expected[:, 0], rtol=1e-9, atol=1e-11)
+    for solve in factorised(matrix):
+        np.testing.assert_allclose(solve(columns), expected, rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(solve(columns[:, 0]), expected[:, 0], rtol=1e-9, atol=1e-11)
 
 
 def test_what_is_not_positive_definite_has_no_factors(solver):
@@ -64,9 +64,9 @@ def test_an_elimination_serves_all_matrices_of_its_pattern_in_any_order(solver):
     sent = pickle.loads(pickle.dumps(one))
     right = np.ones(terms.n_dof)
     first, second = terms.assemble(THETA[:2])
-    alone = [one.factorise(matrix).solve(right) for matrix in (first, second)]
-    np.testing.assert_array_equal(one.factorise(first).solve(right), alone[0])
-    np.testing.assert_array_equal(sent.factorise(second).solve(right), alone[1])
+    alone = [one.factorise(matrix)(right) for matrix in (first, second)]
+    np.testing.assert_array_equal(one.factorise(first)(right), alone[0])
+    np.testing.assert_array_equal(sent.factorise(second)(right), alone[1])
 
 
 def test_frequencies_do_not_depend_on_the_solver(solver):

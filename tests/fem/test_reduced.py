@@ -149,3 +149,9 @@ def test_an_error_that_no_basis_reaches_is_said(monkeypatch):
     monkeypatch.setattr("skthermo.fem.affine._basis.MAX_ROUNDS", 3)
     with pytest.raises(RuntimeError, match=r"after 3 rounds .* do not give frequencies to 1e-13"):
         make_truss().reduced(0.2, tol=1e-13)
+
+
+def test_a_reduced_model_is_not_reduced_again():
+    assert FRAME.reduction_pays(10**6)
+    assert not REDUCED.reduction_pays(10**6)
+    assert REDUCED.reduced(0.2, random_state=0).full is FRAME

@@ -855,6 +855,9 @@ class ReducedModel(AffineModel):
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
         return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
 
+    def reduction_pays(self, n_solves: int) -> bool:
+        return False  # it is reduced already
+
     def __repr__(self) -> str:
         return f"ReducedModel({self._full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
 
@@ -874,8 +877,8 @@ class ReducedModel(AffineModel):
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
         bounds = np.array([known[name] for name in full.parameter_names])
-        twin = self._twin(_full=full, _whole=core, _bounds=bounds, parameter_names=full.parameter_names)
-        twin._groups = full._groups
+        names, groups = full.parameter_names, full._groups
+        twin = self._twin(_full=full, _whole=core, _bounds=bounds, parameter_names=names, _groups=groups)
         twin._use(grow_basis(core, bounds, self._tol, 0, start=self._basis))
         return twin
 

@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU
 
 from skthermo._estimators.threads import map_on_blas_threads
 from skthermo._tables.arrays import Array, RandomState, as_random_state
-from skthermo.fem._factors import factorise
+from skthermo.fem._factors import Solve, factorise
 from skthermo.fem.modal import AffineCore, ShiftInvertSolver, may_be_missed, pair_modes
 
 FIRST_SNAPSHOTS = 16
@@ -62,7 +61,7 @@ def grow_basis(
     random = np.random.RandomState(own_seed)  # other points than those of a sample with the same seed
     nominal = np.ones((1, len(bounds)))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
-    factors = factorise(stiffness)
+    solve = factorise(stiffness)
     if start is None:
         used = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
         start, points = snapshots_at(full, used[:UNGUIDED]), used[UNGUIDED:]
@@ -78,7 +77,7 @@ def grow_basis(
             directions = principal_directions(np.hstack([known, new]), stiffness, LEAST_SHARE * tol)
             vectors, core = basis_of(directions, full, tol)
         for candidates in drawn(bounds, random, CANDIDATES_PER_ROUND)[::-1]:  # errors are largest at corners
-            estimates, steps = estimated_errors(full, core, vectors, candidates, factors)
+            estimates, steps = estimated_errors(full, core, vectors, candidates, solve)
             errors, is_near = estimates.max(axis=1), estimates.max() < NEAR * tol
             if errors.max() >= tol / 2:
                 break
@@ -149,7 +148,7 @@ def snapshots_at(full: AffineCore, theta: Array) -> Array:
 
 
 def estimated_errors(
-    full: AffineCore, core: AffineCore, vectors: Array, theta: Array, factors: SuperLU
+    full: AffineCore, core: AffineCore, vectors: Array, theta: Array, solve: Solve
 ) -> tuple[Array, list[Array]]:
     """r' K_0^-1 r / (2 lambda) of the modes of every row, (n_samples, n_modes), and K_0^-1 r / sqrt(lambda)."""
     errors, steps = [], []
@@ -158,7 +157,7 @@ def estimated_errors(
         eigenvalues, phi = (2 * np.pi * frequencies) ** 2, vectors @ shapes
         inertia = eigenvalues[:, np.newaxis] * full.mass.product(rows, phi)
         residuals = full.stiffness.product(rows, phi) - inertia
-        parts = [factors.solve(residual) for residual in residuals]
+        parts = [solve(residual) for residual in residuals]
         errors.append(np.einsum("sim,sim->sm", residuals, parts) / (2 * eigenvalues))
         steps += [part / np.sqrt(squares) for part, squares in zip(parts, eigenvalues, strict=True)]
     return np.nan_to_num(np.concatenate(errors)), steps

@@ -8,7 +8,7 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from skthermo._tables.arrays import Array, Label, Matrix, as_dense
-from skthermo.fem._factors import Factors, factorise
+from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 
 MAX_STEPS = 6
@@ -19,7 +19,7 @@ DEPENDENT = 1e-14  # share of modal mass below which a direction is rounding err
 
 def modes_near(
     stiffness: scipy.sparse.csc_array,
-    factors: Factors,
+    solve: Solve,
     mass: scipy.sparse.csc_array,
     guesses: Array,
     n_modes: int,
@@ -40,14 +40,14 @@ def modes_near(
     known = orthonormal(guesses, mass, nothing, nothing)
     random = np.random.default_rng(0).standard_normal((len(guesses), RANDOM_COLUMNS))
     for _ in range(RANDOM_STEPS):  # towards the lowest modes beside those
-        random = factors.solve(orthonormal(random, mass, *known)[1])
+        random = solve(orthonormal(random, mass, *known)[1])
     basis, weighted = (np.hstack(both) for both in zip(known, orthonormal(random, mass, *known), strict=True))
     n_followed = basis.shape[1]
     images, block = nothing, weighted
     for _ in range(MAX_STEPS):
         if not block.shape[1] or basis.shape[1] < n_modes:
             return None
-        images = np.hstack([images, factors.solve(block)])
+        images = np.hstack([images, solve(block)])
         values, weights = np.linalg.eigh(weighted.T @ images)
         values, weights = values[::-1][:n_followed], weights[:, ::-1][:, :n_followed]
         vectors = images @ weights
@@ -129,11 +129,11 @@ class ShiftInvertSolver:
         guesses = None if self._guide is None else self._guide(theta, n_modes + 2 * GUARD_VECTORS)
         pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
         for row, (stiffness, mass) in enumerate(pairs):
-            factors, found = self._factorise(stiffness), None
-            if factors is not None and guesses is not None and guesses.shape[2] >= n_modes:
-                found = modes_near(stiffness, factors, mass, guesses[row], n_modes, tol=self._tol)
+            solve, found = self._factorise(stiffness), None
+            if solve is not None and guesses is not None and guesses.shape[2] >= n_modes:
+                found = modes_near(stiffness, solve, mass, guesses[row], n_modes, tol=self._tol)
             if found is None:
-                found = lowest_modes(stiffness, factors, mass, n_modes, self._start)
+                found = lowest_modes(stiffness, solve, mass, n_modes, self._start)
             eigenvalues[row] = found[0]
             if with_shapes:
                 shapes[row] = found[1]
@@ -141,43 +141,41 @@ class ShiftInvertSolver:
 
     def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
         stiffness, mass = self._stiffness.assemble(theta)[0], self._mass.assemble(theta)[0]
-        factors = self._factorise(stiffness)
-        eigenvalues, shapes = lowest_modes(stiffness, factors, mass, n_modes, self._start)
-        return eigenvalues, shapes, factors.solve if factors else (lambda columns: np.full_like(columns, np.nan))
+        solve = self._factorise(stiffness)
+        eigenvalues, shapes = lowest_modes(stiffness, solve, mass, n_modes, self._start)
+        return eigenvalues, shapes, solve or (lambda columns: np.full_like(columns, np.nan))
 
 
 def lowest_modes(
     stiffness: scipy.sparse.csc_array,
-    factors: Factors | None,
+    solve: Solve | None,
     mass: scipy.sparse.csc_array,
     n_modes: int,
     start: Array,
 ) -> tuple[Array, Array]:
-    """Eigenvalues in ascending order and shapes of unit modal mass; NaN without factors or convergence."""
+    """Eigenvalues in ascending order and shapes of unit modal mass; NaN without a factorisation or convergence."""
     n_dof = len(start)
     nothing = np.full(n_modes, np.nan), np.full((n_dof, n_modes), np.nan)
-    if factors is None:
+    if solve is None:
         return nothing
     massive = np.flatnonzero(mass.diagonal())
     wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
     if len(massive) < FEW_MASSES + 3 * wanted:
-        vectors = modes_of_few_masses(factors, mass, massive, n_modes)
+        vectors = modes_of_few_masses(solve, mass, massive, n_modes)
     else:
-        inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=factors.solve, dtype=float)
+        inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=solve, dtype=float)
         try:
             values, vectors = scipy.sparse.linalg.eigsh(stiffness, wanted, mass, sigma=0, OPinv=inverse, v0=start)
         except scipy.sparse.linalg.ArpackError:
             return nothing
         vectors = vectors[:, np.argsort(values)[:n_modes]]
     # One more application of K^-1 M removes the rounding errors at massless degrees of freedom.
-    shapes = factors.solve(mass @ vectors)
+    shapes = solve(mass @ vectors)
     shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
     return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
 
 
-def modes_of_few_masses(
-    factors: Factors, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int
-) -> Array:
+def modes_of_few_masses(solve: Solve, mass: scipy.sparse.csc_array, massive: NDArray[np.intp], n_modes: int) -> Array:
     """Lowest shapes, up to their scale, from the dense flexibility R' K^-1 R of the mass M = R R'.
 
     With few masses the Krylov space of K^-1 M is too small for a Lanczos iteration.
@@ -185,7 +183,7 @@ def modes_of_few_masses(
     root = np.zeros((mass.shape[0], len(massive)))
     weights, directions = np.linalg.eigh(mass[massive][:, massive].toarray())
     root[massive] = directions * np.sqrt(np.maximum(weights, 0.0))
-    flexible = factors.solve(root)
+    flexible = solve(root)
     return flexible @ np.linalg.eigh(root.T @ flexible)[1][:, ::-1][:, :n_modes]
 
 
@@ -261,9 +259,9 @@ def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     """Lowest eigenvalue and its eigenvector, by shift-invert with a shift below it."""
     identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
     shift = SMALL_SHIFT
-    while (factors := factorise(matrix + shift * identity)) is None:
+    while (solve := factorise(matrix + shift * identity)) is None:
         shift *= 10
-    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factors.solve, dtype=float)
+    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=solve, dtype=float)
     start = seeded_start(matrix.shape[0])
     eigenvalue, vector = scipy.sparse.linalg.eigsh(matrix, 1, sigma=-shift, OPinv=inverse, v0=start)
     return float(eigenvalue[0]), vector[:, 0]

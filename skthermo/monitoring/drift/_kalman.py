@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from skthermo._tables.arrays import Array
-from skthermo.residuals.scatter import Scatter
+from skthermo.residuals.baseline import Scatter
 
 SMALLEST = 1e-8  # standard deviation of a daily mean of the logarithm of a frequency
 LEAST_WORTH = 4.0  # independent days as which those of a baseline count at least
