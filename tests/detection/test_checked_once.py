@@ -95,7 +95,11 @@ class TestChecks:
         assert table[["what", "column", "n_rows"]].to_numpy().tolist() == [["stuck-sensor", "T1", 40]]
 
     def test_several_compensators_of_the_same_records_share_a_check(self, n_checks):
-        parts = [("lines", detector(LinearRegression())), ("ridge", detector(Ridge())), ("chain", detector(chain(), cv=2))]
+        parts = [
+            ("lines", detector(LinearRegression())),
+            ("ridge", detector(Ridge())),
+            ("chain", detector(chain(), cv=2)),
+        ]
         _, texts = said(FusedDetector(parts).fit, STUCK)
         assert n_checks() == 1
         assert times_said(texts) == 1

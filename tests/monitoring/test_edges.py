@@ -104,7 +104,6 @@ def test_no_change_of_any_size_or_pattern_is_healthy(options, factors, alarm, st
     assert set(opened["kind"]) & KINDS
 
 
-
 @cache
 def about_zero():
     """The truss's records as responses of any sign, about 0 mm."""

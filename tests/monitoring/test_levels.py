@@ -78,7 +78,11 @@ def test_an_alarm_is_also_a_watch(whole):
 
 
 @settings(
-    max_examples=by_day(2, at_night=3), deadline=None, derandomize=True, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
+    max_examples=by_day(2, at_night=3),
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[*HealthCheck],
 )
 @given(shares=st.lists(st.floats(0, 0.05), min_size=2, max_size=3, unique=True))
 def test_more_change_never_lowers_the_level(two_levels, records, shares):
@@ -89,8 +93,10 @@ def test_more_change_never_lowers_the_level(two_levels, records, shares):
 
 
 def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(two_levels, records):
-    some = (served(two_levels, lowered(records, share))[0] for share in np.arange(0.002, 0.02, 0.001))
-    monitor = next(one for one in some if one.state() == "watch")
+    share = next(
+        s for s in np.arange(0.002, 0.02, 0.001) if served(two_levels, lowered(records, s))[0].state() == "watch"
+    )
+    monitor, _ = served(two_levels, lowered(records, share))
     assert monitor.status(monitor.last_).state == "watch"
     assert monitor.status(monitor.last_ + pd.Timedelta("30D")).state == "not evaluated"
     assert "watch: opens above" in monitor.summary()
