@@ -108,3 +108,32 @@ def _the_memory_of_records_is_found_once():
 def _chains_of_docstrings_are_fitted_once(request):
     if isinstance(request.node, pytest.DoctestItem):
         request.getfixturevalue("chains_fitted_once")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _the_same_records_are_checked_once():
+    """Most tests learn from one of a few years, which estimators would check again each time."""
+    import joblib
+
+    import skthermo.detection
+    import skthermo.surrogate  # noqa: F401
+    from skthermo.preprocessing import check_records
+
+    found = {}
+
+    @functools.wraps(check_records)
+    def once(*tables, **options):
+        try:
+            key = joblib.hash((tables, options))
+        except Exception:  # of what cannot be pickled
+            return check_records(*tables, **options)
+        if key not in found:
+            found[key] = check_records(*tables, **options)
+        return copy.deepcopy(found[key])
+
+    users = [name for name in sys.modules if name.startswith(("skthermo.detection.", "skthermo.surrogate."))]
+    with pytest.MonkeyPatch.context() as patched:
+        for module in (sys.modules[name] for name in users):
+            if getattr(module, "check_records", None) is check_records:
+                patched.setattr(module, "check_records", once)
+        yield

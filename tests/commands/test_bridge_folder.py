@@ -133,6 +133,7 @@ def test_other_values_of_a_known_record_are_refused_alone(bridge, records):
     assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_later_records_of_the_baselines_files_are_new_ones(records, tmp_path):
     files = write_pair(records[: FIRST + 10], tmp_path)
     toml = tmp_path / "b" / "monitor.toml"
@@ -300,6 +301,7 @@ def test_what_is_done_is_logged(bridge, records, tmp_path):
     assert run("status", settings(bridge), "--log", tmp_path).code == FAILED  # no file
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_check_and_init_say_what_they_found(records, tmp_path):
     stuck = records.copy()
     stuck.iloc[300:340, 0] = 7.0

@@ -67,6 +67,7 @@ def test_columns_that_measure_nothing_are_left_out_with_a_reason(tmp_path):
     assert list(found.records) == list(RECORDS)
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
     stuck, file, settings = RECORDS.assign(f2=5.0), tmp_path / "records.csv", tmp_path / "bridge"
     stuck.to_csv(file, index_label="time")
@@ -144,6 +145,7 @@ def test_what_is_no_table_of_records_is_an_error(tmp_path, text, expected):
     assert (done.code, expected in done.err) == (3, True), done.err
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_columns_find_their_roles_and_units(tmp_path):
     random = np.random.default_rng(0)
     days = pd.date_range("2025-01-01", periods=400)

@@ -13,10 +13,13 @@ from hypothesis.extra.numpy import arrays
 
 from skthermo.datasets import _kw51_file, load_kw51
 from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
+from tests.nights import by_day
 
 pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
 IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
-FUZZ = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(
+    max_examples=by_day(25, at_night=60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*other-kw51-file:UserWarning")
 HOUR = pd.Timedelta("1h")
 
@@ -202,7 +205,7 @@ SMALL = kw51_fields(frequencies=np.full((3, 2), 2.0), shapes=np.ones((3, 2, 2)) 
 
 @IN_A_CHILD
 @NOT_PUBLISHED
-@settings(FUZZ, max_examples=5)
+@settings(FUZZ, max_examples=by_day(2, at_night=5))
 @given(
     form=st.sampled_from(["mat", "packed", "zip"]), place=st.integers(0, 10**6), byte=st.none() | st.integers(0, 255)
 )

@@ -146,12 +146,13 @@ def test_columns_that_are_no_frequencies_of_the_model_are_refused(change):
 
 
 def test_the_unit_of_given_directions_does_not_matter():
-    effects = DirectionalDetector(make_truss()).fit(F).directions_
-    whole, per_mille = (DirectionalDetector(effects * size).fit(F) for size in (1.0, 1e-3))
+    few = F[::3]
+    effects = DirectionalDetector(make_truss()).fit(few).directions_
+    whole, per_mille = (DirectionalDetector(effects * size).fit(few) for size in (1.0, 1e-3))
     smallest = whole.minimum_detectable_damage()
     np.testing.assert_allclose(per_mille.minimum_detectable_damage(), 1e3 * smallest, rtol=1e-6)
     np.testing.assert_allclose(per_mille.pod(1e3 * smallest), whole.pod(smallest), rtol=1e-12)
-    np.testing.assert_allclose(per_mille.severities(F), 1e3 * whole.severities(F), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(per_mille.severities(few), 1e3 * whole.severities(few), rtol=1e-6, atol=1e-9)
 
 
 def test_an_index_means_the_same_whichever_modes_are_there():
