@@ -186,7 +186,7 @@ class AffineModel(AffineBase):
         Notes
         -----
         The costs are rounded from those of lines and grids of beams with 2 to 20 parameters within 30 %
-        (``python tests/benchmarks/reduction_pays.py``).
+        (``python tests/benchmarks/solves.py --parts pays``).
 
         Examples
         --------
