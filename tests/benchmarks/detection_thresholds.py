@@ -212,7 +212,7 @@ def print_charts(options):
     print(f"Below: records from the shift to the first alarm, median of {options.streams} streams, and share of the")
     print(f"{n_after} records after it in alarm.\n")
     for words, threshold_of in {
-        "2 % of the records of another healthy stream are in alarm": lambda values: np.quantile(values, 1 - ASKED),
+        "2 % of the records of another healthy stream are in alarm": lambda values: np.nanquantile(values, 1 - ASKED),
         f"alarms begin once in {BETWEEN_ALARMS} records of another healthy stream": rare_alarms,
     }.items():
         thresholds = {name: threshold_of(values) for name, values in healthy.items()}
@@ -228,7 +228,7 @@ def shifted(streams, onset, shift):
 
 def rare_alarms(index):
     """Threshold above which alarms begin as rarely as they should."""
-    levels = np.quantile(index, 1 - np.geomspace(0.2, 1e-4, 100))
+    levels = np.nanquantile(index, 1 - np.geomspace(0.2, 1e-4, 100))
     begins = [np.count_nonzero(np.diff((index > level).astype(int)) > 0) for level in levels]
     return levels[np.flatnonzero(np.array(begins) > len(index) / BETWEEN_ALARMS)[-1] + 1]
 

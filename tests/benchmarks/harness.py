@@ -70,9 +70,8 @@ def arguments(text, **options):
 def shown(title, table, digits=2):
     """Print a table, rounded or, as "3g", to some digits in all, and keep it for ``--out``."""
     table = table.to_frame("") if isinstance(table, pd.Series) else table
-    table = (
-        table.map(lambda x: f"{x:.{digits}}" if isinstance(x, float) else x) if digits == "3g" else table.round(digits)
-    )
+    form = f".{digits}" if isinstance(digits, str) else f".{digits}f"
+    table = table.map(lambda value: format(value, form) if isinstance(value, float) and value == value else value)
     print(f"\n{title}\n{table.to_string(na_rep='')}", flush=True)
     TABLES[title] = table.to_csv()
 
@@ -159,7 +158,8 @@ def modes_of(records):
 
 def compensated(targets, last=None, regressor=None, **options):
     """A detector, by default by the Mahalanobis distance, of what a regression on temperatures leaves."""
-    regressor, last = regressor or TemperatureMapper(), last or MahalanobisDetector()
+    regressor = TemperatureMapper() if regressor is None else regressor
+    last = MahalanobisDetector() if last is None else last
     return make_pipeline(TemperatureCompensator(regressor, targets=list(targets), **options), last)
 
 

@@ -351,42 +351,15 @@ def evaluated(case, names):
     return rows
 
 
-def table_of(rows):
-    """Mean errors by variant and state, ratios to the best settings, and processor seconds of fit and predictions."""
-    order = [name for name in VARIANTS if name in set(rows["variant"])]
-    errors = rows.pivot_table(index="variant", columns="state", values="error", sort=False, dropna=False).loc[order]
-    states = [state for state in ("healthy", "damaged") if state in errors]
-    best = errors[errors.index.isin(set_by_hand(errors.index))].min()
-    ratios = (errors / best)[states].add_suffix(" / best")
-    seconds = rows.groupby(["variant", "case"])["seconds"].first().groupby("variant").mean()
-    return errors[states].join(ratios).assign(seconds=seconds)
-
-
-def set_by_hand(names):
-    """Chains with settings."""
-    return [name for name in names if name != "plain" and not name.startswith("regression")]
-
-
 def summary_of(rows):
     """One row for each table and state: plain, the best settings, the regression, and the ratios."""
     found = {}
     for (table, state), part in rows.groupby(["table", "state"], sort=False):
         errors = part.groupby("variant")["error"].mean()
-        by_case = part.groupby(["case", "variant"])["error"].mean().unstack()
-        by_hand = set_by_hand(errors.index)
-        if "plain" not in errors or not by_hand:
-            continue
-        direct = errors[errors.index.str.startswith("regression")].min()
-        worst = by_case["plain"] / by_case[by_hand].min(axis=1)
-        found[table, state] = {
-            "plain": errors["plain"],
-            "best": errors[by_hand].min(),
-            "plain / best": errors["plain"] / errors[by_hand].min(),
-            "largest of a case": worst.max(),
-            "regression": direct,
-            "plain / regression": errors["plain"] / direct,
-            "best settings": errors[by_hand].idxmin(),
-        }
+        by_hand = [name for name in errors.index if name != "plain" and not name.startswith("regression")]
+        direct, best = errors[errors.index.str.startswith("regression")].min(), errors[by_hand].min()
+        found[table, state] = {"plain": errors["plain"], "best": best, "regression": direct}
+        found[table, state] |= {"plain / best": errors["plain"] / best, "best settings": errors[by_hand].idxmin()}
     return pd.DataFrame(found).T
 
 
@@ -397,17 +370,17 @@ def compare(options):
         if structure in REAL and DATA is None:
             print(f"{structure} is left out: SKTHERMO_DATA is not set\n")
             continue
-        found = [row for case in STRUCTURES[structure](options) for row in evaluated(case, options.variants)]
-        for table, part in pd.DataFrame(found).groupby("table", sort=False):
-            n_cases, share = part["case"].nunique(), 100 * part["predicted"].mean()
-            shown(f"{table} ({n_cases} cases, {share:.0f} % of the records): mean error, %", table_of(part), 3)
-        rows += found
-    summary = summary_of(pd.DataFrame(rows))
-    if len(summary):
-        shown("Plain call and best settings: mean error, %", summary.infer_objects(), 3)
-        better = summary[["best", "regression"]].astype(float).min(axis=1)
-        close = summary["plain"].astype(float) <= 1.05 * better
-        print(f"plain within 5 % of the better of settings and regression in {close.sum()} of {len(close)} rows")
+        for case in STRUCTURES[structure](options):
+            rows += evaluated(case, options.variants)
+    rows = pd.DataFrame(rows)
+    errors = rows.pivot_table(index="variant", columns=["table", "state"], values="error", sort=False)
+    shown("Mean errors by variant, %", errors.T, 3)
+    shown("Processor seconds of fit and predictions", rows.groupby("variant", sort=False)["seconds"].mean(), 1)
+    summary = summary_of(rows)
+    shown("Plain call and best settings: mean error, %", summary, 3)
+    better = summary[["best", "regression"]].astype(float).min(axis=1)
+    close = summary["plain"].astype(float) <= 1.05 * better
+    print(f"plain within 5 % of the better of settings and regression in {close.sum()} of {len(close)} rows")
 
 
 def main():

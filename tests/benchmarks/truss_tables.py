@@ -232,7 +232,7 @@ def means(mapes, rates, alarms):
         row["false alarms, points"] = gaps[source].xs("healthy", level="scenario").abs().mean()
         row["all rates, points"] = gaps[source].abs().mean()
         by_row = gaps[source].abs().groupby("scenario").mean()
-        row[f"largest row ({by_row.idxmax()}), points"] = by_row.max()
+        row |= {"largest row, points": by_row.max(), "largest row": by_row.idxmax()}
     fitted = (alarms.sub(alarms["true"], axis=0)).drop(columns="true")
     for name, column in fitted.items():
         rows.setdefault("informed" if name != "oracle" else name, {})[f"false alarms, 20 draws, {name}, points"] = (
