@@ -280,10 +280,15 @@ class PredictionDisplay(Display):
         """
         if kind not in KINDS:
             raise ValueError(f"kind is {kind!r}; expected one of {KINDS}")
-        names = panel_names(titles, list(self.measured.columns))
+        columns = list(self.measured.columns)
+        if titles is not None and len(titles) != len(columns):
+            raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {columns}")
+        names = [label_of(name) for name in (columns if titles is None else titles)]
         is_square = kind == "scatter" or self.temperature is not None
         n_columns = n_columns or (1 if not is_square else 3 if kind == "scatter" or len(names) == 6 else 4)
-        size = (3.3, 3.2) if is_square else size_in_time(len(names), n_columns)
+        n_rows = -(-len(names) // n_columns)  # panels over time are wide, and taller if there are few
+        wide = (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
+        size = (3.3, 3.2) if is_square else wide
         self._take_axes(ax, names, size, n_columns=n_columns, share_x=not is_square)
         self.lines_: dict[str, list[Line2D]] = {}
         self.bands_: list[PolyCollection] = []
@@ -372,19 +377,6 @@ def one_temperature(temperature: ArrayLike, measured: ArrayLike) -> pd.Series:
 def with_unit(quantity: str, unit: str) -> str:
     """Label of an axis."""
     return plain(f"{quantity} ({unit})" if unit else quantity)
-
-
-def panel_names(titles: Sequence[str] | None, columns: Sequence[Hashable]) -> list[str]:
-    """Names of the panels: those that are given, or those of the columns."""
-    if titles is not None and len(titles) != len(columns):
-        raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {list(columns)}")
-    return [label_of(name) for name in (columns if titles is None else titles)]
-
-
-def size_in_time(n_panels: int, n_columns: int) -> tuple[float, float]:
-    """Width and height in inches of panels over time: wide ones, and taller if there are few."""
-    n_rows = -(-n_panels // n_columns)
-    return (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
 
 
 def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:

@@ -132,14 +132,6 @@ class Arrangement:
         detector.set_params(**{key: [*value, added] for key, value in targets.items()})
         return replace(self, detector=detector, columns=[*self.columns, name])
 
-    def with_sensor(self, name: Hashable) -> Arrangement:
-        """The arrangement with one more temperature."""
-        return replace(self, columns=[*self.columns, name])
-
-    def with_baseline(self, factor: float) -> Arrangement:
-        """The arrangement with a longer baseline."""
-        return replace(self, n_baseline=int(np.ceil(self.n_baseline * factor)))
-
     def smallest(self, baseline: pd.DataFrame, tables: Mapping[tuple[str, float], pd.DataFrame]) -> dict[str, float]:
         """Severity at which the curve of the probability of detection reaches 0.9, by family."""
         detector = clone(self.detector).fit(self._seen(baseline.iloc[: self.n_baseline]))
@@ -280,7 +272,9 @@ def compare_extensions(
     ranks = _further_modes(fem.model, modes)
     scatter = _scatter(study) if noise is None else noise
     candidates = {("mode", mode_name(rank)): present.with_mode(mode_name(rank)) for rank in ranks}
-    candidates |= {("baseline", f"baseline x {factor:g}"): present.with_baseline(factor) for factor in factors}
+    for factor in factors:
+        n_baseline = int(np.ceil(present.n_baseline * factor))
+        candidates["baseline", f"baseline x {factor:g}"] = replace(present, n_baseline=n_baseline)
     longest = max([present.n_baseline, *(candidate.n_baseline for candidate in candidates.values())])
     measurement = Measurement.asked(study.fem, study.noise, study.gaps, study.outliers)
     simulator = CampaignSimulator(
@@ -421,7 +415,8 @@ def _with_sensors(
         fem = clone(study.fem).fit(beside, F)
         seen = name if isinstance(T, pd.DataFrame) else f"T{T.shape[1] + 1}"
         simulator = CampaignSimulator(fem, beside, changes, measurement, present.n_baseline)
-        trials.append(Trials(simulator, present, {("sensor", str(name)): present.with_sensor(seen)}))
+        beside_present = replace(present, columns=[*present.columns, seen])
+        trials.append(Trials(simulator, present, {("sensor", str(name)): beside_present}))
     return trials
 
 

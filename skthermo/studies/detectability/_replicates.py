@@ -132,10 +132,6 @@ class Replicates:
         errors = self.fem.recorder_.residuals.level_errors
         return np.exp(errors * np.random.RandomState([self.seeds[number], 1]).standard_normal(len(errors)))
 
-    def fault_stream(self, number: int) -> np.random.RandomState:
-        """Random numbers of the gaps and outliers that other training records have."""
-        return np.random.RandomState([self.seeds[number], 2])
-
 
 def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> list[FEModel]:
     """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""
@@ -407,7 +403,8 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
                     here = replace(simulation, T=T)
                     drawn = [here.drawn(int(seed)) for seed, _ in seeds]
                 if part == "baseline":
-                    measurement = here.measurement.resampled(here.fem, replicates.fault_stream(number))
+                    faults = np.random.RandomState([replicates.seeds[number], 2])  # gaps and outliers of other records
+                    measurement = here.measurement.resampled(here.fem, faults)
                     if measurement is not here.measurement:
                         here = replace(here, measurement=measurement)
                         drawn = [here.drawn(int(seed)) for seed, _ in seeds]

@@ -78,10 +78,6 @@ class Amount:
         """Whether another cause's amount is of the same kind and within the band of this one."""
         return self.saying == other.saying and self.lowest <= other.value <= self.highest
 
-    def resembles(self, other: Amount) -> bool:
-        """Whether another amount of the same cause differs by no more than the width of the band."""
-        return abs(self.value - other.value) <= abs(self.highest - self.lowest)
-
 
 @dataclass(frozen=True)
 class Statement:
@@ -114,7 +110,11 @@ class Statement:
         known = {amounts[0].cause: amounts[0] for amounts in first.changes}
         own = [amounts for amounts in self.changes if amounts[0].cause not in known]
         shared = [amounts[0] for amounts in self.changes if amounts[0].cause in known]
-        is_same = len(shared) == len(known) and all(known[one.cause].resembles(one) for one in shared)
+        # the same amounts, within the width of their bands
+        is_same = len(shared) == len(known) and all(
+            abs(known[one.cause].value - one.value) <= abs(known[one.cause].highest - known[one.cause].lowest)
+            for one in shared
+        )
         if first.is_healthy or not is_same or len(own) + self.has_else - first.has_else != 1:
             return ""
         return _phrase(own[0], False, False).removeprefix("a loss of ").rstrip(",") if own else SOMETHING_ELSE

@@ -201,7 +201,8 @@ class LocatedDamage(Sentences):
             return
         (small, in_small), (wide, in_wide) = (fewest(self._sets(group), level) for level in (PROBABLE, LIKELY))
         if len(small) == len(places.members):
-            whole = self._share_of_whole(group)
+            sets, everything = self._sets(group), frozenset(places.members)
+            whole = sum(share for inside, share in sets if inside == everything) / sum(share for _, share in sets)
             yield damaged + (
                 f", probably all {len(small)} elements alike ({_share(whole)})."
                 if whole >= PROBABLE
@@ -216,11 +217,6 @@ class LocatedDamage(Sentences):
             yield f"It lies in {where} ({_share(in_wide)}). Damage in the rest of {group} is unlikely."
         else:
             yield f"Damage in the rest of {group} is unlikely."
-
-    def _share_of_whole(self, group: str) -> float:
-        """Probability that all of a group is damaged alike, given that it is damaged."""
-        sets, everything = self._sets(group), frozenset(self.places[group].members)
-        return sum(share for members, share in sets if members == everything) / sum(share for _, share in sets)
 
     def __repr__(self) -> str:
         best = self.groups["probability"].sort_values(ascending=False, kind="stable")[:3]
