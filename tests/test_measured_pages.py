@@ -46,6 +46,14 @@ def test_numbers_of_the_prose_are_in_the_tables(page):
     assert not unknown, dict(zip(unknown, places, strict=True))
 
 
+def test_numbers_of_the_home_pages_cards_are_in_the_summary():
+    cards = (
+        (DOCS / "index.rst").read_text().partition(":class-container: measured")[2].partition(":class-container:")[0]
+    )
+    assert numbers(cards)
+    assert numbers(cards) <= numbers((MEASURED / "summary.rst").read_text())
+
+
 @pytest.mark.parametrize("table", sorted(MEASURED.glob("*.rst")), ids=lambda path: path.stem)
 def test_a_table_names_its_commands(table, parts):
     known = {part.command for part in parts.values()}

@@ -78,7 +78,7 @@ def alarm_rates(residuals, evaluated):
     return rates
 
 
-def compared(seeds, title, ways, measure):
+def compared(seeds, title, ways, counted):
     """Alarms in year 2 by each way to learn, and whether the last of them has too many."""
     rows = {}
     for seed in seeds:
@@ -91,7 +91,7 @@ def compared(seeds, title, ways, measure):
                 rows.setdefault((whiten or "plain", way), []).append(alarm_rates(residuals, evaluated))
     table = pd.DataFrame({key: pd.DataFrame(found).mean() for key, found in rows.items()}).T
     shown(f"Alarms in year 2{title}, %, {ASKED:g} asked", table, 1)
-    return int((table.xs(measure, level=1)["record", "healthy"] > MOST_FALSE).sum())
+    return int((table.xs(counted, level=1)["record", "healthy"] > MOST_FALSE).sum())
 
 
 def folds(seeds):

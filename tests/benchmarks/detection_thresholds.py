@@ -264,8 +264,7 @@ def print_drift(options):
         found = (later > np.quantile(index, 1 - ASKED)).mean()
         rates.setdefault("CUSUM, allowance 0.5", []).append(found)
     table = pd.DataFrame({size: {name: 100 * np.mean(r) for name, r in rates.items()} for size, rates in rows.items()})
-    print(f"False alarms in the next year, %, residuals that drift with an autocorrelation of {SLOW} by\n")
-    print(table.round(1).to_string(), end="\n\n")
+    shown(f"False alarms in the next year, %, residuals that drift with an autocorrelation of {SLOW} by", table, 1)
 
 
 def print_short(options):

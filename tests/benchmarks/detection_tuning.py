@@ -14,7 +14,7 @@ more than 5 points from what fresh simulation predicted.
 
 import numpy as np
 import pandas as pd
-from harness import arguments
+from harness import arguments, shown
 from sklearn.model_selection import GridSearchCV, ParameterGrid
 from tuning_recipes import GRID, LIMIT, detector, fitted_chain, true_score, true_year
 
@@ -68,8 +68,7 @@ def main():
     table = pd.concat(tables, names=["seed", "which"])
     columns = ["setting", "tuned", "fresh", "fresh_ci_low", "fresh_ci_high", "optimism", "true", "false_alarms"]
     columns.append("true false alarms")
-    print("Damaged records found at 2 % false alarms, and false alarms by the own threshold, %\n")
-    print(table[columns].round(1).to_string(na_rep=""), end="\n\n")
+    shown("Damaged records found at 2 % false alarms, and false alarms by the own threshold, %", table[columns], 1)
     means = table[columns[1:]].groupby("which").mean()
     print(means.loc[["first", "winner", "best"]].round(1).to_string(na_rep=""), end="\n\n")
     print(f"rank correlation of simulated and true scores of 12 settings, mean of the seeds: {np.mean(ranks):.3f}")

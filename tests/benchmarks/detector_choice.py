@@ -26,7 +26,7 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-from harness import arguments, autoregression, compensated, recipes
+from harness import arguments, autoregression, compensated, recipes, shown
 from joblib import Parallel, delayed
 from kw51_recipes import DEFAULT, NOISE, RECIPES, TRAINED, Fitted, Records
 from scipy.stats import spearmanr
@@ -312,8 +312,10 @@ def main():
     for kind in options.wrong:
         found = Parallel(n_jobs=options.jobs)(delayed(one_seed)(options, kind, seed) for seed in seeds)
         tables, outcomes = [table for table, _ in found], pd.concat([each for _, each in found], ignore_index=True)
-        print(f"\n{options.structure}, {len(seeds)} seeds; wrong: {WRONG[kind].title}. Percent of records:\n")
-        print(by_detector(tables, outcomes).to_string())
+        shown(
+            f"{options.structure}, {len(seeds)} seeds; wrong: {WRONG[kind].title}. Percent of records:",
+            by_detector(tables, outcomes),
+        )
         print(f"\nwhat the choice loses, points of {len(seeds)} seeds:\n\n{by_rule(outcomes).to_string()}", flush=True)
         shipped[kind] = by_rule(outcomes).iloc[0].rename(WRONG[kind].title), is_missed(outcomes)
     print(f"\nordered by what is {SHIPPED}:\n\n{pd.DataFrame([row for row, _ in shipped.values()]).to_string()}")

@@ -19,7 +19,7 @@ import time
 
 import numpy as np
 import pandas as pd
-from harness import arguments
+from harness import arguments, shown
 from structures import KNOWN, Campaign, memory_of
 
 from skthermo.studies import identify_damage
@@ -246,25 +246,29 @@ def main():
             every.append(measured(name, design, seeds, options.verbose))
     states, groups = (pd.concat(parts, ignore_index=True) for parts in zip(*every, strict=True))
     print("\nThe truth is the most probable explanation, % of states")
-    print("(visible: above 2 Cramer-Rao deviations beside the group most like it; alone: with no other group)")
-    print(found_table(states).to_string())
-    print("\nSeverities in their bands of 90 %, % of groups (seen: Cramer-Rao deviation alone below 6 %)")
-    print(coverage_table(groups).to_string())
+    shown(
+        "(visible: above 2 Cramer-Rao deviations beside the group most like it; alone: with no other group)",
+        found_table(states),
+    )
+    shown(
+        "Severities in their bands of 90 %, % of groups (seen: Cramer-Rao deviation alone below 6 %)",
+        coverage_table(groups),
+    )
     for which in ("right", "wrong"):
         some, of_groups = (frame[frame["design"].isin(RIGHT) == (which == "right")] for frame in (states, groups))
         if len(some):
-            print(f"\nBy correlation of records, {which} models, %")
-            print(dependence_table(some, of_groups).to_string())
+            shown(f"By correlation of records, {which} models, %", dependence_table(some, of_groups))
         if some["probability"].notna().any():
-            print(f"\nReliability, {which} models, %: most probable explanation; each group")
-            print(reliability(some["probability"], some["hit"]).to_string())
+            shown(
+                f"Reliability, {which} models, %: most probable explanation; each group",
+                reliability(some["probability"], some["hit"]),
+            )
             print(reliability(of_groups["probability"], of_groups["truth"] > 0).to_string())
     print()
     missed = 0
     for what, values, lowest, highest in targets(states, groups):
         if len(values):
-            values = values.astype(float)
-            met = is_met(values, lowest, highest)
+            met = is_met(values.astype(float), lowest, highest)
             missed += not met
             print(f"{'met' if met else 'MISSED':7} {what}: {share(values)}, target {lowest} to {highest}")
     return 1 if missed else 0

@@ -25,7 +25,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated
+from harness import arguments, compensated, shown
 from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
@@ -159,8 +159,10 @@ def main():
         **days,
     )
     by_structure = table.pivot_table(index=by, columns="structure", values="events", sort=False)
-    print(f"days: median to the first event within {N_DAYS} days; columns of structures: events a year")
-    print(summary.join(by_structure).round(2).to_string())
+    shown(
+        f"days: median to the first event within {N_DAYS} days; columns of structures: events a year",
+        summary.join(by_structure),
+    )
     print(f"{time.perf_counter() - start:.0f} s")
     return 0 if summary.loc[(3, False), "events"].between(LEAST, MOST).all() else 1
 

@@ -27,7 +27,7 @@ import time
 
 import numpy as np
 import pandas as pd
-from harness import arguments, split
+from harness import arguments, shown, split
 from scipy import stats
 from structures import AGEING
 
@@ -192,8 +192,7 @@ def main():
     means = figures.groupby(["bridge", "way", "rate, %"], sort=False).mean()
     means["rms error, %"] **= 0.5
     model = ", drift begins after a year" if options.quiet else ""
-    print(f"\n{options.seeds} seeds, noise correlated by {options.correlation}{model}; in percent\n")
-    print(means.round(2).to_string())
+    shown(f"{options.seeds} seeds, noise correlated by {options.correlation}{model}; in percent", means)
     missed = [] if options.quiet else list(misses(table))
     has_targets = "tracked" in options.ways and not options.quiet
     reached = "all targets reached" if has_targets else "no targets"
