@@ -98,7 +98,7 @@ def solve_rows(
 class Job:
     """What is asked of a model for every chunk of rows; Dask sends it to a worker once, because it says it is large."""
 
-    def __init__(self, model: Any, method: str, dofs: NDArray[np.intp] | None):
+    def __init__(self, model: Any, method: str, dofs: Any):
         self.model = model
         self.method = method
         self.dofs = dofs

@@ -324,7 +324,7 @@ class SparseTerms(AffineTerms):
         return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
 
     @property
-    def each_matrix(self) -> list[Matrix]:
+    def each_matrix(self) -> list[scipy.sparse.csc_array]:
         ends = self.entries.indptr[1:-1]
         parts = zip(np.split(self.entries.data, ends), np.split(self.entries.indices, ends), strict=True)
         rows, columns = self.pattern.rows, self.pattern.columns

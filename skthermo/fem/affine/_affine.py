@@ -818,6 +818,8 @@ class ReducedModel(AffineModel):
     True
     """
 
+    _basis: Array
+
     def __init__(self, full: AffineModel, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None):
         if not isinstance(full, AffineModel):
             raise ValueError(f"full is {full!r:.200}; expected an AffineModel, or a ReducedModel")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -13,6 +13,7 @@ from scipy.sparse import csc_array
 from skthermo._estimators.threads import map_on_blas_threads
 from skthermo._tables.arrays import Array, RandomState, as_random_state
 from skthermo.fem._factors import Solve, factorise
+from skthermo.fem._terms import SparseTerms
 from skthermo.fem.modal import AffineCore, ShiftInvertSolver, may_be_missed, pair_modes
 
 FIRST_SNAPSHOTS = 16
@@ -61,7 +62,7 @@ def grow_basis(
     random = np.random.RandomState(own_seed)  # other points than those of a sample with the same seed
     nominal = np.ones((1, len(bounds)))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
-    solve = factorise(stiffness)
+    solve: Any = factorise(stiffness)
     if start is None:
         used = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
         start, points = snapshots_at(full, used[:UNGUIDED]), used[UNGUIDED:]
@@ -112,7 +113,7 @@ def basis_of(directions: Directions, full: AffineCore, tol: float) -> tuple[Arra
 
 def guided(full: AffineCore, core: AffineCore, vectors: Array, tol: float) -> AffineCore:
     """The full core; a sparse one is solved from the shapes of the core on the basis, to a relative error ``tol``."""
-    if not isinstance(full.solver, ShiftInvertSolver):
+    if not (isinstance(full.stiffness, SparseTerms) and isinstance(full.mass, SparseTerms)):
         return full
 
     def guide(theta: Array, n_shapes: int) -> Array:
