@@ -337,8 +337,8 @@ class FrequencyInverse(TransformerMixin):
             The model's parameter names; without a model those of the columns of y, else theta1, theta2, ...
         """
         check_is_fitted(self)
-        numbered = [f"theta{i + 1}" for i in range(self.n_parameters_)]
-        return np.array(self.parameter_names_ or numbered, dtype=object)
+        names = self.parameter_names_ or [f"theta{i + 1}" for i in range(self.n_parameters_)]
+        return np.array(names, dtype=object)
 
     def _checked_model(self) -> Any:
         if self.model is None:

@@ -1,4 +1,4 @@
-"""Boxes of parameters, and frequencies of many rows: by the reduced model inside its box, the full model outside."""
+"""Frequencies of many rows: by the reduced model inside its box of parameters, by the full model outside."""
 
 from __future__ import annotations
 
@@ -15,59 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import DEFAULT_TOLERANCE, Array, Bounds, Reduce, check_bounds, is_auto, tolerance
+from skthermo._tables.arrays import DEFAULT_TOLERANCE, Array, Reduce, is_auto, tolerance
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import AffineModel, FEModel, FrequencySurface, ReducedModel, evaluate, linearise, linearise_modes
-
-NEAR_HALF_WIDTHS = 2.0  # from the middle up to which parameters are near the box; a surrogate extrapolates well there
-MANY_FAR_ROWS = 0.05  # share of rows far outside the box that gives a warning
-
-
-@dataclass(frozen=True)
-class Box:
-    """Lowest and highest multiplier of each parameter, (n_parameters, 2)."""
-
-    bounds: Array
-    names: tuple[str, ...]
-
-    @classmethod
-    def of(cls, bounds: Bounds, names: Sequence[str]) -> Box:
-        """The box of bounds in any of the ways that an estimator takes them."""
-        return cls(check_bounds(bounds, names), tuple(names))
-
-    @property
-    def near(self) -> Array:
-        """Bounds of the region in or near the box; all positive."""
-        middle, half = self.bounds.mean(axis=1), np.diff(self.bounds, axis=1)[:, 0] / 2
-        lowest = np.maximum(middle - NEAR_HALF_WIDTHS * half, self.bounds[:, 0] / 2)
-        return np.column_stack([lowest, middle + NEAR_HALF_WIDTHS * half])
-
-    def outside(self, theta: Array) -> NDArray[np.bool_]:
-        """Which parameters of each row are outside the box; NaN is not."""
-        lowest, highest = self.bounds.T
-        return (theta < lowest) | (theta > highest)
-
-    def far_outside(self, theta: Array) -> NDArray[np.bool_]:
-        """Which parameters of each row are not even near the box; NaN is not."""
-        return Box(self.near, self.names).outside(theta)
-
-    def warning(self, theta: Array) -> str:
-        """Text of the warning if many rows have parameters far outside, else an empty string."""
-        known = ~np.isnan(theta).any(axis=1)
-        far = self.far_outside(theta[known])
-        rows = far.any(axis=1)
-        if not rows.size or rows.mean() <= MANY_FAR_ROWS:
-            return ""
-        worst = int(far.sum(axis=0).argmax())
-        values = theta[known][far[:, worst], worst]
-        lowest, highest = self.bounds[worst]
-        return (
-            f"{rows.sum()} of {rows.size} rows give parameters farther outside the bounds than half their width. "
-            f"{self.names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, with bounds "
-            f"{lowest:.6g} to {highest:.6g}. Give frequencies in Hz in the order of the model's modes, wider bounds, "
-            "or the noise of the measurement"
-        )
-
 
 SOLVES_PER_ROW = 3  # for predictions and simulations, and to refine the parameters of a record
 MARGIN, LEAST_MARGIN = 0.25, 0.05  # around learned parameters: shares of their range, and of their values

@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import replace
 from functools import partial
 from numbers import Integral, Real
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, TypedDict, Unpack, overload
 
 import numpy as np
 import pandas as pd
@@ -155,7 +155,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ``discrepancy_(T)``, (n_samples, n_modes), is the logarithm of measured over modelled frequencies at
         temperatures T; 0 with ``discrepancy=None``.
     records_ : TrainingRecords
-        The training records, and what M2 learned from them.
+        The training records (``temperatures``, ``frequencies``), and what M2 learned from them.
     thermal_ : ThermalModel
         Mapper, simulator, aligner and discrepancy, which predict: ``thermal_.simulated(weather(T), modes)`` also gives
         modes that were not measured.
@@ -189,8 +189,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     A mapper with a method ``predict_covariance(X)``, (n_samples, n_parameters, n_parameters), such as one that has
     learned from a fleet, makes standard deviations and intervals as wide as it is uncertain. With ``reach_``, a range
-    of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others.
-    :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty` explain each step.
+    of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others. See
+    :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty`.
 
     Examples
     --------
@@ -305,14 +305,16 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with stages.stage("noise"):
             self.noise_ = measurement_noise(self.mapper_, filled, usable)
         with stages.stage("inverse", self.inverse_):
-            aligned = self._fit_inverse(inverse, T, usable, shapes)
+            complete = usable if self.imputer_ is None else imputed(self.imputer_, T, usable)
+            aligned = inverse.with_shapes(self.aligner_.fit(complete).transform(complete), shapes)
+            inverse.fit(aligned, self.noise_)
         with stages.stage("parameters of the records"):
             parameters = inverse.invert(aligned, self.parameter_names_)
             warn_each(() if shapes is None else inverse.shape_warnings(aligned, parameters.theta))
         with stages.stage("temperature mapper", self.mapper_):
             fit_weighted(self.mapper_, filled, named(filled, parameters.theta, self.parameter_names_), weights)
         with stages.stage("discrepancy and report"):
-            hold(self, recorder_of(self, inverse, T, F, filled, usable, parameters.theta, weights))
+            self._hold(recorder_of(self, inverse, T, F, filled, usable, parameters.theta, weights))
             self.report_ = report_of(self, parameters, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -347,8 +349,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         measured = frame_like(F, check_array(F, dtype=np.float64))
         inputs = ChainInverse(self.inverse_).with_shapes(self.aligner_.transform(measured), shapes)
-        theta = as_floats(self.inverse_.transform(inputs))
-        return frame_like(F, theta, self.parameter_names_)
+        return frame_like(F, as_floats(self.inverse_.transform(inputs)), self.parameter_names_)
 
     @overload
     def predict_parameters(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -375,8 +376,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
-        weather = self.weather(X)
-        return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
+        return frame_like(X, self.thermal_.parameters(self.weather(X)), self.parameter_names_)
 
     @overload
     def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
@@ -408,11 +408,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             weather, out of fold, in Hz. They contain the scatter of the measurement, what a missing temperature costs,
             and what `predict_covariance` says where the mapper knows it.
         """
-        check_flag(return_std, "return_std")
         weather = self.weather(X)
         frequencies = self.thermal_.simulated(weather)
         predicted = self._as_targets(X, frequencies)
-        if not return_std:
+        if not check_flag(return_std, "return_std"):
             return predicted
         deviations = np.hypot(self.recorder_.residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
         return predicted, self._as_targets(X, frequencies * deviations)
@@ -428,9 +427,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         ndarray of shape (n_samples, n_modes, n_modes)
-            In Hz squared, in the measured domain, to first order: G C G' with the covariance C of the parameters that
-            the mapper states, and G = d f / d theta, times the discrepancy, without the scatter of the measurement.
-            Errors of records in similar weather do not average out.
+            In Hz squared, in the measured domain, to first order: G C G' with the mapper's covariance C of the
+            parameters and G = d f / d theta, times the discrepancy. It is without the scatter of the measurement;
+            errors of records in similar weather do not average out.
 
         Raises
         ------
@@ -495,8 +494,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         frequencies, residuals = self.thermal_.simulated(weather), self.recorder_.residuals
         margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
         margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
-        lowest, highest = frequencies * np.maximum(1 - margin, 0.0), frequencies * (1 + margin)
-        return self._as_targets(X, lowest), self._as_targets(X, highest)
+        lowest = frequencies * np.maximum(1 - margin, 0.0)
+        return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margin))
 
     @overload
     def simulate(self, X: pd.DataFrame, **options: Unpack[Simulated]) -> pd.DataFrame: ...
@@ -563,8 +562,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             If a factor is above 10, which may be meant in percent.
         """
         weather = self.weather(X)
-        change = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
-        frequencies = self.thermal_.simulated(weather, **change)
+        frequencies = self.thermal_.simulated(
+            weather, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass
+        )
         frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
         return frame_like(X, frequencies, self.mode_names_)
 
@@ -667,13 +667,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     def _clone_parts(self, shapes: ArrayLike | None) -> ChainInverse:
         """Clone inverse, mapper, aligner and imputer, with the model, and seeds where they have none; the inverse."""
         tolerance(self.model, self.reduce)
-        unchanged = FunctionTransformer().set_output(transform="default")
         self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
-        self.aligner_ = unchanged if self.aligner == "passthrough" else self._part("aligner")
+        self.aligner_ = with_reference(None if self.aligner == "passthrough" else self._part("aligner"), self.model)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
-        for part in (self.aligner_, *self.aligner_.get_params().values()):
-            if isinstance(part, BiasAligner) and part.reference is None:
-                part.set_params(reference=self.model)
         inverse = ChainInverse(self.inverse_)
         inverse.prepare(self.model, self.memory, self.reduce, has_shapes=shapes is not None)
         random_state = seeded(self.random_state)
@@ -686,22 +682,21 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
         mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
         findings = findings_of(partial(known_findings, self.memory), *given, mended=mended)
-        warn_each(misplaced_columns(T, F))
-        warn_each(mode_warnings(self.model, F))
+        warn_each([*misplaced_columns(T, F), *mode_warnings(self.model, F)])
         self.sensors_ = SensorRegression.of(T)
         means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
         if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
             self.mapper_ = make_pipeline(means, self.mapper_)
         return findings
 
-    def _fit_inverse(self, inverse: ChainInverse, T: Table, F: Table, shapes: ArrayLike | None) -> Table:
-        """Fill gaps, fit aligner and M1; the aligned records."""
-        if self.imputer_ is not None:
-            values = as_floats(self.imputer_.fit_transform(np.hstack([T, F])))
-            F = frame_like(F, values[:, T.shape[1] : T.shape[1] + F.shape[1]], self.mode_names_)
-        aligned = inverse.with_shapes(self.aligner_.fit(F).transform(F), shapes)
-        inverse.fit(aligned, self.noise_)
-        return aligned
+    def _hold(self, recorder: RecordSimulator) -> Self:
+        """Hold what was learned, and its parts by the names that users know."""
+        thermal, records = recorder.model, recorder.records
+        self.thermal_, self.recorder_, self.records_ = thermal, recorder, records
+        self.mapper_, self.aligner_, self.simulator_ = thermal.mapper, thermal.aligner, thermal.simulator
+        self.discrepancy_, self.training_range_ = thermal.discrepancy, thermal.training_range
+        self.parameters_ = frame_like(records.temperatures, records.targets, self.parameter_names_)
+        return self
 
     def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
@@ -711,6 +706,23 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 def known_findings(memory: str | Memory | None, T: Table, F: Table) -> RecordFindings:
     """What `check_records` finds, read from the memory if these records were checked before."""
     return remembered(memory, "checks", partial(check_records, T, F), (T, F))
+
+
+def with_reference(aligner: BaseEstimator | None, model: FEModel) -> BaseEstimator:
+    """An aligner, whose parts without a reference get the model; without one, frequencies stay as they are."""
+    if aligner is None:
+        return FunctionTransformer().set_output(transform="default")
+    for part in (aligner, *aligner.get_params().values()):
+        if isinstance(part, BiasAligner) and part.reference is None:
+            part.set_params(reference=model)
+    return aligner
+
+
+def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:
+    """Frequencies whose gaps an imputer fills, given temperatures and frequencies side by side."""
+    n_sensors, n_modes = T.shape[1], F.shape[1]
+    values = as_floats(imputer.fit_transform(np.hstack([T, F])))
+    return frame_like(F, values[:, n_sensors : n_sensors + n_modes], column_names(F, "f"))
 
 
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
@@ -757,16 +769,6 @@ def recorder_of(
         **parts,
     )
     return RecordSimulator(thermal, records)
-
-
-def hold(chain: DataInformedFEM, recorder: RecordSimulator) -> DataInformedFEM:
-    """Let a chain hold what was learned, and its parts by the names that users know."""
-    thermal, records = recorder.model, recorder.records
-    chain.thermal_, chain.recorder_, chain.records_ = thermal, recorder, records
-    chain.mapper_, chain.aligner_, chain.simulator_ = thermal.mapper, thermal.aligner, thermal.simulator
-    chain.discrepancy_, chain.training_range_ = thermal.discrepancy, thermal.training_range
-    chain.parameters_ = frame_like(records.temperatures, records.targets, chain.parameter_names_)
-    return chain
 
 
 def refitted(
@@ -870,7 +872,7 @@ def resampled(fem: FittedChain, random_state: int | np.random.RandomState | None
     records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
     discrepancy = fem.discrepancy_.again(records.ratios, mapper)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
-    return hold(copy(fem), RecordSimulator(thermal, records, fem.recorder_.service))
+    return copy(fem)._hold(RecordSimulator(thermal, records, fem.recorder_.service))
 
 
 def with_model(fem: FittedChain, model: FEModel) -> DataInformedFEM:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from numbers import Integral, Real
 from typing import Literal, overload
@@ -15,7 +16,7 @@ from sklearn.utils import Bunch, check_random_state
 
 from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, check_model, check_noise, check_theta
+from skthermo._tables.arrays import Array, Bounds, check_bounds, check_model, check_noise, check_theta
 from skthermo._tables.frames import frame_like
 from skthermo._validation import (
     HasMethods,
@@ -29,10 +30,11 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2
 from skthermo.surrogate._regression import FrequencyInverse, MultiplierRegressor, default_network
-from skthermo.surrogate._simulator import Box
 
 N_HELD_OUT = 500  # simulations that a score is of
 HELD_OUT_SEED = 20_260_000  # of them: the same for all settings that are compared
+NEAR_HALF_WIDTHS = 2.0  # from the middle, up to which parameters are near the bounds: a regressor extrapolates there
+MANY_FAR_ROWS = 0.05  # share of rows far outside the bounds that gives a warning
 
 
 class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
@@ -74,8 +76,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         Means and scales of the log frequencies and of the log parameters.
     samples_ : Bunch
         ``theta`` and ``frequencies`` of the training samples, before noise.
-    box_ : Box or None
-        The bounds of the samples, if they were simulated; else None.
+    bounds_ : ndarray of shape (n_parameters, 2) or None
+        Lowest and highest multiplier of each parameter in the samples, if they were simulated; else None.
     noise_ : ndarray of shape (n_modes,)
         If there is a model: the relative standard deviations of the noise.
     n_parameters_, parameter_names_ : int, list of str or None
@@ -178,7 +180,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
             inputs, theta = self._simulated(random)
         else:
             inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
-            self.box_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
+            self.bounds_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
             if self.model is not None:
                 check_theta(theta, self.model.parameter_names, allow_nan=True)
                 self.parameter_names_ = list(self.model.parameter_names)
@@ -232,8 +234,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
             the box.
         """
         theta = self._predict_arrays(X)[0]
-        if self.box_ is not None:
-            warn_user(self.box_.warning(theta), ModelWarning, "outside-bounds")
+        if self.bounds_ is not None:
+            warn_user(far_outside_text(theta, self.bounds_, self.parameter_names_), ModelWarning, "outside-bounds")
         return frame_like(X, theta, self.get_feature_names_out())
 
     def score(
@@ -282,7 +284,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         check_is_fitted(self)
         if y is not None:
             return super().score(X, y, sample_weight)
-        if self.box_ is None:
+        if self.bounds_ is None:
             raise ValueError("InverseSurrogate has learned from given parameters, not simulations; expected y to score")
         random = np.random.RandomState(HELD_OUT_SEED)
         samples = self._drawn(N_HELD_OUT, random)
@@ -306,7 +308,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         """
         check_is_fitted(self)
         model, state = self._checked_model(), np.ones((1, self.n_parameters_))
-        nominal = evaluate(model, state if self.box_ is None else np.clip(state, *self.box_.bounds.T))
+        nominal = evaluate(model, state if self.bounds_ is None else np.clip(state, *self.bounds_.T))
         return (evaluate(model, self._regress(nominal)[0]) / nominal - 1)[0]
 
     def _simulated(self, random: np.random.RandomState) -> tuple[Array, Array]:
@@ -319,14 +321,14 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
                 FewRecordsWarning,
                 "underdetermined",
             )
-        self.box_ = Box.of(self.bounds, names)
+        self.bounds_ = check_bounds(self.bounds, names)
         self.parameter_names_, self.y_is_vector_ = list(names), False
         self.samples_ = self._drawn(self.n_samples, random)
         return add_noise(self.samples_.frequencies, self.noise_, random_state=random), self.samples_.theta
 
     def _drawn(self, n_samples: int, random: np.random.RandomState) -> Bunch:
         """Samples in the box; read from the memory if they are there."""
-        settings = (self.box_.bounds, n_samples, random.randint(np.iinfo(np.int32).max))
+        settings = (self.bounds_, n_samples, random.randint(np.iinfo(np.int32).max))
         draw = partial(sample, self.model, *settings[:2], n_jobs=self.n_jobs, random_state=settings[2])
         return remembered(self.memory, "simulations", draw, (self.model, settings))
 
@@ -339,3 +341,21 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
         check_is_fitted(self)
         return self._regress(self._positive(X, None if self.inputs_.log else 0), return_std)
+
+
+def far_outside_text(theta: Array, bounds: Array, names: Sequence[str]) -> str:
+    """Text of the warning if many rows have parameters far outside the bounds, else an empty string."""
+    known, middle, half = theta[~np.isnan(theta).any(axis=1)], bounds.mean(axis=1), np.diff(bounds, axis=1)[:, 0] / 2
+    least = np.maximum(middle - NEAR_HALF_WIDTHS * half, bounds[:, 0] / 2)  # positive
+    far = (known < least) | (known > middle + NEAR_HALF_WIDTHS * half)
+    rows = far.any(axis=1)
+    if not rows.size or rows.mean() <= MANY_FAR_ROWS:
+        return ""
+    worst = int(far.sum(axis=0).argmax())
+    values, (lowest, highest) = known[far[:, worst], worst], bounds[worst]
+    return (
+        f"{rows.sum()} of {rows.size} rows give parameters farther outside the bounds than half their width. "
+        f"{names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, with bounds "
+        f"{lowest:.6g} to {highest:.6g}. Give frequencies in Hz in the order of the model's modes, wider bounds, "
+        "or the noise of the measurement"
+    )

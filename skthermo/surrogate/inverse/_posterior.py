@@ -103,11 +103,6 @@ class ThermalPrior:
         """Standard deviations of ln theta, (n_parameters,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    @classmethod
-    def first(cls, names: Sequence[str]) -> ThermalPrior:
-        """Before records are known."""
-        return cls(tuple(names), FIRST_DEVIATION, np.full(len(names), FIRST_DEVIATION))
-
     def __str__(self) -> str:
         own = listed(
             [f"{name!r} by itself by {percent(size, '.2g')}" for name, size in zip(self.names, self.own, strict=True)]
@@ -170,8 +165,9 @@ class LinearRecords:
         start = np.log(np.append([prior.common, *prior.own] if learns_prior else [], noise[learns_noise]))
         if not len(start):
             return prior, noise
-        noisy = [(one, MOST_NOISE) for one in least[learns_noise]]
-        bounds = np.log([MOVED] * (n_own * learns_prior) + noisy)
+        lowest = np.append([MOVED[0]] * (n_own * learns_prior), least[learns_noise])
+        highest = np.append([MOVED[1]] * (n_own * learns_prior), [MOST_NOISE] * learns_noise.sum())
+        bounds = np.log(np.column_stack([lowest, highest]))
         return read(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
     def _likelihood(self, prior: ThermalPrior, noise: Array) -> tuple[float, Array, Array]:
@@ -241,10 +237,9 @@ class Posterior:
         found = self._refine(objective)
         local, lost = found.local, found.stalled[:, np.newaxis]
         sensitivity = np.nan_to_num(local.sensitivity)
-        std, at_best = (
-            deviations_of(information(sensitivity, spread, self.prior.precision))
-            for spread in (np.where(objective.missing, np.inf, objective.noise), objective.noise)
-        )
+        noise, precision = objective.noise, self.prior.precision
+        std = deviations_of(information(sensitivity, np.where(objective.missing, np.inf, noise), precision))
+        at_best = deviations_of(information(sensitivity, noise, precision))
         result.theta[some] = np.where(lost, np.nan, np.exp(local.x))
         result.std[some] = np.where(lost, np.nan, std) * result.theta[some]
         unknown = lost | np.isnan(objective.log_measured)
@@ -261,13 +256,9 @@ class Posterior:
         gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
         noise = np.tile(self.noise, (len(inputs), 1))
         noise[:, : self.n_modes] = np.maximum(self.noise[: self.n_modes], np.where(gaps, EXACT_WITH_GAPS, EXACT))
-        return Objective(self._linearise, np.log(frequencies), noise, self.prior.precision, units)
-
-    @property
-    def _linearise(self) -> Linearise:
-        if self.is_program and self.surface is not None:
-            return self.surface.linearise
-        return self._by(self.simulator.approximate)
+        by_surface = self.surface.linearise if self.is_program and self.surface is not None else None
+        linearise = by_surface or self._by(self.simulator.approximate)
+        return Objective(linearise, np.log(frequencies), noise, self.prior.precision, units)
 
     def _by(self, simulator: Simulator) -> Linearise:
         """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
@@ -311,9 +302,10 @@ class Posterior:
         rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), N_TEACHING)
         if not len(rows):
             return self
-        nominal = self._by(self.simulator)(np.ones((1, len(self.prior.own))))
+        at_nominal = self._by(self.simulator)(np.ones((1, len(self.prior.own))))
+        nominal = [*map(partial(np.repeat, repeats=len(rows), axis=0), at_nominal)]
         now, x = self, np.zeros((len(rows), len(self.prior.own)))
-        objective = replace(self.objective(inputs[rows]), linearise=partial(_repeated, nominal))
+        objective = replace(self.objective(inputs[rows]), linearise=lambda _: nominal)
         least = self.noise.copy()
         least[: self.n_modes] = least_noise(np.log(inputs[:, : self.n_modes]))
         runs: list[tuple[Array, Array]] = []
@@ -348,11 +340,6 @@ class Posterior:
         runs.append((points, evaluate(self.simulator.model, np.exp(points), n_jobs=self.n_jobs)))
         surface = ResponseSurface.of(*(np.concatenate(part) for part in zip(*runs, strict=True)))
         return replace(self, surface=surface, n_runs=self.n_runs + number + (2 * n_parameters + 1) * (len(runs) == 1))
-
-
-def _repeated(solved: tuple[Array, ...], theta: Array) -> tuple[Array, ...]:
-    """The same solution for each row of theta."""
-    return tuple(np.repeat(one, len(theta), axis=0) for one in solved)
 
 
 class PosteriorInverse(FrequencyInverse, Estimator):
@@ -632,15 +619,16 @@ class PosteriorInverse(FrequencyInverse, Estimator):
     def _first(self, mode_names: Any) -> Posterior:
         """What is known before the records: what is stated, and first values of the rest."""
         model, shapes = self.model, self.shape_inputs_
-        prior = ThermalPrior.first(model.parameter_names)
+        names = tuple(model.parameter_names)
+        prior = ThermalPrior(names, FIRST_DEVIATION, np.full(len(names), FIRST_DEVIATION))
         if not isinstance(self.prior, str):
-            prior = ThermalPrior(prior.names, 0.0, check_prior(self.prior, prior.names))
+            prior = ThermalPrior(names, 0.0, check_prior(self.prior, names))
         stated = np.full(model.n_modes, FIRST_NOISE)
         if not isinstance(self.noise, str):
             stated = np.maximum(check_noise(self.noise, model.n_modes, mode_names), EXACT)
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
-        needed = ("linearised", "jacobian") if shapes is None else ("linearised_modes",)
-        is_program = not any(hasattr(model, name) for name in needed)
+        has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
+        is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
         return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program, 0, self.n_jobs)
 
     def _read(self, X: ArrayLike) -> Array:

@@ -168,13 +168,6 @@ class Objective:
         """The objective of frequencies alone."""
         return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], units=self.units[:, :, :0])
 
-    def with_modes(self, order: NDArray) -> Objective:
-        """The objective with the measured modes in another order."""
-        n_modes, n_observations = self.log_measured.shape[1], self.noise.shape[1]
-        later = np.arange(n_modes, n_observations).reshape(n_modes, -1)[order]
-        noise = self.noise[:, np.append(order, later)]
-        return replace(self, log_measured=self.log_measured[:, order], noise=noise, units=self.units[:, order])
-
 
 class Rows:
     """Arrays of the same rows, and further objects of the same rows."""
@@ -346,17 +339,18 @@ def gap(objective: Objective, found: Local, lower: int) -> Array:
 
 def across(objective: Objective, found: Local, lower: int) -> Array:
     """One Gauss-Newton step that aims at the measured modes ``lower`` and ``lower + 1`` in exchanged order."""
+    frequencies = objective.without_shapes()
     n_modes = objective.log_measured.shape[1]
     order = np.arange(n_modes)
     order[[lower, lower + 1]] = order[[lower + 1, lower]]
     fitted = np.exp(objective.log_measured - found.residual[:, :n_modes]), found.sensitivity[:, :n_modes]
-    here = replace(objective.without_shapes().with_modes(order), linearise=lambda theta: fitted).at(found.x)
+    measured, noise = frequencies.log_measured[:, order], frequencies.noise[:, order]
+    here = replace(frequencies, linearise=lambda _: fitted, log_measured=measured, noise=noise).at(found.x)
     return here.x + here.step(np.zeros(len(here.x)))
 
 
 def exchanged(before: Local, after: Local, lower: int) -> NDArray[np.bool_]:
     """Whether the modes ``lower`` and ``lower + 1`` have each other's derivatives afterwards, as beyond a crossing."""
     pair = slice(lower, lower + 2)
-    mine, others = before.sensitivity[:, pair], before.sensitivity[:, pair][:, ::-1]
-    same, other = (((after.sensitivity[:, pair] - one) ** 2).sum(axis=(1, 2)) for one in (mine, others))
-    return other < same
+    mine, now = before.sensitivity[:, pair], after.sensitivity[:, pair]
+    return ((now - mine[:, ::-1]) ** 2).sum(axis=(1, 2)) < ((now - mine) ** 2).sum(axis=(1, 2))
