@@ -244,6 +244,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self._scattered)", "self._scattered"),
         ("spread beyond the range", " * (1 + beyond)[:, np.newaxis]", ""),
         ("noise of similar weather", "DRAWN_FROM = 25", "DRAWN_FROM = 400"),
+        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
@@ -258,7 +259,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("residuals/weather.py", "surrogate/test_uncertainty.py"): [
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
-        ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
     ("_tables/frames.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
@@ -305,7 +305,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "counts.sum() - np.outer(step, step)\n    return np.concatenate([[mean], (updated",
         ),
         ("end of the iteration", "TOLERANCE = 1e-9", "TOLERANCE = 1e-2"),
-        ("whitened gaps", "return np.where(present, white, np.nan)", "return white"),
+        ("whitened gaps", "return np.where(np.isnan(centred), np.nan, white)", "return white"),
     ],
     ("residuals/gaussian.py", "detection/test_whitening.py"): [
         ("covariance of each row", "which * len(masks) + pattern", "which[0] * len(masks) + pattern"),
@@ -344,12 +344,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weight of all records", "filled + pseudo * prior.ravel()) / (counts + pseudo)", "filled) / counts"),
     ],
     ("residuals/spread.py", "detection/test_whitening.py"): [
-        ("spread beyond the baseline", "ERROR_PER_RANGE = 0.5", "ERROR_PER_RANGE = 0.0"),
-        ("unknown weather", "len(self.covariances) - 1)", "0)"),
+        ("spread beyond the baseline", "** 2) @ self.growth", "** 2) @ (0 * self.growth)"),
+        ("unknown weather", "unknown[rows] * (no_smaller", "0 * unknown[rows] * (no_smaller"),
     ],
     ("detection/_windowed_alarm.py", "detection/test_windowed_alarm.py"): [
         ("correlation in a window", "sums**2 - squares", "sums**2"),
-        ("variance of a mean", "self.correlation * counts**2", "self.correlation * counts"),
+        ("variance of a mean", "np.sqrt(self.correlation + (1", "np.sqrt((1"),
         ("records of a partial window", "self.m * count / self.n", "self.m"),
         ("records before a run of windows", "before = self.first[start]", "before = start"),
         ("edge of a window of time", 'side="right"', 'side="left"'),

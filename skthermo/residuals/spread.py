@@ -44,235 +44,6 @@ FAMILIAR = 0.98  # share of the baseline records that are as close to others in 
 
 
 @dataclass(frozen=True)
-class Extrapolation:
-    """Variance of predictions outside the weather that they learned from, in shares of that of the residuals.
-
-    Where a column is e ranges below the lowest value of the baseline, or above the highest, the share is ``growth *
-    log(1 + e^2)``: the column that is farthest outside counts, and each end has a growth of its own.
-    """
-
-    trained: TrainingRange
-    growth: Array
-
-    @classmethod
-    def of(cls, weather: Array, overall: Gaussian, residuals_of: Callable[[NDArray[np.bool_]], Array]) -> Extrapolation:
-        """Learned from the coldest and from the warmest fifth of some records, each predicted from the other records.
-
-        ``residuals_of`` gives the residuals of the records of a mask, predicted from all others; the growth at an end
-        is the ratio of what these exceed ``overall`` by to what a growth of 1 would give.
-        """
-        everywhere = TrainingRange.of(weather, slice(None))
-        width = np.where(everywhere.highest > everywhere.lowest, everywhere.highest - everywhere.lowest, 1.0)
-        warmth, growth = np.mean((weather - everywhere.lowest) / width, axis=1), np.full(2, USUAL)
-        for end, along in enumerate((-warmth, warmth)):
-            apart = along > np.nanquantile(along, 1 - SHARE)
-            if not apart.any():
-                continue
-            distance = _outside(TrainingRange.of(weather, ~apart), weather[apart])[:, end]
-            residuals = residuals_of(apart)
-            counts = (~np.isnan(residuals)).sum(axis=1)
-            excess = np.nansum(overall.whiten(residuals) ** 2, axis=1) - counts
-            expected = distance @ (counts * np.log1p(distance**2))
-            growth[end] = max((distance @ excess + PRIOR * USUAL) / (expected + PRIOR), 0.0)
-        return cls(everywhere, growth)
-
-    def shares(self, weather: Array) -> Array:
-        """Variance of the predictions in the weather of each row over that of the residuals; NaN counts as inside."""
-        return np.log1p(_outside(self.trained, weather) ** 2) @ self.growth
-
-
-def _outside(trained: TrainingRange, weather: Array) -> Array:
-    """How far each row is below and above a range, by its farthest column, in units of that of the column."""
-    excess = np.nan_to_num(trained.excess(weather))
-    below, above = np.where(weather < trained.lowest, excess, 0.0), np.where(weather > trained.highest, excess, 0.0)
-    return np.column_stack([below.max(axis=1), above.max(axis=1)])
-
-
-class Smoothing(NamedTuple):
-    """Over how many records of similar weather a covariance is taken, and as how many that of all records counts."""
-
-    n_neighbors: int
-    n_pseudo: int
-
-
-# The more records, the more the covariance of all may count.
-PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
-CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
-
-
-@dataclass(frozen=True)
-class Neighbours:
-    """Records nearest to some places in weather, and which of them count."""
-
-    rows: NDArray[np.intp]
-    counted: Mask
-    distances: Array
-
-    @property
-    def mean_distances(self) -> Array:
-        """Mean distance from each place of the records that count."""
-        return np.where(self.counted, self.distances, 0.0).sum(axis=1) / np.maximum(self.counted.sum(axis=1), 1)
-
-    def weights(self, n_records: int) -> scipy.sparse.csr_array:
-        """A row for each place: 1 at the records that count, else 0."""
-        rows, ends = self.rows[self.counted], np.append(0, self.counted.sum(axis=1).cumsum())
-        return scipy.sparse.csr_array((np.ones(len(rows)), rows, ends), (len(self.rows), n_records))
-
-
-@dataclass(frozen=True)
-class History:
-    """Residuals of records at positions in time and places in weather, and the distribution of all residuals.
-
-    Records fewer than ``near`` positions apart do not tell each other's covariance.
-    """
-
-    order: NDArray[np.intp]
-    places: Array
-    residuals: Array
-    overall: Gaussian
-    near: int = NEAR_IN_TIME
-
-    def neighbours(self, size: int, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Neighbours:
-        """The records nearest to each place, by default that of each record, without those near ``order`` in time."""
-        number = size if order is None else size + self.most_near
-        of_own = (part[:, :number] for part in self._nearest)
-        distances, near = of_own if places is None else nearest(self.places, places, number)
-        if order is None:
-            return Neighbours(near, np.ones(near.shape, dtype=bool), distances)
-        far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
-        return Neighbours(near, far & (far.cumsum(axis=1) <= size), distances)
-
-    @cached_property
-    def _nearest(self) -> tuple[Array, NDArray[np.intp]]:
-        """Distances and positions of the records nearest to each record, as many as any candidate asks for."""
-        most = max(one.n_neighbors for one in self._candidates)
-        return nearest(self.places, self.places, most + self.most_near)
-
-    @property
-    def _candidates(self) -> list[Smoothing]:
-        return [one for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
-
-    @cached_property
-    def most_near(self) -> int:
-        """The most records that may be near one in time."""
-        return int((np.searchsorted(self.order, self.order + 2 * self.near - 1) - np.arange(len(self.order))).max())
-
-    def likeliest(self) -> LocalCovariance | None:
-        """The covariance by weather, or none, under which records are likeliest given the others."""
-        candidates = [LocalCovariance(self, one) for one in self._candidates]
-        plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
-        likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
-        return [None, *candidates][int(np.argmax(likelihoods))]
-
-
-def rows_near_in_time(X: Any) -> int:
-    """Number of records in a day, if they have stamps and are more than hourly."""
-    if not has_stamps(X) or len(X) < 2:
-        return NEAR_IN_TIME
-    step = np.median(np.diff(np.sort(row_times(X))))
-    return int(np.clip(DAY_NS / max(step, 1.0), NEAR_IN_TIME, max(NEAR_IN_TIME, len(X) // 20)))
-
-
-@dataclass(frozen=True)
-class LocalCovariance:
-    """Covariance at places in weather, as the records of the most similar weather show it.
-
-    Standard deviations come from the modes that records have, correlations from records completed by the correlation
-    in all weather.
-    """
-
-    history: History
-    smoothing: Smoothing
-
-    def __call__(self, neighbours: Neighbours) -> Array:
-        """Covariances that the neighbours of each place show."""
-        rows, standard = self._standard
-        correlation = self._mean(standard.second_moments(rows), standard.covariance, neighbours)
-        scale = np.sqrt(self._variances(neighbours) / np.einsum("ijj->ij", correlation))
-        return scale[:, :, np.newaxis] * correlation * scale[:, np.newaxis, :]
-
-    def at(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
-        """Covariances at places, by default those of the records, without the records near ``order`` in time."""
-        return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
-
-    def distances(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
-        """Mean distances of places from the records that covariances `at` them are taken from."""
-        return self.history.neighbours(self.smoothing.n_neighbors, places, order).mean_distances
-
-    @property
-    def numbers_per_record(self) -> int:
-        """How many numbers `at` holds in memory for each place."""
-        return self.smoothing.n_neighbors + self.history.most_near + self.history.overall.covariance.size
-
-    def likelihood(self) -> float:
-        """Log-likelihood of the records, each given the others."""
-        return whitened(self.history.residuals, self.history.overall, self(self._own))[1]
-
-    @cached_property
-    def _own(self) -> Neighbours:
-        return self.history.neighbours(self.smoothing.n_neighbors, order=self.history.order)
-
-    @cached_property
-    def _standard(self) -> tuple[Array, Gaussian]:
-        """Records over the standard deviations in their own weather, and their distribution."""
-        rows = (self.history.residuals - self.history.overall.mean) / np.sqrt(self._variances(self._own))
-        return rows, Gaussian.of(rows)
-
-    def _variances(self, neighbours: Neighbours) -> Array:
-        overall = self.history.overall
-        return self._mean((self.history.residuals - overall.mean) ** 2, np.diag(overall.covariance), neighbours)
-
-    def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
-        """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
-        known, filled = ~np.isnan(values).reshape(len(values), -1), np.nan_to_num(values).reshape(len(values), -1)
-        weights, pseudo = neighbours.weights(len(values)), self.smoothing.n_pseudo
-        counts = weights @ (np.ones((len(values), 1)) if known.all() else known.astype(float))
-        means = (weights @ filled + pseudo * prior.ravel()) / (counts + pseudo)
-        return means.reshape(-1, *prior.shape)
-
-
-def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:
-    """Residuals in standard deviations and uncorrelated, by a covariance each, and their log-likelihood."""
-    present = ~np.isnan(residuals)
-    roots, log_determinants = whitenings(covariances, present)
-    white = np.einsum("ij,ijk->ik", np.nan_to_num(residuals - overall.mean), roots)
-    return np.where(present, white, np.nan), -0.5 * float((white**2).sum() + log_determinants.sum())
-
-
-@dataclass(frozen=True)
-class WeatherCovariance:
-    """Covariances at the places of the baseline's weather, each of which is taken for the weather around it.
-
-    Records that are farther from the places than ``familiar``, or outside the ``trained`` range, get a covariance that
-    is, to the extent that they are, no smaller than that of all weather: wholly at twice the distance, or far outside.
-    Without ``trained``, none does.
-    """
-
-    coordinates: Pipeline
-    nearest: NearestPlaces
-    covariances: Array
-    smoothing: Smoothing
-    familiar: float
-    trained: TrainingRange | None = None
-
-    def at(self, weather: Array, overall: Array) -> Array:
-        """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
-        distances, near = self.nearest.of(self.coordinates.transform(weather))
-        return self.floored(self.covariances[near[:, 0]], weather, distances, overall)
-
-    def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
-        """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""
-        if self.trained is None:
-            return covariances
-        outside = self.trained.excess(weather).max(axis=1) / FAR_OUTSIDE
-        unknown = np.clip(np.maximum(distances / self.familiar - 1, outside), 0, 1)[:, np.newaxis, np.newaxis]
-        rows = np.flatnonzero(unknown)
-        floored = covariances.copy()
-        floored[rows] += unknown[rows] * (no_smaller(covariances[rows], overall) - covariances[rows])
-        return floored
-
-
-@dataclass(frozen=True)
 class Spread:
     """Mean of residuals and their covariance, by weather where it is known, and wider beyond that of the baseline."""
 
@@ -417,3 +188,232 @@ class Spread:
 def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:
     """Distribution of what residuals are without the errors of predictions that are known of each row."""
     return Gaussian.of(residuals, errors.of_all(*residuals.shape) if len(errors.rows) else None)
+
+
+@dataclass(frozen=True)
+class WeatherCovariance:
+    """Covariances at the places of the baseline's weather, each of which is taken for the weather around it.
+
+    Records that are farther from the places than ``familiar``, or outside the ``trained`` range, get a covariance that
+    is, to the extent that they are, no smaller than that of all weather: wholly at twice the distance, or far outside.
+    Without ``trained``, none does.
+    """
+
+    coordinates: Pipeline
+    nearest: NearestPlaces
+    covariances: Array
+    smoothing: Smoothing
+    familiar: float
+    trained: TrainingRange | None = None
+
+    def at(self, weather: Array, overall: Array) -> Array:
+        """Covariances in the weather of rows, (n_rows, n_modes, n_modes)."""
+        distances, near = self.nearest.of(self.coordinates.transform(weather))
+        return self.floored(self.covariances[near[:, 0]], weather, distances, overall)
+
+    def floored(self, covariances: Array, weather: Array, distances: Array, overall: Array) -> Array:
+        """Covariances of rows at mean distances from the places nearest to them, no smaller in unknown weather."""
+        if self.trained is None:
+            return covariances
+        outside = self.trained.excess(weather).max(axis=1) / FAR_OUTSIDE
+        unknown = np.clip(np.maximum(distances / self.familiar - 1, outside), 0, 1)[:, np.newaxis, np.newaxis]
+        rows = np.flatnonzero(unknown)
+        floored = covariances.copy()
+        floored[rows] += unknown[rows] * (no_smaller(covariances[rows], overall) - covariances[rows])
+        return floored
+
+
+@dataclass(frozen=True)
+class History:
+    """Residuals of records at positions in time and places in weather, and the distribution of all residuals.
+
+    Records fewer than ``near`` positions apart do not tell each other's covariance.
+    """
+
+    order: NDArray[np.intp]
+    places: Array
+    residuals: Array
+    overall: Gaussian
+    near: int = NEAR_IN_TIME
+
+    def neighbours(self, size: int, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Neighbours:
+        """The records nearest to each place, by default that of each record, without those near ``order`` in time."""
+        number = size if order is None else size + self.most_near
+        of_own = (part[:, :number] for part in self._nearest)
+        distances, near = of_own if places is None else nearest(self.places, places, number)
+        if order is None:
+            return Neighbours(near, np.ones(near.shape, dtype=bool), distances)
+        far = np.abs(self.order[near] - order[:, np.newaxis]) >= self.near
+        return Neighbours(near, far & (far.cumsum(axis=1) <= size), distances)
+
+    @cached_property
+    def _nearest(self) -> tuple[Array, NDArray[np.intp]]:
+        """Distances and positions of the records nearest to each record, as many as any candidate asks for."""
+        most = max(one.n_neighbors for one in self._candidates)
+        return nearest(self.places, self.places, most + self.most_near)
+
+    @property
+    def _candidates(self) -> list[Smoothing]:
+        return [one for one in CANDIDATES if one.n_neighbors <= len(self.order) // 2]
+
+    @cached_property
+    def most_near(self) -> int:
+        """The most records that may be near one in time."""
+        return int((np.searchsorted(self.order, self.order + 2 * self.near - 1) - np.arange(len(self.order))).max())
+
+    def likeliest(self) -> LocalCovariance | None:
+        """The covariance by weather, or none, under which records are likeliest given the others."""
+        candidates = [LocalCovariance(self, one) for one in self._candidates]
+        plain = whitened(self.residuals, self.overall, self.overall.covariance[np.newaxis])[1]
+        likelihoods = [plain, *(candidate.likelihood() for candidate in candidates)]
+        return [None, *candidates][int(np.argmax(likelihoods))]
+
+
+def rows_near_in_time(X: Any) -> int:
+    """Number of records in a day, if they have stamps and are more than hourly."""
+    if not has_stamps(X) or len(X) < 2:
+        return NEAR_IN_TIME
+    step = np.median(np.diff(np.sort(row_times(X))))
+    return int(np.clip(DAY_NS / max(step, 1.0), NEAR_IN_TIME, max(NEAR_IN_TIME, len(X) // 20)))
+
+
+@dataclass(frozen=True)
+class LocalCovariance:
+    """Covariance at places in weather, as the records of the most similar weather show it.
+
+    Standard deviations come from the modes that records have, correlations from records completed by the correlation
+    in all weather.
+    """
+
+    history: History
+    smoothing: Smoothing
+
+    def __call__(self, neighbours: Neighbours) -> Array:
+        """Covariances that the neighbours of each place show."""
+        rows, standard = self._standard
+        correlation = self._mean(standard.second_moments(rows), standard.covariance, neighbours)
+        scale = np.sqrt(self._variances(neighbours) / np.einsum("ijj->ij", correlation))
+        return scale[:, :, np.newaxis] * correlation * scale[:, np.newaxis, :]
+
+    def at(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
+        """Covariances at places, by default those of the records, without the records near ``order`` in time."""
+        return self(self.history.neighbours(self.smoothing.n_neighbors, places, order))
+
+    def distances(self, places: Array | None = None, order: NDArray[np.intp] | None = None) -> Array:
+        """Mean distances of places from the records that covariances `at` them are taken from."""
+        return self.history.neighbours(self.smoothing.n_neighbors, places, order).mean_distances
+
+    @property
+    def numbers_per_record(self) -> int:
+        """How many numbers `at` holds in memory for each place."""
+        return self.smoothing.n_neighbors + self.history.most_near + self.history.overall.covariance.size
+
+    def likelihood(self) -> float:
+        """Log-likelihood of the records, each given the others."""
+        return whitened(self.history.residuals, self.history.overall, self(self._own))[1]
+
+    @cached_property
+    def _own(self) -> Neighbours:
+        return self.history.neighbours(self.smoothing.n_neighbors, order=self.history.order)
+
+    @cached_property
+    def _standard(self) -> tuple[Array, Gaussian]:
+        """Records over the standard deviations in their own weather, and their distribution."""
+        rows = (self.history.residuals - self.history.overall.mean) / np.sqrt(self._variances(self._own))
+        return rows, Gaussian.of(rows)
+
+    def _variances(self, neighbours: Neighbours) -> Array:
+        overall = self.history.overall
+        return self._mean((self.history.residuals - overall.mean) ** 2, np.diag(overall.covariance), neighbours)
+
+    def _mean(self, values: Array, prior: Array, neighbours: Neighbours) -> Array:
+        """Mean of the neighbours' values, NaN left out, and of pseudo-rows that have the prior's."""
+        known, filled = ~np.isnan(values).reshape(len(values), -1), np.nan_to_num(values).reshape(len(values), -1)
+        weights, pseudo = neighbours.weights(len(values)), self.smoothing.n_pseudo
+        counts = weights @ (np.ones((len(values), 1)) if known.all() else known.astype(float))
+        means = (weights @ filled + pseudo * prior.ravel()) / (counts + pseudo)
+        return means.reshape(-1, *prior.shape)
+
+
+def whitened(residuals: Array, overall: Gaussian, covariances: Array) -> tuple[Array, float]:
+    """Residuals in standard deviations and uncorrelated, by a covariance each, and their log-likelihood."""
+    present = ~np.isnan(residuals)
+    roots, log_determinants = whitenings(covariances, present)
+    white = np.einsum("ij,ijk->ik", np.nan_to_num(residuals - overall.mean), roots)
+    return np.where(present, white, np.nan), -0.5 * float((white**2).sum() + log_determinants.sum())
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Records nearest to some places in weather, and which of them count."""
+
+    rows: NDArray[np.intp]
+    counted: Mask
+    distances: Array
+
+    @property
+    def mean_distances(self) -> Array:
+        """Mean distance from each place of the records that count."""
+        return np.where(self.counted, self.distances, 0.0).sum(axis=1) / np.maximum(self.counted.sum(axis=1), 1)
+
+    def weights(self, n_records: int) -> scipy.sparse.csr_array:
+        """A row for each place: 1 at the records that count, else 0."""
+        rows, ends = self.rows[self.counted], np.append(0, self.counted.sum(axis=1).cumsum())
+        return scipy.sparse.csr_array((np.ones(len(rows)), rows, ends), (len(self.rows), n_records))
+
+
+class Smoothing(NamedTuple):
+    """Over how many records of similar weather a covariance is taken, and as how many that of all records counts."""
+
+    n_neighbors: int
+    n_pseudo: int
+
+
+# The more records, the more the covariance of all may count.
+PAIRS = ((50, 5), (50, 15), (100, 5), (100, 15), (200, 15), (200, 50), (400, 50))
+CANDIDATES = tuple(Smoothing(*pair) for pair in PAIRS)
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """Variance of predictions outside the weather that they learned from, in shares of that of the residuals.
+
+    Where a column is e ranges below the lowest value of the baseline, or above the highest, the share is ``growth *
+    log(1 + e^2)``: the column that is farthest outside counts, and each end has a growth of its own.
+    """
+
+    trained: TrainingRange
+    growth: Array
+
+    @classmethod
+    def of(cls, weather: Array, overall: Gaussian, residuals_of: Callable[[NDArray[np.bool_]], Array]) -> Extrapolation:
+        """Learned from the coldest and from the warmest fifth of some records, each predicted from the other records.
+
+        ``residuals_of`` gives the residuals of the records of a mask, predicted from all others; the growth at an end
+        is the ratio of what these exceed ``overall`` by to what a growth of 1 would give.
+        """
+        everywhere = TrainingRange.of(weather, slice(None))
+        width = np.where(everywhere.highest > everywhere.lowest, everywhere.highest - everywhere.lowest, 1.0)
+        warmth, growth = np.mean((weather - everywhere.lowest) / width, axis=1), np.full(2, USUAL)
+        for end, along in enumerate((-warmth, warmth)):
+            apart = along > np.nanquantile(along, 1 - SHARE)
+            if not apart.any():
+                continue
+            distance = _outside(TrainingRange.of(weather, ~apart), weather[apart])[:, end]
+            residuals = residuals_of(apart)
+            counts = (~np.isnan(residuals)).sum(axis=1)
+            excess = np.nansum(overall.whiten(residuals) ** 2, axis=1) - counts
+            expected = distance @ (counts * np.log1p(distance**2))
+            growth[end] = max((distance @ excess + PRIOR * USUAL) / (expected + PRIOR), 0.0)
+        return cls(everywhere, growth)
+
+    def shares(self, weather: Array) -> Array:
+        """Variance of the predictions in the weather of each row over that of the residuals; NaN counts as inside."""
+        return np.log1p(_outside(self.trained, weather) ** 2) @ self.growth
+
+
+def _outside(trained: TrainingRange, weather: Array) -> Array:
+    """How far each row is below and above a range, by its farthest column, in units of that of the column."""
+    excess = np.nan_to_num(trained.excess(weather))
+    below, above = np.where(weather < trained.lowest, excess, 0.0), np.where(weather > trained.highest, excess, 0.0)
+    return np.column_stack([below.max(axis=1), above.max(axis=1)])

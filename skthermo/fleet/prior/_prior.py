@@ -281,36 +281,6 @@ class FleetPrior(Estimator):
         return "\n".join(lines)
 
 
-def groups(n_bridges: int) -> list[list[int]]:
-    """Bridges that are left out together."""
-    n_groups = min(n_bridges, MOST_LEFT_OUT)
-    return [list(range(i, n_bridges, n_groups)) for i in range(n_groups)]
-
-
-def left_out(
-    members: Sequence[Member],
-    names: Sequence[Hashable],
-    follows: Mapping[tuple[int, Hashable], float],
-    families: Mapping[Hashable, CoefficientFamily],
-    probabilities: Mapping[Hashable, float],
-) -> list[Mixture]:
-    """Every bridge's posterior by families that are learned without it."""
-    found: dict[int, Mixture] = {}
-    moments, n_steps = expect(members, families), FEW // len(members)
-    for group in groups(len(members)):
-        kept = [i for i in range(len(members)) if i not in group]
-        others = {(place, name): follows.get((i, name), 1.0) for place, i in enumerate(kept) for name in names}
-        rest = [members[i] for i in kept]
-        known = [name for name in names if sum(name in member.families for member in rest) > 0]
-        without = learn_families(rest, known, others, [moments[i] for i in kept], n_steps)
-        for i in group:
-            member = members[i]
-            prior = member.prior(without, predictive=True)
-            chances = {name: p for name, p in probabilities.items() if name in without}
-            found[i] = mixture(member.information.J, member.information.h, member.families, prior, member.own, chances)
-    return [found[i] for i in range(len(members))]
-
-
 def compare_pooling(
     members: Sequence[Member], bridges: Sequence[Hashable], names: Sequence[Hashable], covariance: Array
 ) -> tuple[dict[Hashable, CoefficientFamily], dict[Hashable, float], pd.DataFrame, pd.DataFrame, dict[Hashable, Array]]:
@@ -364,6 +334,36 @@ def seem_to_follow(
         for (i, _), is_far in zip(of_family, far, strict=True):
             follows[i, name] = min(follows.get((i, name), 1.0), 0.0 if is_far else 1.0)
     return follows
+
+
+def left_out(
+    members: Sequence[Member],
+    names: Sequence[Hashable],
+    follows: Mapping[tuple[int, Hashable], float],
+    families: Mapping[Hashable, CoefficientFamily],
+    probabilities: Mapping[Hashable, float],
+) -> list[Mixture]:
+    """Every bridge's posterior by families that are learned without it."""
+    found: dict[int, Mixture] = {}
+    moments, n_steps = expect(members, families), FEW // len(members)
+    for group in groups(len(members)):
+        kept = [i for i in range(len(members)) if i not in group]
+        others = {(place, name): follows.get((i, name), 1.0) for place, i in enumerate(kept) for name in names}
+        rest = [members[i] for i in kept]
+        known = [name for name in names if sum(name in member.families for member in rest) > 0]
+        without = learn_families(rest, known, others, [moments[i] for i in kept], n_steps)
+        for i in group:
+            member = members[i]
+            prior = member.prior(without, predictive=True)
+            chances = {name: p for name, p in probabilities.items() if name in without}
+            found[i] = mixture(member.information.J, member.information.h, member.families, prior, member.own, chances)
+    return [found[i] for i in range(len(members))]
+
+
+def groups(n_bridges: int) -> list[list[int]]:
+    """Bridges that are left out together."""
+    n_groups = min(n_bridges, MOST_LEFT_OUT)
+    return [list(range(i, n_bridges, n_groups)) for i in range(n_groups)]
 
 
 def by_bridge(
