@@ -12,13 +12,13 @@ import pytest
 
 from skthermo.commands._looking import look_at
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
+from skthermo.commands._proposal import SINGLE, Candidate, Proposal
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, run, write_day
 from tests.monitoring.nightly import FIRST as TWO_YEARS
 
 FAILED = 3
-pytestmark = pytest.mark.usefixtures("one_detector")
 N, FIRST = 80, 60  # records of a file, and of the baseline where later ones are new
 RANDOM = np.random.default_rng(0)
 RECORDS = pd.DataFrame(
@@ -335,6 +335,12 @@ LATER = {
     "a status": (lambda: log(STATE), "status"),
 }  # fmt: skip
 """Logs that come after a plain one: the place that is named, or None for those that are read."""
+
+
+@pytest.fixture(autouse=True)
+def _one_detector(monkeypatch):
+    """``init`` need not choose a detector where files are only read."""
+    monkeypatch.setattr(Proposal, "detectors", [Candidate(*SINGLE, "", 1.0)])
 
 
 def write(one, folder):
