@@ -18,7 +18,6 @@ from tests.commands.folders import edit, run, write_day
 from tests.monitoring.nightly import FIRST as TWO_YEARS
 
 FAILED = 3
-pytestmark = pytest.mark.usefixtures("one_detector")
 N, FIRST = 80, 60  # records of a file, and of the baseline where later ones are new
 RANDOM = np.random.default_rng(0)
 RECORDS = pd.DataFrame(
@@ -335,6 +334,12 @@ LATER = {
     "a status": (lambda: log(STATE), "status"),
 }  # fmt: skip
 """Logs that come after a plain one: the place that is named, or None for those that are read."""
+
+
+@pytest.fixture(autouse=True)
+def _one_detector(monkeypatch):
+    """``init`` need not choose a detector where files are only read."""
+    monkeypatch.setattr(Proposal, "detectors", [Candidate(*SINGLE, "", 1.0)])
 
 
 def write(one, folder):

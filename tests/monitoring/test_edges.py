@@ -48,7 +48,7 @@ TESTS = {
     "model": partial(DirectionalDetector, make_truss()),
 }
 ALARMS = by_day(
-    [(None, "any direction"), ("2D", "softening"), (None, "model")],
+    [("2D", "any direction"), (None, "softening"), (None, "model")],
     at_night=[(window, test) for window in (None, "2D") for test in TESTS],
 )
 
