@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
+from skthermo.commands._proposal import SINGLE, Candidate, Proposal
 from skthermo.commands._record_files import look_at
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
