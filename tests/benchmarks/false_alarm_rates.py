@@ -15,7 +15,8 @@ standard deviations in .1 and .5 % of the values, and twice as much noise in win
 ``HampelFilter()`` on what a linear regression leaves of them.
 
 ``persistence`` 3 is the default of ``Monitor``, 1 means alarms of single records; both by the same fitted detector.
-``watches`` are events a year of the lower level, of which 12 were asked for (``watch_per_year``). The exit
+``watches`` are events a year of the lower level, of which 12 were asked for (``watch_per_year``). ``plain`` is
+the strongest simple competitor: a regression, and the distance that its own year exceeds once. The exit
 code is 1 if a mean over the structures is not .5 to 1.5 events a year with a raw baseline and persistence 3.
 """
 
@@ -27,7 +28,10 @@ import numpy as np
 import pandas as pd
 from harness import arguments, compensated, shown
 from scipy.signal import lfilter
+from sklearn.covariance import EmpiricalCovariance
 from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_fleet, make_truss_campaign
 from skthermo.detection import DirectionalDetector
@@ -40,6 +44,7 @@ LAWS = ("iid", "ar .5", "ar .9", "t3", "outliers .1 %", "outliers .5 %", "winter
 YEARS, YEAR, N_DAYS, STARTS = 3, 365, 180, (20, 200)
 SEVERITIES, PERSISTENCE = (0.05, 0.10, 0.20), (1, 3)
 LEAST, MOST = 0.5, 1.5
+APART = 5  # days between alarms of two events
 WATCHES = 12.0  # events a year of the lower level
 STAMPS = pd.date_range("2021-01-01", periods=(1 + YEARS) * YEAR)
 
@@ -108,14 +113,20 @@ def rows_of(name, law, is_cleaned, seed):
     baseline = F[0.0][:YEAR]
     baseline = T[:YEAR].join(cleaned(T[:YEAR], baseline) if is_cleaned else baseline)
     monitor = Monitor(compensated(modes, DirectionalDetector()), sensors=False).fit(baseline)
+    plain = of_plain_regression(T.to_numpy(), F[0.0].to_numpy())
     index = {s: series(monitor, T[YEAR:].join(one[YEAR:])) for s, one in F.items()}
     for persistence in PERSISTENCE:
         rule = estimate_false_alarms(monitor.active_.baseline_index, persistence=persistence).rule
         events = find_events(index[0.0].to_numpy(), index[0.0].index, rule)
-        row = {"structure": name, "law": law, "cleaned": is_cleaned, "persistence": persistence}
+        row = {"structure": name, "law": law, "cleaned": is_cleaned, "persistence": persistence, "plain": plain}
         watch = estimate_false_alarms(monitor.active_.baseline_index, WATCHES, persistence=persistence).rule
         watches = find_events(index[0.0].to_numpy(), index[0.0].index, watch)
-        row |= {"events": len(events) / YEARS, "watches": len(watches) / YEARS, "threshold": rule.threshold}
+        row |= {
+            "events": len(events) / YEARS,
+            "watches": len(watches) / YEARS,
+            "plain": plain,
+            "threshold": rule.threshold,
+        }
         for severity in SEVERITIES:
             days = []
             for start in STARTS:
@@ -126,6 +137,14 @@ def rows_of(name, law, is_cleaned, seed):
                 days.append(max(wait, 1))
             row[f"days {severity:.0%}"] = days
         yield row
+
+
+def of_plain_regression(T, F):
+    """False alarms a year of a quadratic regression and the Mahalanobis distance that its own year exceeds once."""
+    residuals = F - make_pipeline(PolynomialFeatures(2), LinearRegression()).fit(T[:YEAR], F[:YEAR]).predict(T)
+    distance = EmpiricalCovariance().fit(residuals[:YEAR]).mahalanobis(residuals)
+    alarms = np.flatnonzero(distance[YEAR:] > np.quantile(distance[:YEAR], 1 - 1 / YEAR))
+    return (np.diff(alarms, prepend=-YEAR) > APART).sum() / YEARS
 
 
 def median(days):
@@ -155,6 +174,7 @@ def main():
         error=("events", "sem"),
         watches=("watches", "mean"),
         watches_error=("watches", "sem"),
+        plain=("plain", "mean"),
         threshold=("threshold", "mean"),
         **days,
     )
