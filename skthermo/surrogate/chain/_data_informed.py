@@ -376,7 +376,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
-        return frame_like(X, self.thermal_.parameters(self.weather(X)), self.parameter_names_)
+        weather = self.weather(X)
+        return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
 
     @overload
     def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
@@ -562,9 +563,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             If a factor is above 10, which may be meant in percent.
         """
         weather = self.weather(X)
-        frequencies = self.thermal_.simulated(
-            weather, damage=damage, parameters=parameters, stiffness=stiffness, mass=mass
-        )
+        changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        frequencies = self.thermal_.simulated(weather, **changes)
         frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
         return frame_like(X, frequencies, self.mode_names_)
 
