@@ -31,7 +31,7 @@ class DailyResiduals:
     def less_similar(self, values: Array) -> Array:
         """Values of the days, (n_days, n_columns), less what the regressors explain of each column."""
         rest, known = np.full(values.shape, np.nan), ~np.isnan(values)
-        for days in np.unique(known, axis=1).T:
+        for days in known[:, :1].T if known.all() else np.unique(known, axis=1).T:
             part = np.ix_(days, (known == days[:, np.newaxis]).all(axis=0))
             inputs = self.regressors[days]
             rest[part] = values[part] - inputs @ np.linalg.lstsq(inputs, values[part], rcond=1e-10)[0]
