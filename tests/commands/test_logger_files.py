@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
-from skthermo.commands._proposal import SINGLE, Candidate, Proposal
 from skthermo.commands._record_files import look_at
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
@@ -337,10 +336,7 @@ LATER = {
 """Logs that come after a plain one: the place that is named, or None for those that are read."""
 
 
-@pytest.fixture(autouse=True)
-def _one_detector(monkeypatch):
-    """``init`` need not choose a detector where files are only read."""
-    monkeypatch.setattr(Proposal, "detectors", [Candidate(*SINGLE, "", 1.0)])
+pytestmark = pytest.mark.usefixtures("one_detector")
 
 
 def write(one, folder):
