@@ -249,10 +249,14 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "periods of time",
-            'np.argsort(row_times(self.temperatures), kind="stable")\n        measured',
-            "np.arange(len(self.inputs))\n        measured",
+            'kind="stable")\n        order = order[known[order]]\n        inputs',
+            'kind="stable")\n        order = np.flatnonzero(known)\n        inputs',
         ),
-        ("periods of their own mapper", "train = train[usable[train]]", "train = np.flatnonzero(usable)"),
+        (
+            "periods of their own mapper",
+            "np.flatnonzero(usable & (fold_of != fold)), fold_of",
+            "np.flatnonzero(usable), fold_of",
+        ),
     ],
     ("residuals/folds.py", "surrogate/test_uncertainty.py"): [
         ("blocks as long as residuals remember", "CORRELATION_TIMES = 5 ", "CORRELATION_TIMES = 0 "),
@@ -361,7 +365,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("what the calling estimator has reported", "if kind in context.reported:", "if kind in ():"),
         (
             "a check that is shared",
-            "content = ALL if ALL in found else content_of(tables)",
+            "content = ALL if ALL in found else content_of(*tables)",
             "content = str(len(found))",
         ),
     ],
@@ -484,8 +488,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("plotting/_monitor.py", "plotting/test_monitor.py"): [
         (
             "days without records that nobody sees",
-            'pd.date_range(days.index[0], days.index[-1], freq="D")',
-            "days.index",
+            "days.reindex(midnights_between(days.index[0], days.index[-1]))",
+            "days",
         ),
     ],
     ("reporting/_choice.py", "reporting/test_choice.py"): [
