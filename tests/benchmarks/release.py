@@ -53,7 +53,7 @@ Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 SIZES = {"scaling_samples": "Processor", "scaling_dof": "Costs by degrees", "scaling_parameters": "Costs by parameters"}
 BOUNDS = {"bounds": "Full solves", "bounds_reduced": "Reduced solves"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
-BESIDE = "monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
+BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 PARTS = {
     "truss": benchmark("truss_tables.py", "--seeds 1", {"truss": "Means over seeds"}),
     "directions": benchmark("directions.py", **Z24),
@@ -77,6 +77,8 @@ PARTS = {
     "slow-memory": benchmark("slow_memory.py"),
     "service-records": benchmark("service_records.py --seeds 2", None, {"service_records": "Expected and true"}),
     "study-bands": benchmark("study_bands.py --replicates 10 --calibrated --first-seed 1"),
+    "smallest-losses": benchmark("directions.py --parts smallest"),
+    "false-alarms": benchmark("false_alarm_rates.py", "--quick --laws iid"),
     "quickstart": Part("python -m pytest -q -n0 tests/test_documentation.py -k quickstart -m nightly"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),

@@ -257,6 +257,25 @@ def monitor_update_later(clock, quick):
                 monitor.update(records[start : start + 24])
 
 
+def page_of_two_files(clock, quick):
+    """From two CSV files of an hourly year to a fitted monitor and its page, by three commands."""
+    n_rows = 1460 if quick else 8760
+    campaign = make_truss_campaign(samples_per_year=n_rows, samples_per_day=24, random_state=0)
+    stamps = pd.date_range("2025-01-01", periods=n_rows, freq="h", name="time")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, table in {"T.csv": campaign.temperatures, "F.csv": campaign.frequencies}.items():
+            table.set_axis(stamps).to_csv(Path(folder) / name)
+        settings = "river/monitor.toml"
+        for words in (
+            ["init", "T.csv", "F.csv", "--into", "river"],
+            ["fit", settings],
+            ["report", settings, "--out", "page.html"],
+        ):
+            with clock.work():
+                subprocess.run([sys.executable, "-m", "skthermo", *words], cwd=folder, check=True, capture_output=True)
+        assert (Path(folder) / "page.html").stat().st_size
+
+
 WORKS = {
     "frame-1000": partial(frame_samples, n_samples=1000),
     "frame-10000": partial(frame_samples, n_samples=10_000),
@@ -275,6 +294,7 @@ WORKS = {
     "study-footbridge-all": partial(footbridge_study, uncertainty="all"),
     "monitor-update": monitor_update,
     "monitor-later": monitor_update_later,
+    "two-files": page_of_two_files,
 }
 
 
