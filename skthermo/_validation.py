@@ -33,8 +33,8 @@ from sklearn.utils.metadata_routing import get_routing_for_object
 from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, has_fit_parameter
 
+from skthermo._estimators.jobs import bars_of, without_bars
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import bars_of, without_bars
 from skthermo._tables.arrays import (
     Array,
     as_columns,

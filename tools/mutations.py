@@ -375,7 +375,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_estimators/warnings.py", "surrogate/test_report.py"): [
         ("a warning for each fold", "if kind in given:", "if kind in given and not in_folds:"),
     ],
-    ("_estimators/threads.py", "test_threads.py"): [
+    ("_estimators/jobs.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
     ("residuals/baseline.py", "surrogate/test_scatter.py"): [

@@ -13,8 +13,7 @@ from joblib import delayed, effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 
-from skthermo._estimators.threads import map_on_blas_threads, single_blas_thread
-from skthermo._io import as_they_come, with_progress
+from skthermo._estimators.jobs import as_they_come, map_on_blas_threads, single_blas_thread, with_progress
 from skthermo._tables.arrays import (
     Array,
     Bounds,

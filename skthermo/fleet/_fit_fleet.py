@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
+from skthermo._estimators.jobs import with_progress
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import with_progress
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._fleet import Fleet, Storage, named, warn_of_bridges

@@ -19,8 +19,9 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
+from skthermo._estimators.jobs import with_progress
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import ReadWhenAsked, alone_with, with_progress, write_when_complete
+from skthermo._io import ReadWhenAsked, alone_with, write_when_complete
 from skthermo._tables.arrays import check_jobs, check_path
 from skthermo._tables.text import counted
 from skthermo.exceptions import SkthermoWarning

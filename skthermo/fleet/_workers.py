@@ -24,10 +24,9 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._estimators.answers import content_of
+from skthermo._estimators.jobs import single_blas_thread, without_bars
 from skthermo._estimators.memory import identity_of
-from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import counted_warnings
-from skthermo._io import without_bars
 from skthermo._validation import seed_parts
 from skthermo.metrics import mape
 from skthermo.monitoring import Monitor, MonitorStatus

@@ -18,8 +18,8 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from skthermo._estimators.jobs import single_blas_thread
 from skthermo._estimators.memory import remembered
-from skthermo._estimators.threads import single_blas_thread
 from skthermo._tables.arrays import Array, as_columns, as_floats, by_name, check_flag
 from skthermo._tables.frames import (
     Table,

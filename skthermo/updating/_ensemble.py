@@ -8,7 +8,7 @@ import numpy as np
 from joblib import delayed
 
 from skthermo._effects import read_groups
-from skthermo._io import run_jobs
+from skthermo._estimators.jobs import run_jobs
 from skthermo._tables.arrays import Array, check_names
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel, ReducedModel

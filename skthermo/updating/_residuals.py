@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_assignment, minimize
 
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import single_blas_thread
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import (
     Array,

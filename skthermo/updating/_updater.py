@@ -12,8 +12,8 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
+from skthermo._estimators.jobs import run_jobs
 from skthermo._estimators.warnings import warn_each, warn_user
-from skthermo._io import run_jobs
 from skthermo._tables.arrays import (
     Array,
     Bounds,

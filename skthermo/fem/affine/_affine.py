@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.threads import map_on_blas_threads
+from skthermo._estimators.jobs import map_on_blas_threads
 from skthermo._estimators.warnings import warn_user
 from skthermo._tables.arrays import (
     Array,

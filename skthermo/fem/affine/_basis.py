@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
 
-from skthermo._estimators.threads import map_on_blas_threads
+from skthermo._estimators.jobs import map_on_blas_threads
 from skthermo._tables.arrays import Array, RandomState, as_random_state
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms

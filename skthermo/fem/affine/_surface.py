@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import single_blas_thread
 from skthermo._tables.arrays import Array, Bounds, check_theta, spread_evenly
 
 FIRST_DEGREE = 3

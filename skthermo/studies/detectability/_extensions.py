@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import run_jobs, single_blas_thread
 from skthermo._estimators.warnings import reported_by_caller, warn_user, warnings_once, without_warnings
-from skthermo._io import run_jobs
 from skthermo._tables.arrays import (
     Array,
     as_floats,

@@ -16,9 +16,8 @@ from scipy.special import expit, logit
 from scipy.stats import t
 
 from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import run_jobs, single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_user, without_warnings
-from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_floats, positive_integer
 from skthermo._tables.frames import Table, column_names, frame_like, has_stamps, row_times
 from skthermo.exceptions import ModelWarning, ResultWarning

@@ -18,10 +18,9 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.answers import answer_once, answers_kept
+from skthermo._estimators.jobs import run_jobs, single_blas_thread
 from skthermo._estimators.memory import remembered
-from skthermo._estimators.threads import single_blas_thread
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
-from skthermo._io import run_jobs
 from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts

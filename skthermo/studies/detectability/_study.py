@@ -16,7 +16,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
 from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import single_blas_thread
 from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
 from skthermo._tables.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
 from skthermo._validation import Stages, held, last_step, seeded

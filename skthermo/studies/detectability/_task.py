@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
-from skthermo._estimators.threads import single_blas_thread
+from skthermo._estimators.jobs import single_blas_thread
 from skthermo._estimators.warnings import reported_by_caller, warn_each, warn_user, warnings_once
 from skthermo._tables.arrays import (
     Array,

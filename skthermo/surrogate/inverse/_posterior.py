@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 from sklearn.utils import Bunch
 
+from skthermo._estimators.jobs import with_progress
 from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import warn_user
-from skthermo._io import with_progress
 from skthermo._tables.arrays import (
     Array,
     check_flag,

@@ -1,18 +1,24 @@
-"""A progress bar as a line of text."""
+"""Work in parts: on one BLAS thread, which small matrices and networks are fastest on, on several Python threads, or in
+joblib's jobs; a bar says how much is done."""
 
 import multiprocessing
 import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from contextvars import ContextVar
+from functools import cache
 from typing import Any, TypeVar
 
+import numpy as np
+import threadpoolctl  # installed with scikit-learn, which requires it
 from joblib import Parallel
 
-from skthermo._tables.arrays import check_flag
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 SILENT_SECONDS = 1.0
 SECONDS_BETWEEN = 0.1
@@ -21,6 +27,62 @@ WIDTH = 30
 Part = TypeVar("Part")
 _n_open = 0  # contexts within which no bar is drawn
 _stage = ContextVar("stage", default="")  # what an estimator is doing in this thread, which a bar names
+
+_lock = threading.Lock()
+_n_inside = 0  # open contexts
+_limits: Any = None
+
+
+@cache
+def _controller() -> threadpoolctl.ThreadpoolController:
+    return threadpoolctl.ThreadpoolController().select(user_api="blas")
+
+
+@contextmanager
+def _in_control() -> Iterator[None]:
+    """Let this thread set limits: since threadpoolctl 3.8 only the first thread to set limits may do so."""
+    openblas = getattr(threadpoolctl, "OpenBLASController", None)
+    let_go = getattr(openblas, "clear_controlling_thread", lambda force: None)
+    let_go(force=True)
+    yield
+    let_go(force=True)
+
+
+@contextmanager
+def single_blas_thread() -> Iterator[None]:
+    """Limit every BLAS library of this process to one thread. Contexts that overlap in several Python threads are
+    counted: the first to enter sets the limit, and the last to leave lifts it."""
+    global _n_inside, _limits
+    with _lock:
+        if not _n_inside:
+            with _in_control():
+                _limits = _controller().limit(limits=1)
+        _n_inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _n_inside -= 1
+            if not _n_inside:
+                with _in_control():
+                    _limits.restore_original_limits()
+
+
+def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+    """Map with as many Python threads as BLAS has threads, each limited to one BLAS thread.
+
+    Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) apply to these Python threads too. Closing
+    the iterator waits for the items that are running and skips the rest.
+    """
+    n_threads = 1
+    if len(items) > 1:
+        n_threads = max((library["num_threads"] for library in _controller().info()), default=1)
+    with single_blas_thread():
+        if n_threads < 2:
+            yield from map(function, items)
+        else:
+            with ThreadPoolExecutor(n_threads) as pool:
+                yield from pool.map(function, items)
 
 
 def with_progress(
@@ -31,8 +93,8 @@ def with_progress(
     With ``shown=None`` the environment variable SKTHERMO_PROGRESS decides, 1 or 0. Unset, the bar appears after a
     second on a terminal or in a notebook, in the main thread of the main process.
     """
-    if shown is not None:
-        check_flag(shown, "progress")
+    if not isinstance(shown, bool | np.bool_ | None):
+        raise ValueError(f"progress is {shown!r:.100}; expected None, True or False")
     if shown is None:
         shown = {"0": False, "1": True}.get(os.environ.get("SKTHERMO_PROGRESS", ""))
     if shown is False or _n_open or (shown is None and not _is_watched()):
