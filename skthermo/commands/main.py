@@ -157,6 +157,7 @@ def _complain(error: Exception, what: str = "") -> None:
 def _parser() -> Parser:
     parser = Parser("skthermo", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--version", action="version", version=f"%(prog)s {skthermo.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, text: str, command: Callable[..., int]) -> argparse.ArgumentParser:

@@ -263,6 +263,13 @@ def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_evaluated(argum
     assert capsys.readouterr().err.startswith("usage: skthermo")
 
 
+def test_the_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.split() == ["skthermo", skthermo.__version__]
+
+
 @pytest.mark.parametrize("files", [["bridge.joblib"], ["new.csv"], ["a.toml", "b.toml", "new.csv"]])
 def test_files_that_do_not_belong_together_are_an_error(files, capsys):
     assert main(["update", *files]) == FAILED
