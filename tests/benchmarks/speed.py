@@ -356,7 +356,7 @@ def main():
                 rows[name]["beside"] = found["now"]["beside"].median() / rows[name]["now, s"]
             if len(found) == 2:
                 rows[name]["times faster"] = rows[name]["before, s"] / rows[name]["now, s"]
-                slower += [name] * (found["now"]["seconds"].min() > 1.1 * rows[name]["before, s"])
+                slower += [name] * bool(found["now"]["seconds"].min() > 1.1 * rows[name]["before, s"])
     shown("Seconds, megabytes, and times as long as now", pd.DataFrame(rows).T, "3g")
     print(f"slower by more than 10 %: {', '.join(slower) or 'nothing'}")
     return int(bool(slower))
