@@ -156,8 +156,7 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
     lines = [line for line, _ in records]
     cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
     texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
-    decimal = "." if file.suffix.lower() in WORKBOOKS else form.decimal
-    values = {name: _numbers(cells.get(name, ()), decimal, f"column {name!r}", file, lines) for name in wanted}
+    values = {name: _numbers(cells.get(name, ()), form.decimal, f"column {name!r}", file, lines) for name in wanted}
     table = pd.DataFrame(values, _times(texts, form, file, lines), dtype=float)
     again = table.index.duplicated()
     if again.any() and (is_other := again & ~table.reset_index().duplicated().to_numpy()).any():
@@ -185,7 +184,7 @@ def _records(
     record, which may come earlier than in other files."""
     first = max(form.values_line or 0, names_line + 1)
     heads = [(line, row) for line, row in rows if names_line < line < first and len(row) >= len(names)]
-    is_stamp = parsed([" ".join(row[place] for place in places) for _, row in heads], form.stamps).notna()
+    is_stamp = parsed_or_iso([" ".join(row[place] for place in places) for _, row in heads], form.stamps).notna()
     first = min([first, *(line for line, _ in compress(heads, is_stamp))])
     above = [row for line, row in rows if line < first]
     records = [(line, without_margin(row, len(names))) for line, row in rows if line >= first and row not in above]
@@ -201,7 +200,7 @@ def _records(
 def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
     """Cells of each line that is not empty, with the number of the line, and whether the last line is complete."""
     if file.suffix.lower() in WORKBOOKS:
-        return _rows_of_workbook(file), True
+        return _rows_of_workbook(file, form.decimal), True
     text = text_of(file, form.encoding)
     try:
         rows = rows_of(text, form.separator)
@@ -210,20 +209,31 @@ def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
     return rows, not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
 
 
-def _rows_of_workbook(file: Path) -> list[Line]:
-    """Cells of the first sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
+def _rows_of_workbook(file: Path, decimal: str, n_rows: int | None = None) -> list[Line]:
+    """Cells of the longest sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
     try:
         import_optional("openpyxl", extra="excel")
-        with without_warnings():
-            sheet = pd.read_excel(file, header=None, dtype=object, na_filter=False, engine="openpyxl")
+        with without_warnings(), pd.ExcelFile(file, engine="openpyxl") as book:
+            sheet = book.parse(_longest_sheet(book), header=None, dtype=object, na_filter=False, nrows=n_rows)
     except OSError:
         raise
     except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
         raise ValueError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
-    rows = [[str(cell).strip().replace("\n", "").removesuffix(" 00:00:00") for cell in row] for row in sheet.to_numpy()]
+    rows = [[_text_of_cell(cell, decimal) for cell in row] for row in sheet.to_numpy()]
     return [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
+
+
+def _text_of_cell(cell: Any, decimal: str) -> str:
+    if isinstance(cell, float):
+        return str(cell).replace(".", decimal)
+    return str(cell).strip().replace("\n", "").removesuffix(" 00:00:00")
+
+
+def _longest_sheet(book: pd.ExcelFile) -> str:
+    """Name of the sheet with the most rows: others are covers, or notes."""
+    return max(book.sheet_names, key=lambda name: book.book[name].max_row or 0)
 
 
 def names_of(row: Sequence[str]) -> list[str]:
@@ -309,7 +319,7 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
             f"{file}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have an "
             "offset from UTC; expected all or none"
         )
-    index = parsed(texts, form.stamps)
+    index = parsed_or_iso(texts, form.stamps)
     is_wrong = np.array(index.isna())
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
@@ -336,6 +346,18 @@ def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     index = pd.DatetimeIndex(pd.to_datetime(list(texts), format=form, errors="coerce", utc=has_offsets))
     is_other = np.array([form == ISO and DATE.match(text) is None for text in texts], dtype=bool)
     return index.where(~is_other) if is_other.any() else index
+
+
+def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
+    """Texts as times in this format, or as in ISO 8601, which cannot be taken for another one: dates of a workbook."""
+    index = parsed(texts, form)
+    others = np.flatnonzero(index.isna())
+    if form in (ISO, *NUMERIC) or not len(others):
+        return index
+    times, iso = index.to_series(index=range(len(index))), parsed([texts[place] for place in others], ISO)
+    if iso.notna().any() and (iso.tz is None) == (index.tz is None):
+        times.iloc[others] = iso
+    return pd.DatetimeIndex(times)
 
 
 def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
@@ -405,8 +427,11 @@ def _look_at_table(
 ) -> tuple[CsvFormat, dict[str, str], dict[str, str], list[str]]:
     """Form of a CSV file or workbook, units of its columns as a line below the names has them, columns of text, and
     notes."""
-    separator, decimal = (",", ".") if file.suffix.lower() in WORKBOOKS else _division(text_of(file), file)
-    rows, _ = rows_in(file, CsvFormat(separator))
+    if file.suffix.lower() in WORKBOOKS:
+        separator, decimal, sheets = ",", *_form_of_workbook(file)
+    else:
+        (separator, decimal), sheets = _division(text_of(file), file), []
+    rows, _ = rows_in(file, CsvFormat(separator, decimal))
     width = used_width([row for _, row in rows], _usual_width([row for _, row in rows[:MOST_LOOKED_AT]]))
     rows = [(line, without_margin(row, width)) for line, row in rows]
     rows = [(line, row) for line, row in rows if len(row) == width]
@@ -447,7 +472,21 @@ def _look_at_table(
         stamps=stamps,
         time_zone="UTC" if zone is None and (has_offsets or stamps.startswith(UNIX)) else zone,
     )
-    return form, units, texts, notes
+    return form, units, texts, [*sheets, *notes]
+
+
+def _form_of_workbook(file: Path) -> tuple[str, list[str]]:
+    """The decimal sign by which the most cells are numbers, and which of several sheets is read."""
+
+    def n_numbers(decimal: str) -> int:
+        rows = _rows_of_workbook(file, decimal, MOST_LOOKED_AT)
+        return sum(_is_number(cell, decimal) is True for _, row in rows for cell in row)
+
+    decimal = max(DECIMALS, key=n_numbers)
+    with pd.ExcelFile(file, engine="openpyxl") as book:
+        names, longest = book.sheet_names, _longest_sheet(book)
+    note = f"{file.name} has {len(names)} sheets; the one with the most rows, {longest!r}, is read"
+    return decimal, [note] * (len(names) > 1)
 
 
 def _division(text: str, file: Path) -> tuple[str, str]:
@@ -517,16 +556,18 @@ def _stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
 
 def _times_in(rows: Sequence[Sequence[str]], places: Sequence[int], form: str) -> pd.DatetimeIndex:
     """Stamps in some columns of rows, NaT where there is none that is plausible."""
-    index = parsed([_stamp_text(row, places) for row in rows], form)
+    index = parsed_or_iso([_stamp_text(row, places) for row in rows], form)
     return index.where((index.year >= YEARS[0]) & (index.year <= YEARS[1]))
 
 
 def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str]) -> list[str]:
     """Formats by which the most rows have a stamp, if these are most rows, and their stamps are not all the same."""
-    sample = rows[len(rows) // 2 :: max(len(rows) // 8, 1)]
+    half = len(rows) // 2
+    sample = [*rows[half :: max(len(rows) // 8, 1)], *rows[half : half + 4]]
     signs = {sign for row in sample for sign in _stamp_text(row, places)}
     likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
-    found = {form: _times_in(rows, places, form) for form in likely if _times_in(sample, places, form).notna().any()}
+    texts = [_stamp_text(row, places) for row in sample]
+    found = {form: _times_in(rows, places, form) for form in likely if parsed(texts, form).notna().any()}
     least = max([len(rows) / 2, *(index.notna().sum() for index in found.values())])
     return [
         form

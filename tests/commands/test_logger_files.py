@@ -97,7 +97,7 @@ def with_column(cells, name, values, place=None):
     return [[*row[:place], cell, *row[place:]] for row, cell in zip(cells, [name, *values], strict=True)]
 
 
-def workbook(cells, truth=RECORDS, more=()):
+def workbook(cells, truth=RECORDS, more=(), before=()):
     """An Excel workbook in which numbers are numbers and times are times."""
     openpyxl = pytest.importorskip("openpyxl")
     book, file = openpyxl.Workbook(), io.BytesIO()
@@ -105,6 +105,8 @@ def workbook(cells, truth=RECORDS, more=()):
         book.active.append([None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row])
     for name in more:
         book.create_sheet(name).append(["notes"])
+    for name in before:
+        book.create_sheet(name, 0).append(["a report"])
     book.save(file)
     return Log({"log.xlsx": file.getvalue()}, truth)
 
@@ -115,6 +117,22 @@ def in_cells(records=RECORDS, *stamps):
     values = zip(records.index, records.to_numpy().tolist(), strict=True)
     names = [*["time", "clock"][: len(stamps)], *records]
     return [names, *([*(one(stamp) for one in stamps), *row] for stamp, row in values)]
+
+
+def with_commas(cells, *columns):
+    """Numbers of some columns as texts with decimal commas."""
+    return [
+        [
+            repr(cell).replace(".", ",") if isinstance(cell, float) and n in columns else cell
+            for n, cell in enumerate(row)
+        ]
+        for row in cells
+    ]
+
+
+def with_texts_for_times(cells):
+    """Every second time as text, as a spreadsheet leaves those that it does not recognise."""
+    return [[row[0].strftime(GERMAN), *row[1:]] if n % 2 else row for n, row in enumerate(cells)]
 
 
 def serial(stamp):
@@ -234,6 +252,10 @@ UNDERSTOOD = {
     "a workbook with serial dates": lambda: workbook(in_cells(RECORDS, lambda one: float(serial(one)))),
     "a workbook with dates and times": lambda: workbook(in_cells(RECORDS, pd.Timestamp.date, pd.Timestamp.time)),
     "a workbook with texts of two lines": lambda: workbook(with_column(in_cells(), "note", ["a\nb"] * N)),
+    "a workbook with decimal commas as texts": lambda: workbook(with_commas(in_cells(), *range(9))),
+    "a workbook with decimal commas in a column": lambda: workbook(with_commas(in_cells(), 2)),
+    "a workbook in which some times are texts": lambda: workbook(with_texts_for_times(in_cells())),
+    "a workbook with a cover": lambda: workbook(in_cells(), before=["cover"]),
     "a workbook with texts as stamps": lambda: workbook(in_cells(RECORDS, lambda one: one.strftime(GERMAN))),
     "names again": lambda: log(repeated(rows(), 20, 50)),
     "names and units again": lambda: log([*rows()[:1], ["", "degC", "Hz", ""], *rows()[1:9], rows()[0],
