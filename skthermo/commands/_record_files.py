@@ -200,7 +200,7 @@ def _records(
 def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
     """Cells of each line that is not empty, with the number of the line, and whether the last line is complete."""
     if file.suffix.lower() in WORKBOOKS:
-        return _rows_of_workbook(file, form.decimal), True
+        return _rows_of_cells(_longest_sheet(file)[0], form.decimal), True
     text = text_of(file, form.encoding)
     try:
         rows = rows_of(text, form.separator)
@@ -209,19 +209,27 @@ def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
     return rows, not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
 
 
-def _rows_of_workbook(file: Path, decimal: str, n_rows: int | None = None) -> list[Line]:
-    """Cells of the longest sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
+def _longest_sheet(file: Path) -> tuple[Any, list[str]]:
+    """Cells of the sheet with the most rows, as others are covers or notes; which one of several it is, in words."""
     try:
         import_optional("openpyxl", extra="excel")
         with without_warnings(), pd.ExcelFile(file, engine="openpyxl") as book:
-            sheet = book.parse(_longest_sheet(book), header=None, dtype=object, na_filter=False, nrows=n_rows)
+            longest = max(book.sheet_names, key=lambda name: book.book[name].max_row or 0)
+            cells = book.parse(longest, header=None, dtype=object, na_filter=False).to_numpy()
     except OSError:
         raise
     except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
         raise ValueError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
-    rows = [[_text_of_cell(cell, decimal) for cell in row] for row in sheet.to_numpy()]
+    n_sheets = len(book.sheet_names)
+    note = f"{file.name} has {n_sheets} sheets; the one with the most rows, {longest!r}, is read"
+    return cells, [note] * (n_sheets > 1)
+
+
+def _rows_of_cells(cells: Any, decimal: str) -> list[Line]:
+    """Cells of a sheet as texts: dates as in ISO 8601, numbers with all of their digits."""
+    rows = [[_text_of_cell(cell, decimal) for cell in row] for row in cells]
     return [(line, row) for line, row in enumerate(rows, start=1) if any(row)]
 
 
@@ -229,11 +237,6 @@ def _text_of_cell(cell: Any, decimal: str) -> str:
     if isinstance(cell, float):
         return str(cell).replace(".", decimal)
     return str(cell).strip().replace("\n", "").removesuffix(" 00:00:00")
-
-
-def _longest_sheet(book: pd.ExcelFile) -> str:
-    """Name of the sheet with the most rows: others are covers, or notes."""
-    return max(book.sheet_names, key=lambda name: book.book[name].max_row or 0)
 
 
 def names_of(row: Sequence[str]) -> list[str]:
@@ -477,16 +480,13 @@ def _look_at_table(
 
 def _form_of_workbook(file: Path) -> tuple[str, list[str]]:
     """The decimal sign by which the most cells are numbers, and which of several sheets is read."""
+    cells, note = _longest_sheet(file)
 
     def n_numbers(decimal: str) -> int:
-        rows = _rows_of_workbook(file, decimal, MOST_LOOKED_AT)
+        rows = _rows_of_cells(cells[:MOST_LOOKED_AT], decimal)
         return sum(_is_number(cell, decimal) is True for _, row in rows for cell in row)
 
-    decimal = max(DECIMALS, key=n_numbers)
-    with pd.ExcelFile(file, engine="openpyxl") as book:
-        names, longest = book.sheet_names, _longest_sheet(book)
-    note = f"{file.name} has {len(names)} sheets; the one with the most rows, {longest!r}, is read"
-    return decimal, [note] * (len(names) > 1)
+    return max(DECIMALS, key=n_numbers), note
 
 
 def _division(text: str, file: Path) -> tuple[str, str]:

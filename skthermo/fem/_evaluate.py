@@ -122,6 +122,7 @@ class Job:
 
 
 def on_one_thread(job: Job, chunk: Array) -> tuple[Array, ...]:
+    """A job on a chunk of rows, with one thread of BLAS: its workers share the cores."""
     with single_blas_thread():
         return job(chunk)
 
