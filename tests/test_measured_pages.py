@@ -1,63 +1,102 @@
-"""Numbers of the pages of accuracy and costs are in tables of ``docs/measured``, which name their commands."""
+"""Numbers of the measured pages, of README and of the home page are in tables that ``release.py`` wrote."""
 
 import importlib.util
+import json
 import re
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
 DOCS, MEASURED = ROOT / "docs", ROOT / "docs" / "measured"
-PAGES = ["accuracy.rst", "accuracy_costs.rst"]
-INCLUDE = re.compile(r"^\.\. include:: measured/(\w+\.rst)$", re.MULTILINE)
-NUMBER = re.compile(r"(?<![\w.])-?(?:\d*\.\d+(?:e-?\d+)?|\d+(?= ?%))(?![\w]*\.?\w*[/(])")
-CHOSEN = {"0.5", "1", "2.5", "3.1", "5", "7.5", "30", "40"}  # settings of the measurements, not results
-WITHOUT_COMMAND = {"filled_temperatures.rst", "solvers.rst"}  # measured once
-NO_PROSE = re.compile(r"``[^`]+``|:[\w:]+:`[^`]*`|^\.\. .*$|`[^`]*`_+", re.MULTILINE)
+RESULTS = sorted((MEASURED / "results").glob("*.json"))
+# Settings of the measurements, not results, by page.
+CHOSEN = {
+    "accuracy": "0.5 1 2 5 10 20 30 90",
+    "accuracy_costs": "5 30",
+}
+INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
+NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
+LIST = rf"{NUMBER}(?:(?:,| and| to| or|,? and|;) {NUMBER})*"
+UNITS = r"%|percent|points|seconds|minutes|times|[smµ]?s\b|[MG]B"
+NO_PROSE = re.compile(r"``[^`]+``|:[\w:]+:`[^`]*`|^\.\. .*$|`[^`]*`_+|(?<=\d),(?=\d{3})", re.MULTILINE)
+
+
+def stated(text):
+    """Numbers of a text with a decimal point, or before a unit of what is measured."""
+    prose = re.sub(r"\s+", " ", NO_PROSE.sub("", text))
+    before_units = re.findall(rf"(?<![\w.-])({LIST}) ?(?:{UNITS})", prose)
+    with_points = re.findall(r"(?<![\w.])\d*\.\d+(?![\w.]*[/(])", prose)
+    return {number.lstrip("-") for part in (*before_units, *with_points) for number in re.findall(NUMBER, part)}
+
+
+def is_in(number, table):
+    """Whether a number is one of a table's, or a hundred times one, rounded as far as it is written."""
+    half = 0.5001 * 10.0 ** Decimal(number).as_tuple().exponent
+    found = [abs(float(text)) for text in re.findall(rf"(?<![\w.]){NUMBER}", NO_PROSE.sub("", table))]
+    return any(abs(scale * value - float(number)) <= half for value in found for scale in (1, 100))
+
+
+def unknown(text, table, chosen=""):
+    """Numbers that a text states and a table lacks, each with its place."""
+    prose = re.sub(r"\s+", " ", text)
+    return {
+        number: re.findall(rf".{{0,50}}(?<![\w.]){re.escape(number)}(?![\w.]).{{0,20}}", prose)[:2]
+        for number in stated(text)
+        if number not in chosen.split() and not is_in(number, table)
+    }
 
 
 @pytest.fixture(scope="module")
-def parts():
+def release():
     spec = importlib.util.spec_from_file_location("release", ROOT / "tests" / "benchmarks" / "release.py")
-    release = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(release)
-    return release.PARTS
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-def numbers(text, pattern=NUMBER):
-    """Numbers with a decimal point or a percent sign, as text; ".5" is "0.5"."""
-    return {number.lstrip("-") if number[0] != "." else f"0{number}" for number in re.findall(pattern, text)}
+@pytest.mark.parametrize("file", RESULTS, ids=lambda path: path.stem)
+def test_a_table_is_what_its_command_printed(file, release):
+    found = json.loads(file.read_text())
+    assert found["command"] == release.PARTS[file.stem].command
+    assert found["exit code"] in (0, 1)
+    assert (MEASURED / f"{file.stem}.rst").read_text() == release.page(found)
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_a_page_types_no_table(page):
-    text = (DOCS / page).read_text()
-    assert INCLUDE.search(text)
-    assert not re.findall(r"^ *(?:\.\. (?:list-|csv-)?table::|=+ +=)", text, re.MULTILINE)
+def test_no_table_was_written_by_hand():
+    assert {path.stem for path in MEASURED.glob("*.rst")} == {path.stem for path in RESULTS} | {"summary"}
+    for page in CHOSEN:
+        text = (DOCS / f"{page}.rst").read_text()
+        assert not re.findall(r"^ *(?:\.\. (?:list-|csv-)?table::|=+ +=)", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", CHOSEN)
 def test_numbers_of_the_prose_are_in_the_tables(page):
-    text = (DOCS / page).read_text()
-    tables = "\n".join((MEASURED / name).read_text() for name in INCLUDE.findall(text))
-    prose = re.sub(r"\s+", " ", NO_PROSE.sub(" ", text))
-    unknown = numbers(prose) - numbers(tables, r"\d*\.\d+(?:e-?\d+)?|\d+") - CHOSEN
-    places = [re.findall(rf".{{0,50}}\b{re.escape(number.lstrip('0'))}.{{0,20}}", prose)[:2] for number in unknown]
-    assert not unknown, dict(zip(unknown, places, strict=True))
+    text = (DOCS / f"{page}.rst").read_text()
+    assert INCLUDE.search(text)
+    tables = "\n".join((MEASURED / f"{name}.rst").read_text() for name in INCLUDE.findall(text))
+    assert not unknown(text, tables, CHOSEN[page])
 
 
-def test_numbers_of_the_home_pages_cards_are_in_the_summary():
-    cards = (
-        (DOCS / "index.rst").read_text().partition(":class-container: measured")[2].partition(":class-container:")[0]
-    )
-    assert numbers(cards)
-    assert numbers(cards) <= numbers((MEASURED / "summary.rst").read_text())
+def rows_of_the_summary():
+    return (MEASURED / "summary.rst").read_text().partition("   * - ")[2].split("\n   * - ")[1:]
 
 
-@pytest.mark.parametrize("table", sorted(MEASURED.glob("*.rst")), ids=lambda path: path.stem)
-def test_a_table_names_its_commands(table, parts):
-    known = {part.command for part in parts.values()}
-    named = re.findall(r"``(python (?:tests|examples)/[^`]*)``", table.read_text())
-    assert named or table.name in WITHOUT_COMMAND
-    assert set(named) <= known
-    assert any(table.name in INCLUDE.findall((DOCS / page).read_text()) for page in PAGES)
+@pytest.mark.parametrize("row", rows_of_the_summary(), ids=lambda row: row.partition("\n")[0][:40])
+def test_a_row_of_the_summary_is_what_its_parts_printed(row):
+    *said, parts = row.split("     - ")
+    tables = "\n".join((MEASURED / f"{name}.rst").read_text() for name in re.findall(r"``([\w-]+)``", parts))
+    assert tables
+    assert not unknown("\n".join(said), tables)
+
+
+def test_readme_and_home_say_what_the_summary_says():
+    home, readme = (DOCS / "index.rst").read_text(), (ROOT / "README.md").read_text()
+    cards = home.partition(":class-container: measured")[2].partition(":class-container:")[0]
+    assert stated(cards)
+    assert stated(readme)
+    assert not unknown(cards, (MEASURED / "summary.rst").read_text())
+    output = readme.partition("```text")[2].partition("```")[0]
+    prose = re.sub(r"```.*?```|<img[^>]*>", "", readme, flags=re.DOTALL)
+    assert not unknown(prose, (MEASURED / "summary.rst").read_text() + output)
