@@ -51,6 +51,7 @@ Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 PARTS = {
+    "readme-study": Part("readme_study.py", "--years 1"),
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py", **Z24),
     "directions-wrong": Part("directions.py --parts wrong"),
