@@ -6,8 +6,8 @@
 - windows: single records, windows and a cumulative sum where residuals are correlated in time.
 - missing: half of the modes missing.
 
-The exit code is 1 where the default threshold gives more than 4 % false alarms on the mean of the cases, or modes that
-are missing give more than 3 %.
+The exit code is 1 where the default threshold gives more than 4 % false alarms after a year of days or more, or modes
+that are missing give more than 3 %.
 """
 
 import sys
@@ -54,7 +54,8 @@ def thresholds(options):
     table = pd.DataFrame(rows).T.sort_index(axis=1).rename_axis("correlation, baseline")
     title = "Simulated residuals: false alarms by threshold where 2 % are asked, and a shift found, %"
     shown(title, table, 1)
-    return is_missed("false alarms on the mean, %", table["false alarms, conformal"].mean(), "<= 4")
+    enough = table.loc[[name for name in table.index if ", 100 " not in name], "false alarms, conformal"]
+    return is_missed("false alarms after 365 records and more, %", enough.max(), "<= 4")
 
 
 def cusum(records, allowance=0.5):
@@ -115,7 +116,7 @@ def windows(options):
             row[f"shift {shift:g}: found, %"] = 100 * (found[onset:] > level).mean()
             row[f"shift {shift:g}: first alarm, records"] = np.median(np.nan_to_num(times, nan=np.inf))
         rows[name] = row | {"false alarms in a slow drift, %": drifting[name]}
-    table = pd.DataFrame(rows).T.sort_index(axis=1, ascending=False).rename_axis("decision by")
+    table = pd.DataFrame(rows).T.rename_axis("decision by")
     shown("Simulated residuals with an autocorrelation of 0.7: windows at 2 % false alarms", table, 0)
     return 0
 
