@@ -48,7 +48,7 @@ def detectors(model, targets):
         FALLS: compensated(targets, DirectionalDetector()),
         OMNIBUS: compensated(targets),
         NEIGHBOURS: raw(targets, recipes("detector").NeighbourDistance()),
-        "isolation forest, raw": raw(targets, IsolationForest(random_state=0)),
+        "isolation forest, raw": raw(targets, IsolationForest(n_estimators=500, random_state=0)),
     }
 
 

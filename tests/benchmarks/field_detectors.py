@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/field_detectors.py [--parts z24 seasons years frost] [--seeds 8]
 
-- z24: the last fifth of the healthy records, and the damaged ones. Other detectors than the Mahalanobis distance leave
-  out days for their thresholds or, by default, five correlation times. SKTHERMO_DATA names the folder of data.
+- z24: the last fifth of the healthy records, and the damaged ones. Detectors of raw frequencies leave out days for
+  their thresholds or, by default, five correlation times. SKTHERMO_DATA names the folder of data.
 - seasons: the same after baselines that end earlier, on the fifth of the healthy records that follows.
 - years: the truss day by day, with noise that is independent or has a correlation of 0.9 from day to day. Its weather
   repeats, is colder in the evaluated year, or the baseline ends after the warm half of its year.
@@ -48,12 +48,8 @@ def z24(_):
     records, candidates = z24_records(), recipe.detectors()
     known = directional(recipe.FREQUENCIES, make_z24()) | candidates
     table = recipe.measured_table(records, known).add_suffix(", %")
-    by_default = {
-        name: one
-        for name, one in field_detectors(recipe.FREQUENCIES).items()
-        if name in candidates and hasattr(one[-1] if hasattr(one, "steps") else one, "block")
-    }
-    found = recipe.measured_table(records, by_default)
+    by_default = field_detectors(recipe.FREQUENCIES).items()
+    found = recipe.measured_table(records, {name: one for name, one in by_default if name.startswith("raw")})
     table["default blocks, false alarms, %"] = found["false alarms"]
     table["default blocks, found of 130, %"] = found["found of 130"]
     shown("Z24: alarms among 560 later healthy and 130 damaged records", table.rename_axis("detector"), 1)
