@@ -38,13 +38,13 @@ def rate(detector, records):
 
 def thresholds(options):
     """A shift of all modes, by five standard deviations together, shows what each threshold still finds."""
-    rows, shift = {}, 5 / np.sqrt(N_MODES)
+    rows, shift = {}, 5 / np.sqrt(6)
     kinds = {name: MahalanobisDetector(ASKED, threshold=name) for name in ("conformal", "quantile", "chi2")}
     for correlation in (0.0, 0.9, 0.95):
         for length in (100, 365, 2000):
             random, found = np.random.default_rng(0), {}
             for _ in range(max(options.baselines * 100 // length, 20)):
-                baseline, new = (correlated(random, (n, N_MODES), correlation) for n in (length, 1000))
+                baseline, new = (correlated(random, (n, 6), correlation) for n in (length, 1000))
                 for name, detector in kinds.items():
                     detector.fit(baseline)
                     found.setdefault(f"false alarms, {name}", []).append(rate(detector, new))
@@ -52,7 +52,7 @@ def thresholds(options):
                         found.setdefault(f"shift found, {name}", []).append(rate(detector, new + shift))
             rows[f"{correlation:g}, {length} records"] = {name: np.mean(each) for name, each in found.items()}
     table = pd.DataFrame(rows).T.sort_index(axis=1).rename_axis("correlation, baseline")
-    title = "Simulated residuals: false alarms by threshold where 2 % are asked, and a shift found, %"
+    title = "Simulated residuals of six modes: false alarms by threshold where 2 % are asked, and a shift found, %"
     shown(title, table, 1)
     enough = table.loc[[name for name in table.index if ", 100 " not in name], "false alarms, conformal"]
     return is_missed("false alarms after 365 records and more, %", enough.max(), "<= 4")
