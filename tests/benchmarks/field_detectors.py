@@ -1,6 +1,6 @@
 """False alarms of the field's detectors, and what they find, on the bridge Z24 and where the truth is known.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/field_detectors.py [--parts z24 seasons years frost] [--seeds 8]
+    OMP_NUM_THREADS=1 python tests/benchmarks/field_detectors.py [--parts z24 seasons years frost] [--seeds 4]
 
 - z24: the last fifth of the healthy records, and the damaged ones. Detectors of raw frequencies leave out days for
   their thresholds or, by default, five correlation times. SKTHERMO_DATA names the folder of data.
@@ -161,7 +161,7 @@ PARTS = {"z24": z24, "seasons": seasons, "years": years, "frost": frost}
 
 
 def main():
-    options = arguments(__doc__, parts=PARTS, seeds=8)
+    options = arguments(__doc__, parts=PARTS, seeds=4)
     return int(sum(PARTS[part](options) for part in options.parts) > 0)
 
 

@@ -59,7 +59,6 @@ PARTS = {
     "field-detectors": Part("field_detectors.py --parts years frost"),
     "whitening": Part("whitening.py", **Z24),
     "thresholds": Part("detection_thresholds.py"),
-    "detection-tuning": Part("detection_tuning.py"),
     "own-kind": Part("own_kind.py", **Z24),
     "detector-choice": Part("detector_choice.py"),
     "z24-detectors": Part("z24_detectors.py", **Z24),
