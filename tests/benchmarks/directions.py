@@ -9,7 +9,7 @@
 - smallest: the smallest loss of each group of the truss that is found in 9 of 10 records.
 - wrong: the truss with directions that are off at random, lack a group, or are another structure's.
 
-Shares of records, or of means of a day, in alarm where the threshold leaves 2 % of the other healthy records in alarm.
+Shares of records, or of medians of a day, in alarm where the threshold leaves 2 % of the other healthy records in alarm.
 The exit code is 1 if the model's directions find less than the Mahalanobis distance on any structure, or less than the
 neighbours on Z24.
 """
@@ -59,7 +59,7 @@ def indices(detector, tables):
 def shares(found, daily=False, rate=RATE):
     """Percent of damaged records, or days, above the level that a rate of the healthy ones exceeds."""
     if daily:
-        found = {name: index.resample("1D").mean() for name, index in found.items()}
+        found = {name: index.resample("1D").median() for name, index in found.items()}
     level = found["healthy"].quantile(1 - rate)
     return {name: 100 * (index.dropna() > level).mean() for name, index in found.items() if name != "healthy"}
 
@@ -99,15 +99,15 @@ STRUCTURES = {
 
 
 def beside(part, options):
-    """By detector: the truss by group and loss, others by loss, of records and of means of a day."""
+    """By detector: the truss by group and loss, others by loss, of records and of medians of a day, which leave out outliers."""
     structure, title = STRUCTURES[part]
     rows = {}
     for model, baseline, tables in structure(options.first_seed):
         for what, detector in detectors(model, modes_of(baseline)).items():
             found = indices(detector.fit(baseline), tables)
             row = rows.setdefault(what, {})
-            for kind in ("",) if part == "truss" else ("records", "day means"):
-                for damage, share in shares(found, kind == "day means").items():
+            for kind in ("",) if part == "truss" else ("records", "day medians"):
+                for damage, share in shares(found, kind == "day medians").items():
                     name = f"{damage.split(',')[0]} loss, {kind}" if kind else damage
                     row.setdefault(name.replace("%", " %"), []).append(share)
     table = pd.DataFrame({what: {name: np.mean(each) for name, each in row.items()} for what, row in rows.items()}).T
