@@ -31,10 +31,12 @@ NOISE, DAMAGE = 0.01, {"bottom": 0.2}
 HALF = 182  # days, in which the season is warm
 
 
-def directional(targets, model):
+def default_residuals(targets, model):
+    """Detectors of the default residuals, which are whitened by weather."""
     return {
         "directions of the FE model": compensated(targets, DirectionalDetector(model)),
         "falls, no model": compensated(targets, DirectionalDetector()),
+        "Mahalanobis": compensated(targets),
     }
 
 
@@ -46,7 +48,7 @@ def z24_records():
 def z24(_):
     recipe = recipes("z24_detector")
     records, candidates = z24_records(), recipe.detectors()
-    known = directional(recipe.FREQUENCIES, make_z24()) | candidates
+    known = default_residuals(recipe.FREQUENCIES, make_z24()) | candidates
     table = recipe.measured_table(records, known).add_suffix(", %")
     by_default = field_detectors(recipe.FREQUENCIES).items()
     found = recipe.measured_table(records, {name: one for name, one in by_default if name.startswith("raw")})
@@ -60,7 +62,7 @@ def seasons(_):
     recipe = recipes("z24_detector")
     names = ["piecewise-linear", "piecewise-linear, whitened", "raw, 20 neighbours", "raw, isolation forest"]
     candidates = {name: one for name, one in recipe.detectors().items() if name in names}
-    known = directional(recipe.FREQUENCIES, make_z24()) | candidates
+    known = default_residuals(recipe.FREQUENCIES, make_z24()) | candidates
     table = recipe.short_baselines(z24_records(), known).rename_axis("detector")
     of = {
         "false alarms": "false alarms in the fifth of the healthy records that follows",
@@ -106,7 +108,7 @@ def years(options):
         for seed in range(options.seeds):
             baseline, healthy, damaged, model = daily(seed, **settings)
             targets = modes_of(baseline)
-            for name, detector in (directional(targets, model) | field_detectors(targets)).items():
+            for name, detector in (default_residuals(targets, model) | field_detectors(targets)).items():
                 if "trees" in name or "whitened" in name:
                     continue
                 sees = targets if name.startswith("raw") else list(baseline)
