@@ -9,7 +9,7 @@
 - smallest: the smallest loss of each group of the truss that is found in 9 of 10 records.
 - wrong: the truss with directions that are off at random, lack a group, or are another structure's.
 
-Shares of records, or of medians of a day, in alarm where the threshold leaves 2 % of the other healthy records in alarm.
+Shares of records, or of medians of a day, in alarm where the threshold leaves 2 % of other healthy ones in alarm.
 The exit code is 1 if the model's directions find less than the Mahalanobis distance on any structure, or less than the
 neighbours on Z24.
 """
@@ -99,7 +99,7 @@ STRUCTURES = {
 
 
 def beside(part, options):
-    """By detector: the truss by group and loss, others by loss, of records and of medians of a day, which leave out outliers."""
+    """By detector: the truss by group and loss, others by loss, of records and of a day's medians, without outliers."""
     structure, title = STRUCTURES[part]
     rows = {}
     for model, baseline, tables in structure(options.first_seed):
