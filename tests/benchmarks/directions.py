@@ -142,7 +142,7 @@ def z24(options):
             if hasattr(detector[-1], "threshold_"):
                 own.setdefault(what, []).append(by_threshold(detector[-1], found[what][-1]))
     rows = {what: over_folds(folds) for what, folds in found.items()}
-    table = pd.DataFrame(rows).T
+    table = pd.DataFrame(rows).T.rename_axis("detector")
     for name in ("false alarms", "found"):
         table[f"own threshold, {name}"] = {what: np.mean([one[name] for one in each]) for what, each in own.items()}
     shown("Z24, four quarters held back in turn: damaged records found at measured false alarms, %", table, 1)
