@@ -78,7 +78,6 @@ ax.scatter(results["found (%)"], true)
 ax.set(xlabel="damaged records found, simulated (%)", ylabel="damaged records found, true (%)")
 
 # %%
-# Simulation puts the settings in the order of truth. ``python tests/benchmarks/detection_tuning.py`` repeats this for
-# several years.
+# Simulation puts the settings in the order of truth.
 
 save_figures(options.figures)

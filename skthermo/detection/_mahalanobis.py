@@ -54,7 +54,7 @@ class MahalanobisDetector(DamageDetector):
           distributed, and also where records depend on those just before them. Where the neighbours to be left out are
           more than a fifth of a complete baseline, the distances are its own, times a factor.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
-          of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5.6 % false alarms
+          of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5 % false alarms
           where 2 % are asked for.
         - ``"chi2"``: the distance that normally distributed records exceed at that rate. Real residuals are not normal
           and exceed it some two to seven times as often (two to three times on the Z24 bridge).

@@ -1,79 +1,77 @@
-"""Whitening by itself: false alarms and damage found by the default detector, on real and synthetic bridges.
+"""Ways to whiten residuals, by false alarms and damage found.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/whitening.py [--parts z24 winters] [--seeds 0 1 7]
+    OMP_NUM_THREADS=1 python tests/benchmarks/whitening.py [--parts z24 winters]
 
-- z24: baselines of the first 40 to 80 % of the healthy records; the other healthy records show false alarms, the 130
-  damaged ones what is found. The data are in the folder that SKTHERMO_DATA names.
-- winters: ten bridges of ``make_fleet`` for each seed learn six weeks of two-hourly records to the end of February, and
-  evaluate the spring; in the damaged one, the first damage group has lost 20 %.
+- z24: four folds, in each of which a quarter of the healthy records, a contiguous one, is held back. The data are in
+  the folder that SKTHERMO_DATA names.
+- winters: thirty bridges of ``make_fleet`` learn six weeks of two-hourly records to March, and evaluate the
+  spring; in the damaged one, the first damage group has lost 20 %.
 
-Prints the rates in percent. The exit code is 1 if a target is missed that is not known to be.
+The exit code is 1 if the default gives more than 4 % false alarms in spring, or misses half of the damage.
 """
 
 import sys
 
 import numpy as np
-from harness import arguments, compensated, is_missed, joined, modes_of, z24_records
+import pandas as pd
+from directions import by_threshold, indices, over_folds, z24_folds
+from harness import arguments, compensated, joined, modes_of, shown
 
-from skthermo.datasets import make_fleet
+from skthermo.datasets import make_fleet, make_z24
+from skthermo.detection import DirectionalDetector
 
-MOST_FALSE, LEAST_FOUND = 4.0, 90.0
-KNOWN = {  # an earlier winter's records do not show the deepest frost; one of 130 damaged records is missing
-    ("z24", "first 40 %", "false alarms"),
-    ("z24", "first 50 %", "false alarms"),
-    ("z24", "first 80 %", "found"),
-}
-
-
-def rates(baseline, healthy, damaged, targets):
-    """False alarms and damage found by the default detector, in percent of the records that are evaluated."""
-    detector = compensated(targets)
-    decisions = [detector.fit(baseline).predict(records) for records in (healthy, damaged)]
-    return [100 * (one[one != 0] == -1).mean() for one in decisions]
+SEEDS = 0, 1, 7
+WAYS = {'"auto", default': "auto", '"local"': "local", '"global"': "global", "None": None}
+LAST = {"directions of the FE model": lambda: DirectionalDetector(make_z24()), "Mahalanobis": lambda: None}
 
 
-def z24(_):
-    healthy, damaged = (T.join(F) for T, F in z24_records())
-    for percent in (40, 50, 60, 80):
-        n = percent * len(healthy) // 100
-        false, found = rates(healthy[:n], healthy[n:], damaged, modes_of(healthy))
-        yield f"first {percent} %", "false alarms", false, f"<= {MOST_FALSE}"
-        yield f"first {percent} %", "found", found, f">= {LEAST_FOUND}"
+def z24():
+    found = {}
+    for baseline, tables in z24_folds():
+        for way, whiten in WAYS.items():
+            for what, last in LAST.items():
+                detector = compensated(modes_of(baseline), last(), whiten=whiten).fit(baseline)
+                one = indices(detector, tables)
+                found.setdefault(f"{what}, {way}", []).append((one, by_threshold(detector[-1], one)))
+    rows = {}
+    for what, folds in found.items():
+        own = pd.DataFrame([one for _, one in folds]).mean().add_prefix("own threshold, ")
+        rows[what] = over_folds([one for one, _ in folds]) | own.to_dict()
+    title = "Z24, four quarters held back in turn: damaged records found at measured false alarms, %"
+    shown(title, pd.DataFrame(rows).T.rename_axis("detector and whitening"), 1)
+    return False
 
 
-def winters(seeds):
-    overall = []
-    for seed in seeds:
-        found = []
-        for bridge in make_fleet(10, atypical=0.0, random_state=seed).values():
-            group = bridge.groups[0]
-            baseline = bridge.records(42, "2025-01-18", samples_per_day=12)
-            spring, damaged = (
-                joined(bridge.records(92, "2025-03-01", samples_per_day=12, damage=damage))
-                for damage in (None, {group: 0.2})
+def winters():
+    rates = {}
+    for bridge in (one for seed in SEEDS for one in make_fleet(10, atypical=0.0, random_state=seed).values()):
+        baseline, *later = (
+            joined(bridge.records(n_days, start, samples_per_day=12, damage=damage))
+            for n_days, start, damage in (
+                (42, "2025-01-18", None),
+                (92, "2025-03-01", None),
+                (92, "2025-03-01", {bridge.groups[0]: 0.2}),
             )
-            found.append(rates(joined(baseline), spring, damaged, list(baseline.frequencies)))
-        false, detected = np.mean(found, axis=0)
-        yield f"ten bridges, seed {seed}", "false alarms", false, None
-        yield f"ten bridges, seed {seed}", "largest false alarms of one bridge", np.max(found, axis=0)[0], None
-        yield f"ten bridges, seed {seed}", "found", detected, None
-        overall.append(false)
-    yield "all bridges", "false alarms", np.mean(overall), f"<= {MOST_FALSE}"
+        )
+        for way, whiten in WAYS.items():
+            detector = compensated(modes_of(baseline), whiten=whiten).fit(baseline)
+            decisions = [detector.predict(records) for records in later]
+            rates.setdefault(way, []).append([100 * (one[one != 0] == -1).mean() for one in decisions])
+    rows = {}
+    for way, each in rates.items():
+        false, found = np.transpose(each)
+        rows[way] = {"false alarms": false.mean(), "of the worst bridge": false.max(), "damage found": found.mean()}
+    table = pd.DataFrame(rows).T.rename_axis("whitening")
+    shown("Thirty bridges, six weeks of winter learned: alarms in the spring, Mahalanobis, 2 % asked for, %", table, 1)
+    false, _, found = table.iloc[0]
+    return false > 4 or found < 50
 
 
 PARTS = {"z24": z24, "winters": winters}
 
 
 def main():
-    options = arguments(__doc__, parts=PARTS, seeds=[0, 1, 7])
-    missed = 0
-    for part in options.parts:
-        for case, what, value, target in PARTS[part](options.seeds):
-            if target is None:
-                print(f"{case}: {what} {value:.1f}", flush=True)
-            else:
-                missed += is_missed(f"{case}: {what}, %", value, target, known=(part, case, what) in KNOWN)
-    return 1 if missed else 0
+    return int(sum(PARTS[part]() for part in arguments(__doc__, parts=PARTS).parts) > 0)
 
 
 if __name__ == "__main__":

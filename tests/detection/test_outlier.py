@@ -159,7 +159,6 @@ def test_blocks_are_rows_or_durations(rows, block, message):
 
 
 def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
-    """More estimators, lengths and correlations: tests/benchmarks/detection_thresholds.py."""
     rates = {"conformal": [], "quantile": []}
     for seed in range(6):
         noise = np.random.default_rng(seed).normal(size=(50 + 1000 + 2000, 4))

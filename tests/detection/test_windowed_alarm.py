@@ -269,7 +269,7 @@ def test_later_records_do_not_change_earlier_windows(rule):
 @pytest.mark.one_case
 @each_rule
 def test_false_alarms_are_as_asked_in_spite_of_the_correlation_in_time(rule):
-    """More baselines, lengths and gaps: tests/benchmarks/detection_thresholds.py."""
+    """Windows beside others: tests/benchmarks/detection_thresholds.py."""
     rates = []
     for seed in range(3):
         alarm = WindowedAlarm(12, rule=rule, contamination=0.05).fit(stream(2500, seed, correlation=0.7))
