@@ -49,11 +49,11 @@ DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day
 SINGLE = ("MahalanobisDetector", {}, "each record for itself")
 DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
 FALLS = {"class": "DirectionalDetector"}  # of natural frequencies, as damage has it
-SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, and falls of frequencies before all")
+SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, falls of frequencies with more weight than rises")
 DAY_FALLS = (
     "WindowedAlarm",
     {"window": "1D", "detector": FALLS},
-    "the records of a day together, and falls of frequencies before all",
+    "the records of a day together, falls of frequencies with more weight than rises",
 )
 WIDTH = 110  # of comments
 KELVIN = (200.0, 340.0)  # range of a temperature in kelvin

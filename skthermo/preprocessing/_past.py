@@ -614,7 +614,7 @@ class MemoryFindings(SavesFrames):
     >>> from skthermo.preprocessing import find_memory
     >>> memory = find_memory([[4.0], [5.0]], [[2.1], [2.0]])
     >>> print(memory.summary())
-    No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough.
+    Earlier temperatures explain no more of the frequencies: their means do not lower the error in periods held out.
     >>> memory.fall
     0.0
     """
@@ -632,11 +632,14 @@ class MemoryFindings(SavesFrames):
             The means that explain the frequencies, and by how much the error falls.
         """
         if self.features is None:
-            return "No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough."
+            return (
+                "Earlier temperatures explain no more of the frequencies: their means do not lower the error in periods "
+                "held out."
+            )
         means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
         return (
             "The frequencies depend on earlier temperatures: exponentially weighted means over "
-            f"{means} reduce the out-of-fold error by {self.fall:.0%}."
+            f"{means} lower the error in periods held out by {self.fall:.0%}."
         )
 
     @property

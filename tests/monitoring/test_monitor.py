@@ -32,7 +32,7 @@ N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-excursion|not-evaluated)"
+    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-peak|not-evaluated)"
 )
 
 
