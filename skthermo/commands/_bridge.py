@@ -18,6 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._estimators.warnings import reported_by_caller, warn_user
 from skthermo._io import alone_with
+from skthermo._loggers.files import CsvFormat, in_zone, read_file
 from skthermo._tables.text import counted, plain
 from skthermo.commands._new_records import (
     NewFile,
@@ -28,7 +29,6 @@ from skthermo.commands._new_records import (
     read_baseline,
     read_columns,
 )
-from skthermo.commands._record_files import CsvFormat, in_zone, read_file
 from skthermo.commands._settings import Settings, read_settings
 from skthermo.exceptions import SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor

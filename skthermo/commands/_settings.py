@@ -24,7 +24,7 @@ import pandas as pd
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 
-from skthermo.commands._record_files import CsvFormat
+from skthermo._loggers.files import CsvFormat
 from skthermo.detection import DirectionalDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 

@@ -444,8 +444,8 @@ class Excursions:
             warn_user(
                 f"at {counted_number(per_year, 'false alarm')} a year, {asked:.2g} events are expected in the "
                 f"{self.years} of the baseline; it should be {FAR} or more. The threshold {rule.threshold:.3g} is "
-                f"extrapolated from the peaks of its damage index, the highest of them {highest:.3g}.{now} Use a longer baseline, or "
-                "allow more alarms a year",
+                f"extrapolated from the peaks of its damage index, the highest of them {highest:.3g}.{now} Use a "
+                "longer baseline, or allow more alarms a year",
                 FewRecordsWarning,
                 "extrapolated-threshold",
             )

@@ -633,8 +633,8 @@ class MemoryFindings(SavesFrames):
         """
         if self.features is None:
             return (
-                "Earlier temperatures explain no more of the frequencies: their means do not lower the error in periods "
-                "held out."
+                "Earlier temperatures explain no more of the frequencies: their means do not lower the error in "
+                "periods held out."
             )
         means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
         return (

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from skthermo.commands._record_files import DAYS, CsvFormat, look_at, read_file
+from skthermo._loggers.files import DAYS, CsvFormat, look_at, read_file
 from tests.commands.folders import run
 from tests.nights import by_day
 
