@@ -24,7 +24,6 @@ from skthermo.exceptions import RecordsWarning
 ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"
 NUMERIC = {UNIX: ("s", "unix", 5e8, 4e9), UNIX_MS: ("ms", "unix", 5e11, 4e12), EXCEL: ("D", "1899-12-30", 3e4, 7.5e4)}
 """Stamps that are numbers: their unit, when they begin, and the least and the greatest that are taken for times."""
-OF_A_WORKBOOK = (ISO, EXCEL)  # formats of stamps that are dates there, or were
 STAMP_TEXTS = {
     ISO: "one like 2026-01-31 13:00", UNIX: "seconds since 1970", UNIX_MS: "milliseconds since 1970",
     EXCEL: "a serial date of Excel, such as 46053.5417",
@@ -324,8 +323,8 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
             "offset from UTC; expected all or none"
         )
     index = parsed_or_iso(texts, form.stamps)
-    if form.stamps in OF_A_WORKBOOK and file.suffix.lower() in WORKBOOKS:
-        index = _otherwise_written(texts, index, file)
+    if file.suffix.lower() in WORKBOOKS:
+        index = _otherwise_written(texts, index, form.stamps, file)
     is_wrong = np.array(index.isna())
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
@@ -366,11 +365,12 @@ def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     return pd.DatetimeIndex(times)
 
 
-def _otherwise_written(texts: Sequence[str], index: pd.DatetimeIndex, file: Path) -> pd.DatetimeIndex:
-    """Stamps of a workbook, those that are no dates or serial dates read by the only format that they may have."""
+def _otherwise_written(texts: Sequence[str], index: pd.DatetimeIndex, form: str, file: Path) -> pd.DatetimeIndex:
+    """Stamps of a workbook, where dates, serial dates and texts mean the same: those that are none in its format read
+    by the only other one that they may have. Texts in two formats might be days and months that are exchanged."""
     others = np.flatnonzero(index.isna())
     rows = [[texts[place]] for place in others]
-    for forms in (WRITTEN, (EXCEL,)) if rows else ():
+    for forms in (WRITTEN if form in (ISO, EXCEL) else (), (EXCEL,)) if rows else ():
         if fitting := _fitting(rows, (0,), forms):
             times = index.to_series(index=range(len(index)))
             found = _times_in(rows, (0,), _certain(rows, (0,), fitting, file)[0])

@@ -66,7 +66,7 @@ class LoggerRecords:
                 f"{look.file}: {look.records.index.min()} to {look.records.index.max()}" for look in looks
             )
             raise ValueError(f"the files have no stamp in common ({spans}); expected records of the same times")
-        table = table.sort_index()
+        table = once(table).sort_index()
         convert = {
             name: unit
             for name in (*roles["temperatures"], *roles["reference"])

@@ -9,6 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo._loggers.files import DAYS, CsvFormat, look_at, read_file
+from skthermo.preprocessing import read_records
 from tests.commands.folders import run
 from tests.nights import by_day
 
@@ -76,6 +77,34 @@ def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
     assert run("fit", settings).code == 0
     said = run("status", settings, "--json").json["bridges"][0]["status"]["faults"]
     assert [(fault["column"], fault["kind"]) for fault in said] == [("f2", "left out")]
+
+
+@pytest.mark.parametrize("command", ["fit", "update", "status"])
+@pytest.mark.parametrize("place", ["", "nowhere", "nowhere/monitor.toml"])
+def test_a_folder_without_settings_is_told_which_command_makes_them(command, place, tmp_path):
+    done = run(command, tmp_path / place)
+    assert done.code == 3
+    folder = (tmp_path / place).parent if place.endswith(".toml") else tmp_path / place
+    assert f"skthermo init T.csv F.csv --into {folder}" in done.err
+    assert run("init", tmp_path / "T.csv", "--into", folder).code == 3  # such a command exists
+
+
+def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
+    file, table = tmp_path / "records.csv", RECORDS.assign(RECORD=range(100, 180), empty=np.nan)
+    table.to_csv(file, index_label="time")
+    with pytest.warns(UserWarning, match="'RECORD'.*'empty'") as given:
+        T, F = read_records(str(file))
+    assert [one.message.kind for one in given] == ["read-as"]
+    expected = RECORDS.columns.tolist()
+    assert [list(T), list(F)] == [expected[:1], expected[1:]]
+    pd.testing.assert_frame_equal(T.join(F), RECORDS, check_freq=False, check_names=False, check_index_type=False)
+    other = tmp_path / "other.csv"
+    RECORDS[expected[1:]][10:].to_csv(other, index_label="time")
+    RECORDS[expected[:1]].to_csv(file, index_label="time")
+    with pytest.warns(UserWarning, match="unmatched-stamps"):
+        T, F = read_records(file, other)
+    assert T.index.equals(F.index)
+    assert len(T) == len(RECORDS) - 10
 
 
 def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):

@@ -265,6 +265,18 @@ def test_reasons_say_why_a_record_is_not_evaluated():
         assert answers.loc[answers["index"].isna(), "reason"].str.contains(reason).any() or name == "mean by number"
 
 
+@pytest.mark.parametrize("name", ["whitened, mean by time", "m of n"])
+def test_records_without_values_that_their_window_evaluates_are_named(name):
+    _, answers, _ = fitted(name, sensors=False)
+    seen = SERVICE.mask(SERVICE == -999)
+    lacking = seen[MODES].isna().all(axis=1) | seen.drop(columns=MODES).isna().all(axis=1)
+    lacking &= answers["index"].notna()
+    assert lacking.any()
+    said = answers["reason"].str.split("; ")
+    of_others = {one for reason in said[~lacking & answers["index"].notna()] for one in reason}
+    assert all(set(reason) - of_others for reason in said[lacking])
+
+
 def test_answers_do_not_keep_the_frequency_of_a_batch():
     monitor, records = copy.deepcopy(fitted("lags")[0]), ALL[N_BASELINE : N_BASELINE + 40]
     assert records.index.freq is not None
