@@ -31,7 +31,9 @@ STAMP_TEXTS = {
 PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
 BINARY = (*PARQUET, *WORKBOOKS)
 ENDINGS = (".csv", ".txt", ".dat", ".tsv", *BINARY)
-NO_VALUE = re.compile(r"|-+|#.*|n/?a|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE)
+NO_VALUE = re.compile(
+    r"|-+|#.*|n/?a|k\.? ?a\.?|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE
+)
 BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")

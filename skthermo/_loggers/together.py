@@ -16,7 +16,7 @@ from skthermo._tables.text import counted
 ABSOLUTE_ZERO, FREEZING, FAHRENHEIT = 273.15, 32.0, 5 / 9
 TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"
 LIKE_TEMPERATURE = re.compile(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", re.IGNORECASE)
-LIKE_FREQUENCY = re.compile(r"f_?\d*$|freq|mode|hz", re.IGNORECASE)
+LIKE_FREQUENCY = re.compile(r"f_?\d*$|.*freq|(.*\W)?(mode|hz)", re.IGNORECASE)
 KELVIN = (200.0, 340.0)  # range of a temperature in kelvin
 
 
@@ -82,7 +82,7 @@ def _roles(looks: Sequence[Look], columns: list[str], given: dict[str, Any]) -> 
     """Columns by what they are: as said, else as the first and the other of two files, or by unit and name."""
     unknown = [name for names in given.values() for name in names or () if name not in columns]
     if unknown:
-        raise ValueError(f"there are no columns {unknown}; expected some of {columns}")
+        raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_others(looks)}")
     named = {name for names in given.values() for name in names or ()}
     rest = [name for name in columns if name not in named]
     units = {name: unit for look in looks for name, unit in look.units.items()}
@@ -95,12 +95,20 @@ def _roles(looks: Sequence[Look], columns: list[str], given: dict[str, Any]) -> 
             first = set(looks[0].records)
             given[role] = [name for name in rest if (name in first) == (role == "temperatures")]
         elif given[role] is None:
-            given[role] = [n for n in rest if units.get(n) in unit or (n not in units and like.match(str(n)))]
+            found = [n for n in rest if units.get(n) in unit or (n not in units and like.match(str(n)))]
+            given[role] = [n for n in found if n not in (given["temperatures"] or ())]
         if not given[role]:
             raise ValueError(
-                f"no column is known to be one of the {role}; expected {role} (--{role}) by name, some of {columns}"
+                f"no column is known to be one of the {role}; expected {role} (--{role}) by name, some of "
+                f"{columns}{_others(looks)}"
             )
     return {role: list(names) for role, names in given.items()}
+
+
+def _others(looks: Sequence[Look]) -> str:
+    """Columns that cannot be used, and why."""
+    others = [f"{name!r} is none, as {why}" for look in looks for name, why in look.ignored.items()]
+    return f"; {', '.join(others)}" if others else ""
 
 
 def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:

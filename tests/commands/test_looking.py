@@ -81,12 +81,12 @@ def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
 
 @pytest.mark.parametrize("command", ["fit", "update", "status"])
 @pytest.mark.parametrize("place", ["", "nowhere", "nowhere/monitor.toml"])
-def test_a_folder_without_settings_is_told_which_command_makes_them(command, place, tmp_path):
+def test_without_settings_the_command_that_makes_them_is_named(command, place, tmp_path):
     done = run(command, tmp_path / place)
     assert done.code == 3
     folder = (tmp_path / place).parent if place.endswith(".toml") else tmp_path / place
     assert f"skthermo init T.csv F.csv --into {folder}" in done.err
-    assert run("init", tmp_path / "T.csv", "--into", folder).code == 3  # such a command exists
+    assert run("init", tmp_path / "T.csv", "--into", folder).code == 3
 
 
 def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
@@ -105,6 +105,23 @@ def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
         T, F = read_records(file, other)
     assert T.index.equals(F.index)
     assert len(T) == len(RECORDS) - 10
+
+
+@pytest.mark.parametrize(
+    "names",
+    [["Temperatur außen", "1. Eigenfrequenz"], ["Luft", "f_1"], ["air temperature", "Mode 1"], ["T1", "f1 [Hz]"]],
+)
+def test_columns_are_recognised_by_usual_names(names, tmp_path):
+    RECORDS.set_axis(names, axis=1).to_csv(tmp_path / "a.csv", index_label="time")
+    T, F = read_records(tmp_path / "a.csv")
+    assert [*T, *F] == names
+
+
+def test_columns_that_cannot_be_used_are_named_where_others_are_lacking(tmp_path):
+    table = RECORDS.set_axis(["Luft", "f1"], axis=1)
+    table.assign(f1=table["f1"].map("{:.3f} Hz".format)).to_csv(tmp_path / "a.csv", index_label="time")
+    with pytest.raises(ValueError, match="'f1'"):
+        read_records(tmp_path / "a.csv")
 
 
 def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):
