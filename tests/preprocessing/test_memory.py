@@ -86,8 +86,8 @@ def test_the_mean_halves_the_error_of_a_later_year():
 class TestChecks:
     def test_memory_is_named_and_no_step(self):
         findings = check_records(*bridge(5, 730, "40D")).table
-        assert set(findings["what"]) - {"frequency-outliers"} == {"thermal-memory"}
-        assert set(findings.loc[findings["what"] == "thermal-memory", "column"]) == {"air"}
+        assert set(findings["what"]) - {"frequency-outliers"} == {"slow-temperatures"}
+        assert set(findings.loc[findings["what"] == "slow-temperatures", "column"]) == {"air"}
 
     def test_a_step_beside_memory_stays_one(self):
         findings = check_records(*bridge(7, 730, "40D", step=-0.02)).table

@@ -86,7 +86,7 @@ WARNINGS = {
     "frequency-outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}. "
     "Those that cannot be are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
-    "thermal-memory": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
+    "slow-temperatures": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
     "taken for changes of the structure. Append these means to the inputs of the regression",
     "sudden-change": "frequencies change at once by what the weather does not explain: {}. Both levels would be "
     "learned as healthy. Fit on records of one structure, in one state and by one way of identification",
