@@ -112,7 +112,7 @@ def test_it_says_what_the_real_monitor_says(page, real):
     event = monitor.events_.iloc[-1]
     start = event["start"]
     assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"
-    assert f"modes that drive it: {event['modes']}." in page.text
+    assert f": {event['modes']}." in page.text
     assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not evaluated." in page.text
     assert f"There was no record on 4 of 80{SPACE}days." in page.text
     assert "Slow drift is not followed" in page.text
