@@ -52,6 +52,17 @@ def test_none_is_found_where_there_is_none(days, change):
     assert found.summary()
 
 
+def test_a_mode_of_few_values_does_not_hide_the_memory_of_others():
+    T, F = bridge(0, 400, "40D")
+    expected = find_memory(T, F)
+    assert expected.features is not None
+    scarce = pd.Series(np.random.default_rng(0).normal(7, 0.1, len(F)), F.index)
+    found = find_memory(T, F.assign(f9=scarce.where(np.arange(len(F)) % 20 == 0)))
+    assert found.features.get_params() == expected.features.get_params()
+    assert found.fall == pytest.approx(expected.fall)
+    assert found.table.loc[found.table["mode"] == "f9", "fall"].isna().all()
+
+
 def test_the_truss_has_none():
     year = make_truss_campaign(random_state=0)
     assert find_memory(year.temperatures, year.frequencies).features is None
