@@ -18,7 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._estimators.warnings import without_warnings
 from skthermo._io import write_when_complete
-from skthermo._loggers.files import BINARY, PARQUET, CsvFormat, Look
+from skthermo._loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
 from skthermo._loggers.together import HZ, LoggerRecords
 from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
@@ -234,16 +234,25 @@ class Proposal:
 
 
 def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
-    """The form that all CSV files have in common."""
+    """The form by which all files are read as they were: that of the first text, as workbooks need less of it."""
     looks = [look for look in looks if look.file.suffix.lower() not in PARQUET] or looks[:1]
+    looks.sort(key=lambda look: look.file.suffix.lower() in BINARY)
     missing = sorted({marker for look in looks for marker in look.form.missing})
     forms = [replace(look.form, missing=missing) for look in looks]
-    other = next((n for n, form in enumerate(forms) if form != forms[0]), None)
+    other = next((n for n, form in enumerate(forms) if form != forms[0] and not _fits(forms[0], looks[n])), None)
     if other is not None:
         differing = [name for name, value in asdict(forms[0]).items() if value != getattr(forms[other], name)]
         got = ", ".join(f"{name} {getattr(forms[0], name)!r} and {getattr(forms[other], name)!r}" for name in differing)
         raise ValueError(f"{looks[0].file} and {looks[other].file} have different forms: {got}; expected the same")
     return forms[0]
+
+
+def _fits(form: CsvFormat, look: Look) -> bool:
+    """Whether a file has the same records by another form."""
+    try:
+        return read_file(look.file, form, ignore=look.ignored).equals(look.records)
+    except ValueError:
+        return False
 
 
 def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:

@@ -467,6 +467,22 @@ def test_dates_serial_dates_and_texts_of_a_workbook_mean_the_same(first, then, t
     assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
 
 
+@pytest.mark.parametrize("kind", IN_CELLS)
+def test_a_workbook_beside_a_text_of_another_form_is_read(kind, tmp_path):
+    text = log(rows(RECORDS[["T1"]], GERMAN, write=comma), ";", name="T.csv")
+    book = workbook(in_cells(RECORDS[["f1", "s1"]], IN_CELLS[kind]))
+    files = text.files | {"F.xlsx": book.files["log.xlsx"]}
+    for order in (files, dict(reversed(files.items()))):
+        place = tmp_path / next(iter(order))[0]
+        place.mkdir()
+        one = Log(order, RECORDS, ("--temperatures", "T1", "--responses", "f1", "s1"))
+        done, file = begin(one, place)
+        assert done.code == 0, done.err
+        settings = read_settings(file)
+        baseline, _ = read_baseline(list(map(settings.path, settings.records.baseline)), settings.csv, settings.records)
+        assert_read(baseline, RECORDS)
+
+
 @pytest.mark.parametrize("first", ["dates", "serial dates"])
 def test_days_and_months_of_later_texts_that_may_be_exchanged_are_refused(first, tmp_path):
     _, file = begin(workbook(in_cells(LONE, IN_CELLS[first])), tmp_path)
