@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import pandas as pd
 
@@ -50,6 +51,14 @@ class LoggerRecords:
         """Look at files, in a time zone and with a format of stamps if these are known. What is not said of columns is
         found by files, names and units."""
         wanted = [*(temperatures or ()), *(responses or ()), *reference]
+        again = sorted({name for name in wanted if wanted.count(name) > 1})
+        if again:
+            raise ValueError(f"{again} are named twice among temperatures and responses; expected each column once")
+        try:
+            ZoneInfo("UTC" if zone is None else zone)
+        except (KeyError, ValueError, OSError, TypeError) as error:
+            text = f"zone is {zone!r:.100}; expected a time zone such as 'Europe/Brussels' or 'UTC'"
+            raise ValueError(text) from error
         looks = [look_at(file, zone, stamps, wanted) for file in files]
         again = [
             name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])

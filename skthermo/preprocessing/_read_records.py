@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -74,8 +76,11 @@ def read_records(
     2026-01-13 22:00:00       -1.5    4.012
     2026-01-13 23:00:00        NaN    4.015
     """
-    if not files:
-        raise ValueError("no file is named; expected at least one")
+    if not files or not all(isinstance(file, str | PathLike) for file in files):
+        raise ValueError(f"files are {files!r:.100}; expected paths, at least one")
+    if stamps is not None and not (isinstance(stamps, str) and stamps):
+        raise ValueError(f"stamps is {stamps!r:.100}; expected a format such as '%d.%m.%Y %H:%M'")
+    temperatures, responses = _names(temperatures, "temperatures"), _names(responses, "responses")
     read = LoggerRecords.of(list(map(Path, files)), temperatures, responses, (), zone, stamps)
     said = [note for look in read.looks for note in look.notes]
     said += [f"{name!r} is not used, as {why}" for name, why in read.ignored.items()]
@@ -90,3 +95,12 @@ def read_records(
             "unmatched-stamps",
         )
     return read.table[read.roles["temperatures"]], read.table[read.roles["responses"]]
+
+
+def _names(given: Any, argument: str) -> list[str] | None:
+    """Names of columns, one or several."""
+    if given is None or isinstance(given, str):
+        return None if given is None else [given]
+    if not isinstance(given, Sequence | pd.Index) or not all(isinstance(name, str) for name in given):
+        raise ValueError(f"{argument} are {given!r:.100}; expected names of columns")
+    return list(given)

@@ -117,6 +117,15 @@ def test_columns_are_recognised_by_usual_names(names, tmp_path):
     assert [*T, *F] == names
 
 
+@pytest.mark.parametrize("zone", ["Mars", "../UTC", "Europe"])
+def test_a_time_zone_that_does_not_exist_is_refused_without_a_traceback(zone, tmp_path):
+    RECORDS.to_csv(tmp_path / "a.csv", index_label="time")
+    done = run("init", tmp_path / "a.csv", "--into", tmp_path / "b", "--zone", zone)
+    assert done.code == 3
+    assert len(done.err.splitlines()) == 1
+    assert zone in done.err
+
+
 def test_columns_that_cannot_be_used_are_named_where_others_are_lacking(tmp_path):
     table = RECORDS.set_axis(["Luft", "f1"], axis=1)
     table.assign(f1=table["f1"].map("{:.3f} Hz".format)).to_csv(tmp_path / "a.csv", index_label="time")
