@@ -556,7 +556,7 @@ def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> 
         if found:
             return found[0][0], *_certain(rows, *found[0], file)
     expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
-    raise ValueError(f"{file}: no column holds times, {expected}; the first values are {list(*rows[:1])!r:.200}")
+    raise ValueError(f"{file}: no column holds stamps, {expected}; the first values are {list(*rows[:1])!r:.200}")
 
 
 def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
