@@ -191,7 +191,7 @@ def test_an_hour_that_does_not_exist_is_named(tmp_path):
         ("time,T1\n", "no columns"),
         ("a,b\nc,d\n", "no columns"),
         ("2026-01-01,1.5\n2026-01-02,1.5\n", "line of names"),
-        ("name,T1\nx,1.5\ny,1.5\n", "no column holds times"),
+        ("name,T1\nx,1.5\ny,1.5\n", "no column holds stamps"),
     ],
 )
 def test_what_is_no_table_of_records_is_an_error(tmp_path, text, expected):
