@@ -213,7 +213,7 @@ def warnings_once(where: str = "") -> Iterator[list[str]]:
     for same in alike.values():
         detectors = dict.fromkeys(repr(one.message.detector) for one in same if hasattr(one.message, "detector"))
         notes = [f"detectors {', '.join(detectors)}"] if detectors else []
-        notes += [f"and {len(same) - 1} times more {where}"] if len(same) > 1 and where else []
+        notes += [f"and {len(same) - 1} time{'s' * (len(same) > 2)} more {where}"] if len(same) > 1 and where else []
         if notes:
             vars(same[0])["message"].args = (f"{_text_of(same[0])} ({'; '.join(notes)})",)
         texts.append(str(same[0].message))

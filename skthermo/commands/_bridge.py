@@ -18,6 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._estimators.warnings import reported_by_caller, warn_user
 from skthermo._io import alone_with
+from skthermo._loggers.files import CsvFormat, in_zone, read_file
 from skthermo._tables.text import counted, plain
 from skthermo.commands._new_records import (
     NewFile,
@@ -28,7 +29,6 @@ from skthermo.commands._new_records import (
     read_baseline,
     read_columns,
 )
-from skthermo.commands._record_files import CsvFormat, in_zone, read_file
 from skthermo.commands._settings import Settings, read_settings
 from skthermo.exceptions import SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
@@ -138,9 +138,9 @@ class Bridge:
         done.state = done.status.state if state is None else state
         done.code = FAILED if done.errors and done.state != "alarm" else CODES[done.state]
         reason = reason or (done.status.reason if done.state != "alarm" else "")
-        newest = f"newest record {monitor.last_}" if len(monitor.days_) else "no record since the baseline"
+        newest = f" (newest record {monitor.last_})" if len(monitor.days_) else ""
         why = f"{', as' if done.state == 'not evaluated' else ';'} {reason}" if reason else ""
-        done.lines.append(f"state: {done.state} ({newest}){why}")
+        done.lines.append(f"state: {done.state}{newest}{why}")
         done.lines += monitor.summary().splitlines()[1:]
         self.warn_of_changes()
 
@@ -357,7 +357,9 @@ def _described_update(
     others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
     new = evaluated[~evaluated["revised"]] if len(evaluated) else evaluated
     states = {state: int((new["state"] == state).sum()) if len(new) else 0 for state in CODES}
-    reasons = new.loc[new["state"] == "not evaluated", "reason"].value_counts().to_dict() if len(new) else {}
+    is_unknown = new["state"] == "not evaluated" if len(new) else []
+    reasons = new.loc[is_unknown, "reason"].value_counts().to_dict() if len(new) else {}
+    remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts().to_dict() if len(new) else {}
     n_revised, n_ahead = len(evaluated) - len(new), after["n_ahead"]
     numbers = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
     shown = f" ({', '.join(numbers)})" if len(evaluated) else ""
@@ -365,6 +367,7 @@ def _described_update(
     done.lines += [f"evaluated anew, as records came late: {n_revised}"] if n_revised else []
     done.lines += [f"set aside, stamped too far ahead: {n_ahead}"] if n_ahead else []
     done.lines += [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
+    done.lines += [f"evaluated, with a remark, {remark}: {number}" for remark, number in remarks.items()]
     done.records = {"new": len(new), **{state.replace(" ", "_"): number for state, number in states.items()}}
     done.records |= {"revised": n_revised, "ahead": n_ahead} | {name[2:]: number for name, number in counts.items()}
     done.records["reasons"] = reasons

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,11 @@ import pandas as pd
 
 from skthermo._estimators.warnings import warn_user
 from skthermo._io import write_when_complete
+from skthermo._loggers.files import BINARY, ENDINGS, CsvFormat, read_file
+from skthermo._loggers.together import in_celsius, joined, once
 from skthermo._tables.text import counted
-from skthermo.commands._record_files import BINARY, ENDINGS, CsvFormat, read_file
 from skthermo.commands._settings import Records
 from skthermo.exceptions import RecordsWarning
-
-ABSOLUTE_ZERO, FREEZING, FAHRENHEIT = 273.15, 32.0, 5 / 9
 
 
 @dataclass(frozen=True)
@@ -116,16 +115,6 @@ def read_columns(file: Path, form: CsvFormat, records: Records, *, leave_unfinis
     return in_celsius(table, records.convert)
 
 
-def in_celsius(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
-    """A table with columns that are in K or °F converted to degrees Celsius."""
-    found = {name: unit for name, unit in units.items() if name in table}
-    scaled = {
-        name: table[name] - ABSOLUTE_ZERO if unit == "K" else (table[name] - FREEZING) * FAHRENHEIT
-        for name, unit in found.items()
-    }
-    return table.assign(**scaled)
-
-
 def check_layout(table: pd.DataFrame, file: Path, records: Records, layouts: Sequence[Sequence[str]]) -> None:
     """Raise an error if a file has not the columns of a file of the baseline, or all columns."""
     known = [records.columns, *layouts]
@@ -133,42 +122,6 @@ def check_layout(table: pd.DataFrame, file: Path, records: Records, layouts: Seq
         nearest = max(known, key=lambda layout: len(set(layout) & set(table)))
         lacking = [name for name in nearest if name not in table]
         raise ValueError(f"{file} lacks the columns {lacking}; expected {nearest}, in any order, as in the baseline")
-
-
-def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.DataFrame, pd.DatetimeIndex]:
-    """Records of files with the same columns one below the other, others side by side by their stamps; and stamps that
-    are not in all of them, whose records wait for the rest."""
-    groups: dict[frozenset[Any], list[pd.DataFrame]] = {}
-    for table in tables:
-        groups.setdefault(frozenset(table), []).append(table)
-    whole = groups.pop(frozenset(columns), [])
-    parts = [_once(pd.concat(one)) for one in groups.values()]
-    waiting = pd.DatetimeIndex([])
-    if parts:
-        together = pd.concat(parts, axis=1, join="inner")
-        every = parts[0].index
-        for part in parts[1:]:
-            every = every.union(part.index)
-        waiting = every.difference(together.index) if set(together) == set(columns) else every
-        whole += [together] if set(together) == set(columns) else []
-    if not whole:
-        return pd.DataFrame(columns=list(columns), index=waiting[:0], dtype=float), waiting
-    return pd.concat([one[list(columns)] for one in whole]), waiting
-
-
-def _once(table: pd.DataFrame) -> pd.DataFrame:
-    """Records that come twice with the same values are one; with other values they are an error."""
-    again = table.index.duplicated()
-    if not again.any():
-        return table
-    table = table[~table.reset_index().duplicated().to_numpy()]
-    again = table.index.duplicated()
-    if again.any():
-        raise ValueError(
-            f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
-            f"{table.index[again][0]}; expected each once. If the clocks go back then, [csv] time_zone says where"
-        )
-    return table
 
 
 def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> tuple[pd.DataFrame, list[list[str]]]:
@@ -188,4 +141,4 @@ def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> t
             RecordsWarning,
             "unmatched-stamps",
         )
-    return _once(whole).sort_index(), [list(table) for table in tables]
+    return once(whole).sort_index(), [list(table) for table in tables]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import shutil
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,10 +18,10 @@ import pandas as pd
 import skthermo
 from skthermo._estimators.warnings import without_warnings
 from skthermo._io import write_when_complete
+from skthermo._loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
+from skthermo._loggers.together import HZ, LoggerRecords
 from skthermo._tables.frames import usual_step
 from skthermo._tables.text import duration_text
-from skthermo.commands._new_records import in_celsius, joined
-from skthermo.commands._record_files import BINARY, MOSTLY, PARQUET, CsvFormat, Look, look_at
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -37,9 +36,6 @@ from skthermo.detection import DirectionalDetector
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
-TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"
-LIKE_TEMPERATURE = re.compile(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", re.IGNORECASE)
-LIKE_FREQUENCY = re.compile(r"f_?\d*$|freq|mode|hz", re.IGNORECASE)
 REGRESSION = "sklearn.linear_model.Ridge"
 FEATURES = {
     "ExponentialMeans": "Means of earlier temperatures that explain the responses.",
@@ -49,14 +45,13 @@ DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day
 SINGLE = ("MahalanobisDetector", {}, "each record for itself")
 DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
 FALLS = {"class": "DirectionalDetector"}  # of natural frequencies, as damage has it
-SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, and falls of frequencies before all")
+SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, falls of frequencies with more weight than rises")
 DAY_FALLS = (
     "WindowedAlarm",
     {"window": "1D", "detector": FALLS},
-    "the records of a day together, and falls of frequencies before all",
+    "the records of a day together, falls of frequencies with more weight than rises",
 )
 WIDTH = 110  # of comments
-KELVIN = (200.0, 340.0)  # range of a temperature in kelvin
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
 # a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
@@ -106,44 +101,27 @@ class Proposal:
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
-        wanted = [*(options.temperatures or ()), *(options.responses or ()), *options.reference]
-        looks = [look_at(file, options.zone, options.stamps, wanted) for file in options.files]
+        read = LoggerRecords.of(
+            options.files, options.temperatures, options.responses, options.reference, options.zone, options.stamps
+        )
+        looks, roles, table = read.looks, read.roles, read.table
         form = _form_of_all(looks)
-        again = [
-            name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])
-        ]
-        if again and len({frozenset(look.records) for look in looks}) > 1:
-            raise ValueError(f"several files have the columns {again}; expected each in one, beside the stamps")
-        columns = list(dict.fromkeys(name for look in looks for name in look.records))
-        roles = _roles(looks, columns, options)
-        used = [name for names in roles.values() for name in names]
-        units = {name: unit for look in looks for name, unit in look.units.items()}
-        together, waiting = joined([look.records for look in looks], columns)
-        if not len(together):
-            spans = "; ".join(
-                f"{look.file}: {look.records.index.min()} to {look.records.index.max()}" for look in looks
-            )
-            raise ValueError(f"the files have no stamp in common ({spans}); expected records of the same times")
-        together = together.sort_index()
-        convert = {
-            name: unit
-            for name in (*roles["temperatures"], *roles["reference"])
-            if (unit := _foreign(together, name, units))
-        }
-        together = in_celsius(together, convert)
         until = options.until
-        baseline = together[used] if until is None else together.loc[:until, used]
+        baseline = table if until is None else table.loc[:until]
         if not len(baseline):
-            raise ValueError(f"no record is from before {until}; the first is of {together.index[0]}")
-        ignored = [name for look in looks for name in look.ignored] + [name for name in columns if name not in used]
+            raise ValueError(f"no record is from before {until}; the first is of {table.index[0]}")
         records = Records(
-            [f"{BASELINE}/{look.file.name}" for look in looks], **roles, ignore=ignored, convert=convert, until=until
+            [f"{BASELINE}/{look.file.name}" for look in looks],
+            **roles,
+            ignore=list(read.ignored),
+            convert=read.convert,
+            until=until,
         )
         T, F = baseline[roles["temperatures"]], baseline[roles["responses"]]
-        units = {name: units.get(name, HZ if LIKE_FREQUENCY.match(name) else "") for name in roles["responses"]}
+        units = {name: read.units[name] for name in roles["responses"]}
         unit = next(iter(units.values())) if len(set(units.values())) == 1 else ""
         return cls(
-            looks, form, records, baseline, len(waiting), units, check_records(T, F, unit=unit), find_memory(T, F)
+            looks, form, records, baseline, len(read.waiting), units, check_records(T, F, unit=unit), find_memory(T, F)
         )
 
     @property
@@ -256,11 +234,12 @@ class Proposal:
 
 
 def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
-    """The form that all CSV files have in common."""
+    """The form by which all files are read as they were: that of the first text, as workbooks need less of it."""
     looks = [look for look in looks if look.file.suffix.lower() not in PARQUET] or looks[:1]
+    looks.sort(key=lambda look: look.file.suffix.lower() in BINARY)
     missing = sorted({marker for look in looks for marker in look.form.missing})
     forms = [replace(look.form, missing=missing) for look in looks]
-    other = next((n for n, form in enumerate(forms) if form != forms[0]), None)
+    other = next((n for n, form in enumerate(forms) if form != forms[0] and not _fits(forms[0], looks[n])), None)
     if other is not None:
         differing = [name for name, value in asdict(forms[0]).items() if value != getattr(forms[other], name)]
         got = ", ".join(f"{name} {getattr(forms[0], name)!r} and {getattr(forms[other], name)!r}" for name in differing)
@@ -268,36 +247,12 @@ def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
     return forms[0]
 
 
-def _roles(looks: Sequence[Look], columns: list[str], options: argparse.Namespace) -> dict[str, list[str]]:
-    """Columns by what they are: as said, else as the first and the other of two files, or by unit and name."""
-    given = {"temperatures": options.temperatures, "reference": options.reference, "responses": options.responses}
-    unknown = [name for names in given.values() for name in names or () if name not in columns]
-    if unknown:
-        raise ValueError(f"there are no columns {unknown}; expected some of {columns}")
-    named = {name for names in given.values() for name in names or ()}
-    rest = [name for name in columns if name not in named]
-    units = {name: unit for look in looks for name, unit in look.units.items()}
-    is_pair = len({frozenset(look.records) for look in looks}) == 2
-    for role, unit, like in (
-        ("temperatures", TEMPERATURES, LIKE_TEMPERATURE),
-        ("responses", {HZ}, LIKE_FREQUENCY),
-    ):
-        if given[role] is None and is_pair:
-            first = set(looks[0].records)
-            given[role] = [name for name in rest if (name in first) == (role == "temperatures")]
-        elif given[role] is None:
-            given[role] = [n for n in rest if units.get(n) in unit or (n not in units and like.match(str(n)))]
-        if not given[role]:
-            raise ValueError(f"no column is known to be one of the {role}; expected --{role} and some of {columns}")
-    return {role: list(names) for role, names in given.items()}
-
-
-def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:
-    """The unit of a temperature that is not in degrees Celsius."""
-    unit = units.get(name, "")
-    if unit in ("K", "°F"):
-        return unit
-    return "K" if unit == "" and records[name].between(*KELVIN).mean() > MOSTLY else ""
+def _fits(form: CsvFormat, look: Look) -> bool:
+    """Whether a file has the same records by another form."""
+    try:
+        return read_file(look.file, form, ignore=look.ignored).equals(look.records)
+    except ValueError:
+        return False
 
 
 def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:

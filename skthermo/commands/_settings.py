@@ -24,10 +24,11 @@ import pandas as pd
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 
-from skthermo.commands._record_files import CsvFormat
+from skthermo._loggers.files import CsvFormat
 from skthermo.detection import DirectionalDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 
+HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 NONE = "none"  # in a file, where a parameter may be None and is not by default
 
 
@@ -279,7 +280,8 @@ class _Reader:
             text = file.read_text(encoding="utf-8")
             return cls(file, tomllib.loads(text), dict(_places(text)))
         except FileNotFoundError as error:
-            raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings that init writes") from error
+            how = HOW_TO_BEGIN.format(file.parent)
+            raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings, from: {how}") from error
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
 

@@ -44,6 +44,7 @@ from skthermo._io import ReadWhenAsked, write_when_complete
 from skthermo._tables.text import capital, plain
 from skthermo.commands import _bridge
 from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
+from skthermo.commands._settings import HOW_TO_BEGIN
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
 OF_ONE = ("acknowledge", "rebaseline", "refit", "discard")  # commands on a single monitor
@@ -240,9 +241,10 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
     given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
     files = [file for file in given if file.suffix in MONITORS]
     records = [file for file in given if file.suffix not in MONITORS]
-    missing = [file for file in given if not (file.suffix or file.exists())]
-    if missing:
-        raise FileNotFoundError(None, None, str(missing[0]))
+    empty = [file for file in given if file.is_dir() or not (file.suffix or file.exists())]
+    if empty:
+        what = "the folder {} has no monitor.toml" if empty[0].is_dir() else "there is no folder {}"
+        raise FileNotFoundError(f"{what.format(repr(str(empty[0])))}; expected: {HOW_TO_BEGIN.format(empty[0])}")
     if not files or (records and (work is not _bridge.update or len(files) > 1)):
         raise ValueError(
             f"files are {', '.join(map(str, given))}; expected settings (.toml) or monitors (.skops, .joblib)"

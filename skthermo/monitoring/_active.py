@@ -42,7 +42,7 @@ from skthermo.residuals.weather import BEYOND, TrainingRange
 DECIMALS, LARGEST = 6, 1e300  # of a damage index below 10; a larger one has as many digits, up to the largest
 CLOSE = 1e-9  # relative distance to where rounding changes, within which an index is computed once more, alone
 EXPLAINED = 0.5  # share of a squared departure from which losses of stiffness explain it
-KINDS_OF_ESTIMATE = "missing-seasons", "extrapolated-threshold", "undetected-changes", "baseline-excursion"
+KINDS_OF_ESTIMATE = "missing-seasons", "extrapolated-threshold", "undetected-changes", "baseline-peak"
 SET_ASIDE = 3  # of the last five records with a response that is set aside open an event
 N_CHECKED = 5  # baseline records that are evaluated alone and among others
 N_AROUND = 100  # records before their memory, and after them
@@ -357,12 +357,27 @@ class ActiveDetector(SavesFrames):
         ``outside`` says which of them are extrapolated.
         """
         unknown = np.flatnonzero(np.isnan(index))
-        causes = dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
+        causes = self._without_values(records, first)
+        causes |= dict(zip(unknown.tolist(), self.causes(records, unknown + first), strict=True))
         said = []
         for n, (mark, is_far) in enumerate(zip(marks, outside, strict=True)):
             far = "extrapolated: temperatures outside those of the baseline" if is_far else ""
             said.append("; ".join(filter(None, [causes.get(n, ""), mark, far])))
         return said
+
+    def _without_values(self, records: pd.DataFrame, first: int) -> dict[int, str]:
+        """Which records from a position on say nothing themselves, so that others of their windows are evaluated."""
+        branches = list(Branch.all_of(self.detector))
+        if not any(isinstance(branch.last, WindowedAlarm) for branch in branches):
+            return {}
+        lacking = {"mode": self.targets}
+        if all(branch.compensator is not None for branch in branches):
+            lacking["temperature"] = self.temperatures
+        found = {}
+        for what, names in lacking.items():
+            for row in np.flatnonzero(records[names].iloc[first:].isna().all(axis=1)).tolist() if names else ():
+                found.setdefault(row, f"no {what} has a value: others of its window are evaluated")
+        return found
 
     @property
     def fall_to_detect(self) -> float:

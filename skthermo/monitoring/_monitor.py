@@ -479,7 +479,7 @@ class Monitor(SavesFrames, Estimator):
 
         Notes
         -----
-        The p value comes from the highest excursions of the baseline, by which the detector in charge when the event
+        The p value comes from the highest peaks of the baseline, by which the detector in charge when the event
         began was given its threshold (:ref:`how-events-are-tested`).
         """
         check_is_fitted(self)

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from skthermo._tables.frames import DAY, as_moment, check_duration, usual_step
-from skthermo._tables.text import counted, duration_text, plain, probability_text
+from skthermo._tables.text import counted, counted_number, duration_text, plain, probability_text
 from skthermo.monitoring._events import WATCH
 
 LATE = 2 * DAY  # beyond the usual step, after which a record is missed
@@ -303,7 +303,7 @@ def summary_lines(monitor: Any) -> Iterator[str]:
 
 def _of_watch(monitor: Any, events: pd.DataFrame) -> Iterator[str]:
     yield f"opens above {monitor.watch_threshold_:.4g}"
-    yield f"{monitor.watch_per_year:g} false a year expected"
+    yield f"{counted_number(monitor.watch_per_year, 'false one')} a year expected"
     yield f"{len(events)} so far"
     for number, event in events[events["end"].isna()].iterrows():
         yield f"event {number} is open since {event['start']}"

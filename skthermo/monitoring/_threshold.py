@@ -368,14 +368,14 @@ def estimate_false_alarms(
     found = Excursions.of(known, hold, persistence)
     n_peaks = len(found.squares)
     seen = (
-        f"{name} is {per_year:g}, but the baseline of {found.years} has only {counted_number(n_peaks, 'excursion')} "
-        f"followed by {counted_number(hold / DAY, 'day')} of quiet"
+        f"{name} is {per_year:g}, but the baseline of {found.years} has only {counted_number(n_peaks, 'peak')} of "
+        f"the damage index that {counted_number(hold / DAY, 'day')} of quiet follows"
     )
     if n_peaks < FEWEST_PEAKS:
         raise ValueError(f"{seen}; expected at least {FEWEST_PEAKS}")
     if per_year * found.n_years > n_peaks:
         per_year = n_peaks / found.n_years
-        warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-excursions")
+        warn_user(f"{seen}. The threshold is that of {per_year:.2g} a year", FewRecordsWarning, "few-peaks")
     asked = per_year * found.n_years
     tail = Tail.of(found.squares, asked, found.scales)
     usual, release = quiet_levels(known, hold, persistence)
@@ -386,7 +386,7 @@ def estimate_false_alarms(
     rule = EventRule(threshold, min(release, threshold), hold, persistence)
     lowest, highest = tail.numbers(asked, found.n_years)
     method = (
-        f"from the {tail.k + 1} highest of {len(found.squares)} excursions of the damage index in {found.years} of "
+        f"from the {tail.k + 1} highest of {len(found.squares)} peaks of the damage index in {found.years} of "
         "baseline" + (", extrapolated" if asked < FAR else "")
     )
     found.warn(tail, rule, per_year, None if smallest_at is None else smallest_at(rule.threshold))
@@ -444,8 +444,8 @@ class Excursions:
             warn_user(
                 f"at {counted_number(per_year, 'false alarm')} a year, {asked:.2g} events are expected in the "
                 f"{self.years} of the baseline; it should be {FAR} or more. The threshold {rule.threshold:.3g} is "
-                f"extrapolated from its excursions, the highest of them {highest:.3g}.{now} Use a longer baseline, or "
-                "allow more alarms a year",
+                f"extrapolated from the peaks of its damage index, the highest of them {highest:.3g}.{now} Use a "
+                "longer baseline, or allow more alarms a year",
                 FewRecordsWarning,
                 "extrapolated-threshold",
             )
@@ -460,12 +460,12 @@ class Excursions:
         if tail.has_outlier(DOUBTFUL):
             others = Tail.of(self.squares[1:], asked, self.scales).threshold(asked)
             warn_user(
-                f"the highest excursion of the baseline, {self.table['peak_time'].iloc[0]}, has a damage index of "
+                f"the highest peak of the baseline, {self.table['peak_time'].iloc[0]}, has a damage index of "
                 f"{highest:.3g}, the next {second:.3g}: chance explains that in fewer than {DOUBTFUL:.0%} of "
                 f"baselines. It raises the threshold from {others:.3g} to {rule.threshold:.3g}, which may hide damage. "
                 "Put NaN there if it is a fault or another state",
                 RecordsWarning,
-                "baseline-excursion",
+                "baseline-peak",
             )
 
 

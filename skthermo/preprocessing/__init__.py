@@ -1,4 +1,4 @@
-"""Preparing temperatures and frequencies: faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds.
+"""Preparing temperatures and frequencies: files, faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds.
 
 It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits go.
 """
@@ -8,6 +8,7 @@ from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
 from skthermo.preprocessing._past import ExponentialMeans, LagFeatures, MemoryFindings, find_memory
+from skthermo.preprocessing._read_records import read_records
 from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
 from skthermo.preprocessing.checks import (
     RecordFindings,
@@ -32,6 +33,7 @@ __all__ = [
     "SetAside",
     "check_records",
     "find_memory",
+    "read_records",
     "residual_trend",
     "set_aside",
 ]

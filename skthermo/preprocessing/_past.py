@@ -614,7 +614,7 @@ class MemoryFindings(SavesFrames):
     >>> from skthermo.preprocessing import find_memory
     >>> memory = find_memory([[4.0], [5.0]], [[2.1], [2.0]])
     >>> print(memory.summary())
-    No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough.
+    Earlier temperatures explain no more of the frequencies: their means do not lower the error in periods held out.
     >>> memory.fall
     0.0
     """
@@ -632,11 +632,14 @@ class MemoryFindings(SavesFrames):
             The means that explain the frequencies, and by how much the error falls.
         """
         if self.features is None:
-            return "No thermal memory found: means of earlier temperatures do not reduce the out-of-fold error enough."
+            return (
+                "Earlier temperatures explain no more of the frequencies: their means do not lower the error in "
+                "periods held out."
+            )
         means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
         return (
             "The frequencies depend on earlier temperatures: exponentially weighted means over "
-            f"{means} reduce the out-of-fold error by {self.fall:.0%}."
+            f"{means} lower the error in periods held out by {self.fall:.0%}."
         )
 
     @property
@@ -655,7 +658,8 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
         In degrees Celsius; NaN is allowed.
     frequencies : array-like or DataFrame of shape (n_samples, n_modes)
-        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed.
+        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed. A mode with fewer
+        than 100 values does not count, where others have more.
 
     Returns
     -------
@@ -704,7 +708,10 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     order = np.argsort(stamps, kind="stable")
     first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
     T, F = T[np.ix_(order, list(first.values()))], F[order]
-    usable = np.flatnonzero(~np.isnan(T).all(axis=1) & ~np.isnan(F).all(axis=1))
+    is_known = ~np.isnan(F) & ~np.isnan(T).all(axis=1)[:, np.newaxis]
+    is_scarce = is_known.sum(axis=0) < LEAST_ROWS  # modes that say nothing
+    F = np.where(is_scarce & ~is_scarce.all(), np.nan, F)
+    usable = np.flatnonzero(is_known[:, ~is_scarce | is_scarce.all()].any(axis=1))
     if len(usable) < LEAST_ROWS:
         return nothing
     return _Candidates(stamps[order], T, F, usable).findings(list(first), column_names(frequencies, "f"))

@@ -323,12 +323,14 @@ def unpredicted_text(
     if not unknown.any():
         return ""
     empty = np.isnan(weather).all(axis=1)
-    causes = {"without any temperature": unknown & empty, others: unknown & ~empty}
-    counts = ", ".join(f"{rows.sum()} {cause}" for cause, rows in causes.items() if rows.any())
-    return (
-        f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}. Give the records "
-        "before them, too, and a value of at least one sensor"
-    )
+    causes = {
+        "without any temperature": (unknown & empty, "A row needs a temperature of at least one sensor"),
+        others: (unknown & ~empty, "Lags need the records before a row: give these, too"),
+    }
+    found = {cause: one for cause, one in causes.items() if one[0].any()}
+    counts = ", ".join(f"{rows.sum()} {cause}" for cause, (rows, _) in found.items())
+    needed = ". ".join(need for _, need in found.values())
+    return f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}. {needed}"
 
 
 def _running_means(columns: Array, length: int) -> Array:

@@ -1779,6 +1779,16 @@ BY_NAME = {  # values with names, and a call that reads them by name
 }
 
 
+T.join(F).to_csv(FOLDER / "records.csv", index_label="time")
+use(
+    "preprocessing.read_records",
+    lambda **a: preprocessing.read_records(FOLDER / "records.csv", **a),
+    temperatures=(list(T), names(list(T))),
+    responses=(list(F), names(list(F))),
+    zone=("UTC", texts() | bad("Mars")),
+    stamps=("ISO8601", texts() | bad("%d.%m.%Y")),
+)
+
 NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
     "fem.Element": "a protocol",

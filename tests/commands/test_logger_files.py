@@ -4,16 +4,19 @@ import io
 import re
 import shutil
 import sys
+import warnings
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from skthermo._loggers.files import look_at
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
-from skthermo.commands._record_files import look_at
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
+from skthermo.preprocessing import read_records
 from tests.commands.folders import edit, run, write_day
 from tests.monitoring.nightly import FIRST as TWO_YEARS
 
@@ -397,6 +400,13 @@ def test_what_loggers_write_is_read_as_it_was_meant(kind, tmp_path):
     baseline, _ = read_baseline(files, settings.csv, settings.records)
     assert_read(baseline, one.truth)
     assert list(baseline) == list(one.truth)
+    chosen = {"temperatures": settings.records.temperatures, "responses": settings.records.responses}
+    chosen |= {name[2:]: value for name, value in pairwise(one.options) if name in ("--zone", "--stamps")}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*read-as")
+        T, F = read_records(*(tmp_path / name for name in one.files), **chosen)
+    assert_read(T.join(F), one.truth)
+    assert [list(T), list(F)] == [settings.records.temperatures, settings.records.responses]
 
 
 @pytest.mark.parametrize("kind", REFUSED)
@@ -436,6 +446,50 @@ def test_later_files_of_another_form_are_read_or_refused(kind, tmp_path):
         check_layout(read_columns(later, settings.csv, settings.records), later, settings.records, [])
     assert place in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+IN_CELLS = {
+    "dates": lambda stamp: stamp.to_pydatetime(),
+    "texts": lambda stamp: stamp.strftime(GERMAN),
+    "serial dates": lambda stamp: (stamp - pd.Timestamp("1899-12-30")) / pd.Timedelta("1D"),
+}
+
+
+@pytest.mark.parametrize("first", IN_CELLS)
+@pytest.mark.parametrize("then", IN_CELLS)
+def test_dates_serial_dates_and_texts_of_a_workbook_mean_the_same(first, then, tmp_path):
+    done, file = begin(workbook(in_cells(RECORDS, IN_CELLS[first])), tmp_path)
+    assert done.code == 0, done.err
+    settings = read_settings(file)
+    cells = in_cells(RECORDS, IN_CELLS[then])
+    cells[5:20] = in_cells(RECORDS, IN_CELLS["dates"])[5:20]
+    (later,) = write(workbook(cells), tmp_path)
+    assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
+
+
+@pytest.mark.parametrize("kind", IN_CELLS)
+def test_a_workbook_beside_a_text_of_another_form_is_read(kind, tmp_path):
+    text = log(rows(RECORDS[["T1"]], GERMAN, write=comma), ";", name="T.csv")
+    book = workbook(in_cells(RECORDS[["f1", "s1"]], IN_CELLS[kind]))
+    files = text.files | {"F.xlsx": book.files["log.xlsx"]}
+    for order in (files, dict(reversed(files.items()))):
+        place = tmp_path / next(iter(order))[0]
+        place.mkdir()
+        one = Log(order, RECORDS, ("--temperatures", "T1", "--responses", "f1", "s1"))
+        done, file = begin(one, place)
+        assert done.code == 0, done.err
+        settings = read_settings(file)
+        baseline, _ = read_baseline(list(map(settings.path, settings.records.baseline)), settings.csv, settings.records)
+        assert_read(baseline, RECORDS)
+
+
+@pytest.mark.parametrize("first", ["dates", "serial dates"])
+def test_days_and_months_of_later_texts_that_may_be_exchanged_are_refused(first, tmp_path):
+    _, file = begin(workbook(in_cells(LONE, IN_CELLS[first])), tmp_path)
+    settings = read_settings(file)
+    (later,) = write(workbook(in_cells(LONE, lambda stamp: stamp.strftime(US))), tmp_path)
+    with pytest.raises(ValueError, match=re.escape(str(later))):
+        read_columns(later, settings.csv, settings.records)
 
 
 def test_a_record_is_not_lost_where_a_later_file_has_no_units(tmp_path):

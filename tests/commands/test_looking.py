@@ -8,7 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from skthermo.commands._record_files import DAYS, CsvFormat, look_at, read_file
+from skthermo._loggers.files import DAYS, CsvFormat, look_at, read_file
+from skthermo.preprocessing import read_records
 from tests.commands.folders import run
 from tests.nights import by_day
 
@@ -78,6 +79,60 @@ def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
     assert [(fault["column"], fault["kind"]) for fault in said] == [("f2", "left out")]
 
 
+@pytest.mark.parametrize("command", ["fit", "update", "status"])
+@pytest.mark.parametrize("place", ["", "nowhere", "nowhere/monitor.toml"])
+def test_without_settings_the_command_that_makes_them_is_named(command, place, tmp_path):
+    done = run(command, tmp_path / place)
+    assert done.code == 3
+    folder = (tmp_path / place).parent if place.endswith(".toml") else tmp_path / place
+    assert f"skthermo init T.csv F.csv --into {folder}" in done.err
+    assert run("init", tmp_path / "T.csv", "--into", folder).code == 3
+
+
+def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
+    file, table = tmp_path / "records.csv", RECORDS.assign(RECORD=range(100, 180), empty=np.nan)
+    table.to_csv(file, index_label="time")
+    with pytest.warns(UserWarning, match="'RECORD'.*'empty'") as given:
+        T, F = read_records(str(file))
+    assert [one.message.kind for one in given] == ["read-as"]
+    expected = RECORDS.columns.tolist()
+    assert [list(T), list(F)] == [expected[:1], expected[1:]]
+    pd.testing.assert_frame_equal(T.join(F), RECORDS, check_freq=False, check_names=False, check_index_type=False)
+    other = tmp_path / "other.csv"
+    RECORDS[expected[1:]][10:].to_csv(other, index_label="time")
+    RECORDS[expected[:1]].to_csv(file, index_label="time")
+    with pytest.warns(UserWarning, match="unmatched-stamps"):
+        T, F = read_records(file, other)
+    assert T.index.equals(F.index)
+    assert len(T) == len(RECORDS) - 10
+
+
+@pytest.mark.parametrize(
+    "names",
+    [["Temperatur außen", "1. Eigenfrequenz"], ["Luft", "f_1"], ["air temperature", "Mode 1"], ["T1", "f1 [Hz]"]],
+)
+def test_columns_are_recognised_by_usual_names(names, tmp_path):
+    RECORDS.set_axis(names, axis=1).to_csv(tmp_path / "a.csv", index_label="time")
+    T, F = read_records(tmp_path / "a.csv")
+    assert [*T, *F] == names
+
+
+@pytest.mark.parametrize("zone", ["Mars", "../UTC", "Europe"])
+def test_a_time_zone_that_does_not_exist_is_refused_without_a_traceback(zone, tmp_path):
+    RECORDS.to_csv(tmp_path / "a.csv", index_label="time")
+    done = run("init", tmp_path / "a.csv", "--into", tmp_path / "b", "--zone", zone)
+    assert done.code == 3
+    assert len(done.err.splitlines()) == 1
+    assert zone in done.err
+
+
+def test_columns_that_cannot_be_used_are_named_where_others_are_lacking(tmp_path):
+    table = RECORDS.set_axis(["Luft", "f1"], axis=1)
+    table.assign(f1=table["f1"].map("{:.3f} Hz".format)).to_csv(tmp_path / "a.csv", index_label="time")
+    with pytest.raises(ValueError, match="'f1'"):
+        read_records(tmp_path / "a.csv")
+
+
 def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):
     table = RECORDS.set_axis(pd.date_range("2026-01-01", periods=80, freq="3h"))  # no day after the twelfth
     table.to_csv(tmp_path / "a.csv", date_format="%d/%m/%Y %H:%M")
@@ -136,7 +191,7 @@ def test_an_hour_that_does_not_exist_is_named(tmp_path):
         ("time,T1\n", "no columns"),
         ("a,b\nc,d\n", "no columns"),
         ("2026-01-01,1.5\n2026-01-02,1.5\n", "line of names"),
-        ("name,T1\nx,1.5\ny,1.5\n", "no column holds times"),
+        ("name,T1\nx,1.5\ny,1.5\n", "no column holds stamps"),
     ],
 )
 def test_what_is_no_table_of_records_is_an_error(tmp_path, text, expected):

@@ -7,6 +7,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.residuals.weather import unpredicted_text
 
 MODES = ["f1", "f2"]
 EFFECT = np.array([[-0.02, 0.01], [-0.03, -0.04], [0.0, -0.02]])
@@ -103,6 +104,14 @@ def test_one_warning_names_sensors_and_counts():
     assert "'girder' in 22 of 24 rows (standard deviation 0.93)" in str(given[0].message)
     assert "2 of 24 rows cannot be predicted and are NaN: 2 without any temperature" in str(given[1].message)
     np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [3, 4])
+
+
+def test_what_a_row_needs_is_said_of_its_own_cause_alone():
+    unknown, nothing, known = np.ones(2, dtype=bool), np.full((2, 1), np.nan), np.zeros((2, 1))
+    without, before = ((unpredicted_text(unknown, one)).split(". ")[1:] for one in (nothing, known))
+    both = unpredicted_text(unknown, np.array([[np.nan], [0.0]])).split(". ")[1:]
+    assert without != before
+    assert both == [*without, *before]
 
 
 @pytest.mark.one_case

@@ -24,7 +24,7 @@ SETTLED = 3 * PER_DAY  # records after which also a window of two days has to se
 KINDS = {"damage", "measurement or structure"}
 
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-excursion|not-evaluated)"
+    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-peak|not-evaluated)"
 )
 
 
@@ -436,7 +436,7 @@ def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(s
     assert monitor.threshold_ == expected.threshold_
 
 
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records|few-excursions)")
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records|few-peaks)")
 def test_a_column_that_says_nothing_is_left_out_and_named():
     records = truss()
     baseline = records[:N_BASELINE].assign(f2=records["f2"].iloc[0], T1=np.where(np.arange(N_BASELINE) % 4, 484.6, 5))

@@ -154,7 +154,7 @@ def test_an_index_that_is_mostly_zero_has_a_threshold():
     random = np.random.default_rng(5)
     index = pd.Series(np.maximum(random.normal(-1, 1, 365), 0.0), stamps(365))  # of one mode that can only fall
     assert index.max() / 2 < estimate_false_alarms(index, persistence=1).rule.threshold < 2 * index.max()
-    with pytest.raises(ValueError, match="excursion"):
+    with pytest.raises(ValueError, match="peak"):
         estimate_false_alarms(0 * index)
 
 
@@ -194,7 +194,7 @@ def test_a_threshold_far_beyond_the_baseline_is_said_to_be_one():
 
 def test_of_more_alarms_than_excursions_there_are_as_many_as_these():
     index = pd.Series(chi(np.random.default_rng(7), 365), stamps(365))
-    with pytest.warns(UserWarning, match=r"false_alarms_per_year is 500, .* only \d+ excursions .*few-excursions"):
+    with pytest.warns(UserWarning, match=r"false_alarms_per_year is 500, .* only \d+ peaks .*few-peaks"):
         many = estimate_false_alarms(index, 500.0)
     n_excursions = len(find_events(index, index.index, many.rule))
     assert many.expected == pytest.approx(n_excursions, rel=0.1)
@@ -209,7 +209,7 @@ def test_a_day_that_was_no_healthy_one_is_named():
     index = pd.Series(chi(np.random.default_rng(8), 365), stamps(365))
     spoilt = index.copy()
     spoilt.iloc[100] = 30.0
-    with pytest.warns(UserWarning, match="2025-04-11 00:00:00.* 30,.*baseline-excursion"):
+    with pytest.warns(UserWarning, match="2025-04-11 00:00:00.* 30,.*baseline-peak"):
         raised = estimate_false_alarms(spoilt)
     assert raised.rule.threshold > 2 * estimate_false_alarms(index).rule.threshold
 

@@ -21,7 +21,7 @@ pytestmark = [
         "extrapolated-threshold",
         "weather-of-one-fold",
         "few-baseline-records",
-        "baseline-excursion",
+        "baseline-peak",
         "not-evaluated",
     )
 ]

@@ -32,7 +32,7 @@ N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-excursion|not-evaluated)"
+    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-peak|not-evaluated)"
 )
 
 
@@ -263,6 +263,18 @@ def test_reasons_say_why_a_record_is_not_evaluated():
     ):
         _, answers, _ = fitted(name)
         assert answers.loc[answers["index"].isna(), "reason"].str.contains(reason).any() or name == "mean by number"
+
+
+@pytest.mark.parametrize("name", ["whitened, mean by time", "m of n"])
+def test_records_without_values_that_their_window_evaluates_are_named(name):
+    _, answers, _ = fitted(name, sensors=False)
+    seen = SERVICE.mask(SERVICE == -999)
+    lacking = seen[MODES].isna().all(axis=1) | seen.drop(columns=MODES).isna().all(axis=1)
+    lacking &= answers["index"].notna()
+    assert lacking.any()
+    said = answers["reason"].str.split("; ")
+    of_others = {one for reason in said[~lacking & answers["index"].notna()] for one in reason}
+    assert all(set(reason) - of_others for reason in said[lacking])
 
 
 def test_answers_do_not_keep_the_frequency_of_a_batch():

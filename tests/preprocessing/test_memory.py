@@ -49,7 +49,18 @@ def test_none_is_found_where_there_is_none(days, change):
     """A step or a trend is no memory."""
     found = find_memory(*bridge(1, days, **change))
     assert found.features is None
-    assert "No thermal memory" in found.summary()
+    assert found.summary()
+
+
+def test_a_mode_of_few_values_does_not_hide_the_memory_of_others():
+    T, F = bridge(0, 400, "40D")
+    expected = find_memory(T, F)
+    assert expected.features is not None
+    scarce = pd.Series(np.random.default_rng(0).normal(7, 0.1, len(F)), F.index)
+    found = find_memory(T, F.assign(f9=scarce.where(np.arange(len(F)) % 20 == 0)))
+    assert found.features.get_params() == expected.features.get_params()
+    assert found.fall == pytest.approx(expected.fall)
+    assert found.table.loc[found.table["mode"] == "f9", "fall"].isna().all()
 
 
 def test_the_truss_has_none():
@@ -86,8 +97,8 @@ def test_the_mean_halves_the_error_of_a_later_year():
 class TestChecks:
     def test_memory_is_named_and_no_step(self):
         findings = check_records(*bridge(5, 730, "40D")).table
-        assert set(findings["what"]) - {"frequency-outliers"} == {"thermal-memory"}
-        assert set(findings.loc[findings["what"] == "thermal-memory", "column"]) == {"air"}
+        assert set(findings["what"]) - {"frequency-outliers"} == {"slow-temperatures"}
+        assert set(findings.loc[findings["what"] == "slow-temperatures", "column"]) == {"air"}
 
     def test_a_step_beside_memory_stays_one(self):
         findings = check_records(*bridge(7, 730, "40D", step=-0.02)).table

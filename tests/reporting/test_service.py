@@ -2,6 +2,7 @@
 
 import copy
 import re
+from collections import Counter
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from skthermo.monitoring import Monitor
 from skthermo.monitoring._threshold import SmallestChanges
 from skthermo.reporting import owner_report
 from skthermo.reporting.service import Standing, monitor_facts
+from skthermo.reporting.service._page import _columns
 from tests.reporting.monitors import FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page, section_of, written
 
@@ -110,7 +112,7 @@ def test_it_says_what_the_real_monitor_says(page, real):
     event = monitor.events_.iloc[-1]
     start = event["start"]
     assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"
-    assert f"modes that drive it: {event['modes']}." in page.text
+    assert f": {event['modes']}." in page.text
     assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not evaluated." in page.text
     assert f"There was no record on 4 of 80{SPACE}days." in page.text
     assert "Slow drift is not followed" in page.text
@@ -164,6 +166,23 @@ def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
     assert f"{number:,} ({share_text(number / 180)}) were not evaluated" in page.text
     assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
     assert page.cells == [str(number), "2"]
+
+
+def test_records_that_were_evaluated_with_a_remark_are_counted():
+    monitor = FakeMonitor()
+    before = Counter(re.findall(r"\d+", today_of(monitor).text))
+    month = monitor.evaluations_.index > monitor.last_ - pd.Timedelta("31D")
+    rows = monitor.evaluations_.index[month & (monitor.evaluations_["state"] != "not evaluated")][3:10]
+    monitor.evaluations_.loc[rows, "reason"] = "no temperature has a value"
+    assert Counter(re.findall(r"\d+", today_of(monitor).text)) - before == {str(len(rows)): 1}
+    assert str(len(rows)) in part_of(monitor, "not_evaluated").cells
+
+
+def test_a_unit_that_is_in_the_name_of_a_column_is_said_once():
+    monitor = FakeMonitor()
+    monitor.units_ = {"T1 [°C]": "°C", "f1 (Hz)": "Hz", "f2": "Hz"}
+    monitor.targets_ = ["f1 (Hz)", "f2"]
+    assert _columns(monitor) == {"responses": ["f1 (Hz)", "f2 (Hz)"], "temperatures": ["T1 [°C]"]}
 
 
 def test_a_new_baseline_after_a_change_of_the_structure_is_said():

@@ -373,8 +373,8 @@ class Exports:
             row = int(np.argmax(less))
             raise ValueError(
                 f"{self.file}: {total!r} is {whole.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of "
-                f"{list(terms)}; expected a total of the stiffness, stiffness=... that says which matrices are terms, "
-                "or total=False if none is the total"
+                f"{list(terms)}; expected a total of the stiffness, factor=2.0 if each of these is the whole with one "
+                "modulus doubled, stiffness=... that says which matrices are terms, or total=False if none is the total"
             )
         if not is_meant:
             self._warn(

@@ -189,7 +189,8 @@ class _Records:
         if len(share) and (share < NOTHING).all() and not self.has_faulty_sensors:
             usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
             detail = (
-                f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, out of fold, in {len(usable)} rows"
+                f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, in periods held out, in {len(usable)} "
+                "rows"
             )
             yield Finding.of(self.index, "no-thermal-effect", "", usable, detail)
             return
@@ -287,11 +288,12 @@ class _Records:
                 mean = trailing_means(times, self.T[:, [self.sensors.index(sensor)]], length)
                 before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
                 detail = (
-                    f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the out-of-fold error "
-                    f"by {part['fall'].mean():.0%}: ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
+                    f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the error "
+                    f"in periods held out by {part['fall'].mean():.0%}: "
+                    f"ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
                 )
                 inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-                yield Finding.of(self.index, "thermal-memory", sensor, usable, detail), inputs
+                yield Finding.of(self.index, "slow-temperatures", sensor, usable, detail), inputs
 
     def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> Finding | None:
         """Temperatures of other rows, if they explain clearly more than those of the row and its past."""
@@ -319,8 +321,8 @@ class _Records:
             hours = abs(shift) * self.hours
             length = f" (about {hours:.3g} hours)" if hours < 48 else f" (about {hours / 24:.3g} days)"
         detail = (
-            f"those of {abs(shift)} rows {direction}{length} explain {shifted:.0%} of the variance out of fold, those "
-            f"of the same rows {unshifted:.0%}"
+            f"those of {abs(shift)} rows {direction}{length} explain {shifted:.0%} of the variance in periods held "
+            f"out, those of the same rows {max(unshifted, 0.0):.0%}"
         )
         return Finding.of(self.index, "time-shift", "", rows, detail)
 

@@ -70,7 +70,7 @@ WARNINGS = {
     "temperatures-are-frequencies": "a column stands in both tables: {}. The frequency would predict itself and hide "
     "all damage. Give temperatures only in the first table",
     "number-of-modes": "frequencies and model have different numbers of modes: {}. A column would be read as another "
-    "mode. Give a column for each mode of the model, or the model with_modes of the columns",
+    "mode. Give a column for each mode of the model, or model.with_modes of those that match_modes finds",
     "unit-of-frequencies": "frequencies are in another unit than the model's: {}. Changes of the frequencies would be "
     "wrong by that factor. Convert them to Hz",
     "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as those of another mode or "
@@ -86,7 +86,7 @@ WARNINGS = {
     "frequency-outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}. "
     "Those that cannot be are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
-    "thermal-memory": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
+    "slow-temperatures": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
     "taken for changes of the structure. Append these means to the inputs of the regression",
     "sudden-change": "frequencies change at once by what the weather does not explain: {}. Both levels would be "
     "learned as healthy. Fit on records of one structure, in one state and by one way of identification",

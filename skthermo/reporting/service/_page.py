@@ -39,5 +39,6 @@ def _columns(monitor: Monitor) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {"responses": [], "temperatures": []}
     for name, unit in monitor.units_.items():
         kind = "responses" if name in set(monitor.targets_) else "temperatures"
-        found[kind].append(f"{name} ({unit})" if unit else f"{name}")
+        says_it = f"[{unit}]" in str(name) or f"({unit})" in str(name)
+        found[kind].append(f"{name}" if says_it or not unit else f"{name} ({unit})")
     return found

@@ -175,6 +175,12 @@ class Standing:
         return int(days["n_records"].sum()), int(days["n_evaluated"].sum())
 
     @property
+    def n_doubtful(self) -> int:
+        """How many of the records of that month that were evaluated have a remark."""
+        recent = self.evaluations[self.evaluations.index > self.last - MONTH]
+        return int(((recent["state"] != "not evaluated") & (recent["reason"] != "")).sum())
+
+    @property
     def newest(self) -> Row | None:
         """The newest record, if it was evaluated."""
         rows = rows_of(self.evaluations.tail(1))

@@ -680,7 +680,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     def _look_at(self, T: Table, F: Table, given: tuple[Table, Table]) -> RecordFindings:
         """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
-        mended = {"frequency-outliers"} | ({"thermal-memory"} if self.mapper is None else set())
+        mended = {"frequency-outliers"} | ({"slow-temperatures"} if self.mapper is None else set())
         findings = findings_of(partial(known_findings, self.memory), *given, mended=mended)
         warn_each([*misplaced_columns(T, F), *mode_warnings(self.model, F)])
         self.sensors_ = SensorRegression.of(T)

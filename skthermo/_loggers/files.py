@@ -31,7 +31,9 @@ STAMP_TEXTS = {
 PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
 BINARY = (*PARQUET, *WORKBOOKS)
 ENDINGS = (".csv", ".txt", ".dat", ".tsv", *BINARY)
-NO_VALUE = re.compile(r"|-+|#.*|n/?a|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE)
+NO_VALUE = re.compile(
+    r"|-+|#.*|n/?a|k\.? ?a\.?|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE
+)
 BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
@@ -323,6 +325,8 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
             "offset from UTC; expected all or none"
         )
     index = parsed_or_iso(texts, form.stamps)
+    if file.suffix.lower() in WORKBOOKS:
+        index = _otherwise_written(texts, index, form.stamps, file)
     is_wrong = np.array(index.isna())
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
@@ -361,6 +365,21 @@ def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     if iso.notna().any() and (iso.tz is None) == (index.tz is None):
         times.iloc[others] = iso
     return pd.DatetimeIndex(times)
+
+
+def _otherwise_written(texts: Sequence[str], index: pd.DatetimeIndex, form: str, file: Path) -> pd.DatetimeIndex:
+    """Stamps of a workbook, where dates, serial dates and texts mean the same: those that are none in its format read
+    by the only other one that they may have. Texts in two formats might be days and months that are exchanged."""
+    others = np.flatnonzero(index.isna())
+    rows = [[texts[place]] for place in others]
+    for forms in (WRITTEN if form in (ISO, EXCEL) else (), (EXCEL,)) if rows else ():
+        if fitting := _fitting(rows, (0,), forms):
+            times = index.to_series(index=range(len(index)))
+            found = _times_in(rows, (0,), _certain(rows, (0,), fitting, file)[0])
+            if (found.tz is None) == (index.tz is None):
+                times.iloc[others] = found
+            return pd.DatetimeIndex(times)
+    return index
 
 
 def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
@@ -537,7 +556,7 @@ def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> 
         if found:
             return found[0][0], *_certain(rows, *found[0], file)
     expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
-    raise ValueError(f"{file}: no column holds times, {expected}; the first values are {list(*rows[:1])!r:.200}")
+    raise ValueError(f"{file}: no column holds stamps, {expected}; the first values are {list(*rows[:1])!r:.200}")
 
 
 def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
