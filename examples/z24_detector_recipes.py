@@ -1,10 +1,13 @@
-"""The field's detectors on Z24: measured rates beside simulated ones, and the choice that simulation makes."""
+"""Detectors on Z24: measured rates beside simulated ones, and the choice that simulation makes."""
 
 import pandas as pd
 from detector_recipes import field_detectors
+from sklearn.pipeline import make_pipeline
 from z24_recipes import FREQUENCIES, Records, bridge_model, chain
 
+from skthermo.detection import DirectionalDetector, TemperatureCompensator
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
+from skthermo.surrogate import TemperatureMapper
 
 ASSUMED = {"soil": 0.18}  # damage that one may have expected of a pier that is to be lowered
 DAMAGED = "pier lowered"
@@ -13,8 +16,15 @@ FIRST = 12  # damaged records that another publication counts as healthy
 
 
 def detectors():
-    """The field's detectors by name; the chain is among those that compensate temperature."""
-    return field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
+    """The field's detectors by name, and those that know in which directions damage moves frequencies."""
+    model = bridge_model()
+    found = field_detectors(FREQUENCIES, chain(model), block="1D")
+    for name, directions in {"softening": "softening", "directions of the model": model}.items():
+        for label, whiten in {"": None, ", whitened": "local"}.items():
+            compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES, whiten=whiten)
+            last = DirectionalDetector(directions)
+            found[f"piecewise-linear, {name}{label}"] = make_pipeline(compensator, last)
+    return found
 
 
 def columns_of(name):
