@@ -312,7 +312,7 @@ def main():
             missed = is_missed(shipped[WRONG[kind].title])
     if options.wrong != ["nothing"]:
         table = pd.DataFrame({title: summary(rows) for title, rows in shipped.items()}).T.astype({"choices": int})
-        shown(f"{where}: the choice where the simulation is wrong", table)
+        shown(f"{where}: what the choice is worth where the simulation is wrong", table)
     print(f"\n{(time.perf_counter() - began) / n_seeds / len(shipped):.0f} s for each seed")
     print("missed: within 2 points of the best, at less than 5 % false alarms" if missed else "all targets met")
     return int(missed)

@@ -50,11 +50,14 @@ def timing(options, quick=None, **more):
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
+WRONG = "stiffness both aligned damage white lasting louder"
 PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py", **Z24),
     "directions-wrong": Part("directions.py --parts wrong"),
     "detector-choice": Part("detector_choice.py"),
+    "detector-choice-wrong": Part(f"detector_choice.py --seeds 3 --wrong {WRONG}"),
+    "detector-choice-kw51": Part("detector_choice.py --structure kw51 --seeds 3 --repeats 3"),
     "z24-detectors": Part("z24_detectors.py", **Z24),
     "plain-call": Part("plain_call.py --first-seed 200", **Z24),
     "plain-call-others": Part("plain_call.py --first-seed 100", **Z24),
@@ -68,7 +71,7 @@ PARTS = {
     "record-defects": Part("record_defects.py"),
     "slow-memory": Part("slow_memory.py"),
     "service-records": Part("service_records.py --seeds 2"),
-    "study-bands": Part("study_bands.py --replicates 10 --calibrated --first-seed 1"),
+    "study-bands": Part("study_bands.py"),
     "smallest-losses": Part("directions.py --parts smallest"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
