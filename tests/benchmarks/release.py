@@ -50,13 +50,13 @@ def timing(options, quick=None, **more):
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
-WRONG = "stiffness both aligned damage white lasting louder"
+WRONG = "both aligned damage white lasting louder"
 PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py", **Z24),
     "directions-wrong": Part("directions.py --parts wrong"),
     "detector-choice": Part("detector_choice.py"),
-    "detector-choice-wrong": Part(f"detector_choice.py --seeds 3 --wrong {WRONG}"),
+    "detector-choice-wrong": Part(f"detector_choice.py --seeds 2 --wrong {WRONG}"),
     "detector-choice-kw51": Part("detector_choice.py --structure kw51 --seeds 3 --repeats 3"),
     "z24-detectors": Part("z24_detectors.py", **Z24),
     "plain-call": Part("plain_call.py --first-seed 200", **Z24),

@@ -84,7 +84,7 @@ class Truss:
 
     seed: int
     states = states(TRUSS_STATES)
-    realisations = 8
+    realisations = 6
     is_calibrated = False
     detectors = ("raw", "compensated")
     noise = 0.01
@@ -110,7 +110,7 @@ class Footbridge:
 
     seed: int
     states = states(FOOTBRIDGE_STATES)
-    realisations = 5
+    realisations = 3
     is_calibrated = True
     detectors = ("compensated",)
     noise = Measured.noise
@@ -140,7 +140,7 @@ class Girder:
 
     seed: int
     states = states(GIRDER_STATES)
-    realisations = 10
+    realisations = 8
     is_calibrated = True
     detectors = ("compensated",)
 
@@ -265,7 +265,7 @@ def main():
     options = arguments(
         __doc__,
         structures=STRUCTURES,
-        realisations=(int, "of each structure; 8 of the truss, 5 of the footbridge, 10 girders by default"),
+        realisations=(int, "of each structure; 6 of the truss, 3 of the footbridge, 8 girders by default"),
         first_seed=0,
         jobs=1,
     )
