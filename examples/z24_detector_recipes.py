@@ -16,14 +16,14 @@ FIRST = 12  # damaged records that another publication counts as healthy
 
 
 def detectors():
-    """The field's detectors by name, and those that know in which directions damage moves frequencies."""
+    """The field's detectors by name, and those that know how damage moves frequencies, of piecewise-linear residuals."""
     model = bridge_model()
     found = field_detectors(FREQUENCIES, chain(model), block="1D")
     for name, directions in {"softening": "softening", "directions of the model": model}.items():
         for label, whiten in {"": None, ", whitened": "local"}.items():
             compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES, whiten=whiten)
             last = DirectionalDetector(directions)
-            found[f"piecewise-linear, {name}{label}"] = make_pipeline(compensator, last)
+            found[f"{name}{label}"] = make_pipeline(compensator, last)
     return found
 
 
