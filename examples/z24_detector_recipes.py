@@ -16,7 +16,7 @@ FIRST = 12  # damaged records that another publication counts as healthy
 
 
 def detectors():
-    """The field's detectors by name, and those that know how damage moves frequencies, of piecewise-linear residuals."""
+    """The field's detectors by name, and directional ones of piecewise-linear residuals."""
     model = bridge_model()
     found = field_detectors(FREQUENCIES, chain(model), block="1D")
     for name, directions in {"softening": "softening", "directions of the model": model}.items():
