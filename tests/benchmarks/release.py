@@ -55,7 +55,7 @@ PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py", **Z24),
     "directions-wrong": Part("directions.py --parts wrong"),
-    "detector-choice": Part("detector_choice.py"),
+    "detector-choice": Part("detector_choice.py --seeds 10"),
     "detector-choice-wrong": Part(f"detector_choice.py --seeds 2 --wrong {WRONG}"),
     "detector-choice-kw51": Part("detector_choice.py --structure kw51 --seeds 3 --repeats 3"),
     "z24-detectors": Part("z24_detectors.py", **Z24),
