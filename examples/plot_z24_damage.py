@@ -4,7 +4,7 @@ Z24: where the damage is
 
 :doc:`plot_z24_detection` finds the damage that was done to the Z24 bridge. Here the detector looks at parameters of an
 FE model in place of frequencies, and the parameter that changes says where. Then the damage that explains the shift of
-all four modes is identified, with its uncertainty, and put into the FE model: for 22 detectors, the rates of alarms
+all four modes is identified, with its uncertainty, and put into the FE model: for 26 detectors, the rates of alarms
 that a simulation predicts are compared with the measured ones. At last, simulation chooses a detector before any
 damage.
 
@@ -220,7 +220,7 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 
 # %%
 # .. image:: /images/z24_detectors.png
-#    :alt: Rates of alarms of 22 detectors, measured as dots on simulated bands: false alarms from 0 to 24 %, damage
+#    :alt: Rates of alarms of 26 detectors, measured as dots on simulated bands: false alarms from 0 to 24 %, damage
 #          found from 3 to 98 %; nearly every dot lies in its band or at its end
 #
 # All measured false alarms lie in their bands, 21 of 22 rates of damage found do, and the detectors stand in nearly the
