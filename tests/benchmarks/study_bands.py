@@ -8,9 +8,8 @@ measured in each state, and the user's own detectors evaluate it. Structures:
 
 - the truss of the thermo-mechanical law (four zones of temperature that no multiplier of a group follows exactly),
   with the right FE model, and with one of which two groups are 5 % too stiff or too soft;
-- the footbridge, whose FE model has 16 beams for 44 and every stiffness 3 to 5 % off, calibrated by `ModelUpdater`;
 - girders of `make_fleet`, one in each realisation, with the user's model of each, whose stiffnesses are 2 to 5 % off,
-  calibrated.
+  calibrated by `ModelUpdater`.
 
 Counted are states of which the predicted share is between 5 and 95 %: of the others, nearly every band holds. The exit
 code is 1 if the default's bands cover less than 85 or more than 95 % of them, by more than twice the sampling error.
@@ -23,10 +22,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, shown, split
+from harness import arguments, compensated, shown
 from joblib import Parallel, delayed
-from structures import FOOTBRIDGE_GROUPS, footbridge
-from structures import Footbridge as Measured
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
@@ -43,24 +40,12 @@ OFF = 0.05
 DEVIATION = 0.005
 """Relative deviation of a mean measured frequency from that of a perfect model, as a user may state it."""
 
-COARSE = [0.0, 3.75, 7.5, 11.25, 15.0, 19.5, 24.0, 28.5, 33.0, 37.5, 42.0, 46.5, 51.0, 54.75, 58.5, 62.25, 66.0]
-"""Nodes of the deck in the user's model, m: those of the stays and of the supports, and one between."""
-
-EVERY = Measured.per_day  # records of the footbridge: one a day
 TRUSS_STATES = {
     "bottom": (0.06, 0.1, 0.14, 0.2),
     "top": (0.08, 0.14, 0.2, 0.26),
     "diagonal": (0.03, 0.05, 0.08, 0.11),
     "bottom and top": (0.04, 0.07, 0.1, 0.14),
 }
-FOOTBRIDGE_STATES = {
-    "side span": (0.03, 0.05, 0.08, 0.12),
-    "main stays": (0.01, 0.02, 0.03, 0.05),
-    "bearings": (0.03, 0.05, 0.08, 0.12),
-    "side span and backstays": (0.02, 0.04, 0.06, 0.1),
-}
-
-
 GIRDER_STATES = {
     "girder": (0.01, 0.02, 0.04, 0.07),
     "first span": (0.02, 0.04, 0.07, 0.12),
@@ -105,42 +90,12 @@ class Truss:
 
 
 @dataclass
-class Footbridge:
-    """One realisation of the footbridge, and a coarse model of wrong stiffnesses."""
-
-    seed: int
-    states = states(FOOTBRIDGE_STATES)
-    realisations = 3
-    is_calibrated = True
-    detectors = ("compensated",)
-    noise = Measured.noise
-
-    def __post_init__(self):
-        self.bridge = Measured(self.seed)
-
-    def year(self):
-        records = self.bridge.training(False)[::EVERY]
-        return split(records)
-
-    def later(self, number, damage):
-        records = self.bridge.evaluated(damage)[::EVERY]
-        return split(records)
-
-    def models(self):
-        random = np.random.default_rng(self.seed)
-        off = 1 + random.uniform(0.03, 0.05, len(FOOTBRIDGE_GROUPS)) * random.choice([-1, 1], len(FOOTBRIDGE_GROUPS))
-        structure = footbridge(stations=COARSE, stiffness=dict(zip(FOOTBRIDGE_GROUPS, off, strict=True)))
-        model = structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(Measured.modes), track=True)
-        return {"footbridge, calibrated model": model.reduced(0.7, random_state=0)}
-
-
-@dataclass
 class Girder:
     """One girder, and the model that its owner has."""
 
     seed: int
     states = states(GIRDER_STATES)
-    realisations = 8
+    realisations = 10
     is_calibrated = True
     detectors = ("compensated",)
 
@@ -258,14 +213,14 @@ def by_winter(found):
     return pd.DataFrame(rows).T.astype({"girders": int, "rates": int, "girders with false alarms in bands": int})
 
 
-STRUCTURES = {"truss": Truss, "footbridge": Footbridge, "girder": Girder}
+STRUCTURES = {"truss": Truss, "girder": Girder}
 
 
 def main():
     options = arguments(
         __doc__,
         structures=STRUCTURES,
-        realisations=(int, "of each structure; 6 of the truss, 3 of the footbridge, 8 girders by default"),
+        realisations=(int, "of each structure; 6 of the truss, 10 girders by default"),
         first_seed=0,
         jobs=1,
     )
