@@ -114,7 +114,7 @@ def agreement(table):
     return pd.DataFrame(rows).T
 
 
-def choose(bridge, candidates=None, n_repeats=10, ahead=True):
+def choose(bridge, candidates=None, n_repeats=10, ahead=True, memory=None):
     """A study of all damage groups, from training rows and simulation alone, to choose a detector by.
 
     The chain has learned all training rows. Detectors learn the first three quarters of them, and evaluate the weather
@@ -125,7 +125,13 @@ def choose(bridge, candidates=None, n_repeats=10, ahead=True):
     n = 3 * len(T) // 4 if ahead else len(T)
     fem = chain(bridge_model()).fit(T, F)
     study = DetectabilityStudy(
-        fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0, uncertainty="noise"
+        fem,
+        candidates or detectors(),
+        sweep(fem),
+        n_repeats=n_repeats,
+        uncertainty="noise",
+        random_state=0,
+        memory=memory,
     )
     study.run(T[n:] if ahead else T[::4], T.join(F)[:n])
     return study

@@ -82,12 +82,13 @@ def main():
             FORESIGHT: comparison.compare_before_damage(bridge, candidates=candidates, **kept),
             NEARER: comparison.compare(bridge, fem, assumed, candidates, **kept),
         }
+        ways = (True, False)
+        study, learned = (comparison.choose(bridge, candidates, ahead=ahead, memory=memory) for ahead in ways)
     tables = {kind: comparison.side_by_side(one) for kind, one in results.items()}
     rows, campaigns = agreements(tables), f"{options.repeats} simulated campaigns"
     shown(f"Z24, {campaigns}: how well simulated and measured rates of alarms agree", rows, 3)
     shown(f"Z24: percent of records in alarm, measured and mean of {campaigns}", beside_each_other(tables), 1)
     measured = tables[HINDSIGHT].xs("measured", axis=1, level=1)
-    study, learned = (comparison.choose(bridge, candidates, ahead=ahead) for ahead in (True, False))
     chosen, first = choices(study, learned, measured)
     shown("Z24: detectors chosen, and measured percent of records in alarm", chosen, 1)
     shown("Z24: the first eight by simulation, of those with at most 2 % false alarms; percent of records", first, 1)
