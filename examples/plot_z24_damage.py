@@ -266,8 +266,8 @@ print(percent.head(8).round(1).to_string())
 #
 # Whitened residuals in the directions of the model come first. On the real damage they find 91.5 % at 0.5 % false
 # alarms. The best, whitened residuals that only look for falls, find 92.3 %, and 20 neighbours of raw frequencies
-# 91.5 % at 1.2 %. A detector with the model's directions has an advantage here, as the simulated damage has them, too. A
-# margin of 1 or 2 points, with bounds that include noise alone, is no reason to choose.
+# 91.5 % at 1.2 %. A detector with the model's directions has an advantage here, as the simulated damage has them, too.
+# A margin of 1 or 2 points, with bounds that include noise alone, is no reason to choose.
 #
 # The weather is ahead of the baseline on purpose: in weather that they have learned
 # (``choose(bridge, candidates, ahead=False)``), a local outlier factor of the raw frequencies keeps the limit, and it
