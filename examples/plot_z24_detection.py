@@ -71,8 +71,9 @@ print(f"{len(records.damaged)} after damage began. Every detector is asked for 2
 # The field's detectors
 # ---------------------
 # "Raw" ones see frequencies only. For the others, a :class:`~skthermo.detection.TemperatureCompensator` explains the
-# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals, the
-# residuals; "whitened", residuals are divided by their spread in similar weather. Each threshold comes from the
+# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals;
+# "whitened", residuals are divided by their spread in similar weather. "Softening" and "directions of the model" are a
+# :class:`~skthermo.detection.DirectionalDetector` of piecewise-linear residuals. Each threshold comes from the
 # baseline by one rule: its records are scored by what was learned without them and without their neighbours in time.
 # (:doc:`plot_detectors` explains each detector.) The last two columns count as others do: another publication takes the
 # first 12 of the damaged records for healthy.
@@ -106,6 +107,10 @@ print(measured_table(records, candidates).round(1).to_string())
 #    piecewise-linear, isolation forest           0.0          12.3                     0.0                    13.6
 #    piecewise-linear, 20 neighbours              0.0          88.5                     0.0                    97.5
 #    conditional covariance                       1.6          90.8                     8.3                    99.2
+#    softening                                    0.4          90.8                     0.0                   100.0
+#    softening, whitened                          0.5          92.3                    16.7                   100.0
+#    directions of the model                      0.2          90.8                     0.0                   100.0
+#    directions of the model, whitened            0.5          91.5                     8.3                   100.0
 #
 # This damage can be seen without thermometers: an isolation forest and the distance to the 20th nearest neighbour, on
 # raw frequencies, find as many records as residuals that are whitened, at 0.4 and 1.2 % false alarms. The paper's

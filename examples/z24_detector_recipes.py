@@ -1,10 +1,13 @@
-"""The field's detectors on Z24: measured rates beside simulated ones, and the choice that simulation makes."""
+"""Detectors on Z24: measured rates beside simulated ones, and the choice that simulation makes."""
 
 import pandas as pd
 from detector_recipes import field_detectors
+from sklearn.pipeline import make_pipeline
 from z24_recipes import FREQUENCIES, Records, bridge_model, chain
 
+from skthermo.detection import DirectionalDetector, TemperatureCompensator
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
+from skthermo.surrogate import TemperatureMapper
 
 ASSUMED = {"soil": 0.18}  # damage that one may have expected of a pier that is to be lowered
 DAMAGED = "pier lowered"
@@ -13,8 +16,15 @@ FIRST = 12  # damaged records that another publication counts as healthy
 
 
 def detectors():
-    """The field's detectors by name; the chain is among those that compensate temperature."""
-    return field_detectors(FREQUENCIES, chain(bridge_model()), block="1D")
+    """The field's detectors by name, and directional ones of piecewise-linear residuals."""
+    model = bridge_model()
+    found = field_detectors(FREQUENCIES, chain(model), block="1D")
+    for name, directions in {"softening": "softening", "directions of the model": model}.items():
+        for label, whiten in {"": None, ", whitened": "local"}.items():
+            compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES, whiten=whiten)
+            last = DirectionalDetector(directions)
+            found[f"{name}{label}"] = make_pipeline(compensator, last)
+    return found
 
 
 def columns_of(name):
@@ -104,7 +114,7 @@ def agreement(table):
     return pd.DataFrame(rows).T
 
 
-def choose(bridge, candidates=None, n_repeats=10, ahead=True):
+def choose(bridge, candidates=None, n_repeats=10, ahead=True, memory=None):
     """A study of all damage groups, from training rows and simulation alone, to choose a detector by.
 
     The chain has learned all training rows. Detectors learn the first three quarters of them, and evaluate the weather
@@ -115,7 +125,13 @@ def choose(bridge, candidates=None, n_repeats=10, ahead=True):
     n = 3 * len(T) // 4 if ahead else len(T)
     fem = chain(bridge_model()).fit(T, F)
     study = DetectabilityStudy(
-        fem, candidates or detectors(), sweep(fem), n_repeats=n_repeats, random_state=0, uncertainty="noise"
+        fem,
+        candidates or detectors(),
+        sweep(fem),
+        n_repeats=n_repeats,
+        uncertainty="noise",
+        random_state=0,
+        memory=memory,
     )
     study.run(T[n:] if ahead else T[::4], T.join(F)[:n])
     return study

@@ -393,6 +393,13 @@ def origin_of(table: Any) -> Origin | None:
     return origin if shape == values.shape else None
 
 
+def of_origin(table: Table, origin: Origin | None) -> Table:
+    """A table that was read from a file, and its origin with it, so that `origin_of` knows it."""
+    if origin is None or origin_of(table) is not None:
+        return table
+    return frame_like(table, with_origin(np.array(table, dtype=float), origin))
+
+
 def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
     """Mean over the values that are there, from the logarithm of the density of each row; NaN without any value.
 

@@ -318,7 +318,8 @@ class DirectionalDetector(MahalanobisDetector):
             raise ValueError(
                 "the records are neither frequencies (some are not positive) nor residuals of a TemperatureCompensator "
                 "directly before, so that it is not known by how much a relative change of a frequency moves each "
-                "column; expected frequencies in Hz, or a pipeline in which the detector follows the compensator"
+                "column; expected frequencies in Hz, or a pipeline without a memory of its own, in which the detector "
+                "follows the compensator"
             )
         return np.ones(F.shape[1])
 
@@ -329,7 +330,8 @@ class DirectionalDetector(MahalanobisDetector):
             raise ValueError(
                 f"the means of the columns are {np.round(levels, 3).tolist()}, the frequencies of the model "
                 f"{np.round(expected, 3).tolist()} Hz; expected frequencies in Hz, most within a factor of {FAR_OFF:g} "
-                "of the model's, or a pipeline in which the detector follows the compensator"
+                "of the model's, or a pipeline without a memory of its own, in which the detector follows the "
+                "compensator"
             )
 
     def _projected(self, records: Records) -> tuple[Array, Array, Array]:

@@ -50,6 +50,7 @@ def timing(options, quick=None, **more):
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
+WRONG = "both aligned damage white lasting louder"
 PARTS = {
     "readme-study": Part("readme_study.py", "--years 1"),
     "truss": Part("truss_tables.py", "--seeds 1"),
@@ -61,7 +62,9 @@ PARTS = {
     "whitening": Part("whitening.py", **Z24),
     "thresholds": Part("detection_thresholds.py"),
     "own-kind": Part("own_kind.py", **Z24),
-    "detector-choice": Part("detector_choice.py"),
+    "detector-choice": Part("detector_choice.py --seeds 10"),
+    "detector-choice-wrong": Part(f"detector_choice.py --seeds 2 --wrong {WRONG}"),
+    "detector-choice-kw51": Part("detector_choice.py --structure kw51 --seeds 3 --repeats 3"),
     "z24-detectors": Part("z24_detectors.py", **Z24),
     "plain-call": Part("plain_call.py --first-seed 200", **Z24),
     "plain-call-others": Part("plain_call.py --first-seed 100", **Z24),
@@ -75,7 +78,7 @@ PARTS = {
     "record-defects": Part("record_defects.py"),
     "slow-memory": Part("slow_memory.py"),
     "service-records": Part("service_records.py --seeds 2"),
-    "study-bands": Part("study_bands.py --replicates 10 --calibrated --first-seed 1"),
+    "study-bands": Part("study_bands.py"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),

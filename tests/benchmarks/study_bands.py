@@ -1,4 +1,4 @@
-"""Coverage of a study's prediction intervals for a measured campaign, with the right FE model and with a wrong one.
+"""How often a study's bands contain the rates of alarms of one more measured year.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/study_bands.py
 
@@ -8,18 +8,11 @@ measured in each state, and the user's own detectors evaluate it. Structures:
 
 - the truss of the thermo-mechanical law (four zones of temperature that no multiplier of a group follows exactly),
   with the right FE model, and with one of which two groups are 5 % too stiff or too soft;
-- the footbridge, whose FE model has 16 beams for 44 and every stiffness 3 to 5 % off;
-- girders of `make_fleet`, one in each realisation, with the user's model of each, whose stiffnesses are 2 to 5 % off.
+- girders of `make_fleet`, one in each realisation, with the user's model of each, whose stiffnesses are 2 to 5 % off,
+  calibrated by `ModelUpdater`.
 
-Bands: of the noise alone; with other weather; with other training records too, of all replicates and of as many as a
-study has by default; with an ensemble of models, too, ``models=updater.sample_models(20)``. The model is calibrated to
-the mean of the records by `ModelUpdater`, or only its offset is removed ("aligned").
-
-States of which the predicted share is between 5 and 95 % are counted apart: of the others, nearly every band holds.
-States of such a measured share are counted, too, but they are a biased choice. Of the states predicted to be nearly
-always or never detected, it takes only those in which the prediction was wrong. The exit code is 1 if intervals by
-default, or those of the ensemble, cover less than 85 or more than 95 % of partly detected states, by more than twice
-the sampling error of the share.
+Counted are states of which the predicted share is between 5 and 95 %: of the others, nearly every band holds. The exit
+code is 1 if the default's bands cover less than 85 or more than 95 % of them, by more than twice the sampling error.
 """
 
 import sys
@@ -29,10 +22,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, split
+from harness import arguments, compensated, shown
 from joblib import Parallel, delayed
-from structures import FOOTBRIDGE_GROUPS, footbridge
-from structures import Footbridge as Measured
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
@@ -42,31 +33,19 @@ from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 from skthermo.updating import ModelUpdater
 
 CONFIDENCE, WANTED = 0.9, (85, 95)
-DEFAULT_REPLICATES = 10  # of a study
 PARTLY = (0.05, 0.95)
-PARTS = ("noise", "weather", "baseline", "model")
+COLDER = 1.0  # degrees below the coldest record that was learned, from which on weather counts as colder
+DEFAULT = "default"
 OFF = 0.05
 DEVIATION = 0.005
 """Relative deviation of a mean measured frequency from that of a perfect model, as a user may state it."""
 
-COARSE = [0.0, 3.75, 7.5, 11.25, 15.0, 19.5, 24.0, 28.5, 33.0, 37.5, 42.0, 46.5, 51.0, 54.75, 58.5, 62.25, 66.0]
-"""Nodes of the deck in the user's model, m: those of the stays and of the supports, and one between."""
-
-EVERY = Measured.per_day  # records of the footbridge: one a day
 TRUSS_STATES = {
     "bottom": (0.06, 0.1, 0.14, 0.2),
     "top": (0.08, 0.14, 0.2, 0.26),
     "diagonal": (0.03, 0.05, 0.08, 0.11),
     "bottom and top": (0.04, 0.07, 0.1, 0.14),
 }
-FOOTBRIDGE_STATES = {
-    "side span": (0.03, 0.05, 0.08, 0.12),
-    "main stays": (0.01, 0.02, 0.03, 0.05),
-    "bearings": (0.03, 0.05, 0.08, 0.12),
-    "side span and backstays": (0.02, 0.04, 0.06, 0.1),
-}
-
-
 GIRDER_STATES = {
     "girder": (0.01, 0.02, 0.04, 0.07),
     "first span": (0.02, 0.04, 0.07, 0.12),
@@ -90,6 +69,8 @@ class Truss:
 
     seed: int
     states = states(TRUSS_STATES)
+    realisations = 6
+    is_calibrated = False
     detectors = ("raw", "compensated")
     noise = 0.01
 
@@ -105,38 +86,7 @@ class Truss:
         right, random = make_truss(), np.random.default_rng(self.seed)
         theta = np.ones(4)
         theta[random.choice(3, 2, replace=False)] += OFF * random.choice([-1, 1], 2)
-        return {"right": right, "wrong": right.rescaled(theta)}
-
-
-@dataclass
-class Footbridge:
-    """One realisation of the footbridge, and a coarse model of wrong stiffnesses."""
-
-    seed: int
-    states = states(FOOTBRIDGE_STATES)
-    detectors = ("compensated",)
-    noise = Measured.noise
-
-    def __post_init__(self):
-        self.bridge = Measured(self.seed)
-
-    def year(self):
-        records = self.bridge.training(False)[::EVERY]
-        return split(records)
-
-    def later(self, number, damage):
-        records = self.bridge.evaluated(damage)[::EVERY]
-        return split(records)
-
-    def models(self):
-        random = np.random.default_rng(self.seed)
-        off = 1 + random.uniform(0.03, 0.05, len(FOOTBRIDGE_GROUPS)) * random.choice([-1, 1], len(FOOTBRIDGE_GROUPS))
-        structure = footbridge(stations=COARSE, stiffness=dict(zip(FOOTBRIDGE_GROUPS, off, strict=True)))
-        return {
-            "wrong": structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(Measured.modes), track=True).reduced(
-                0.7, random_state=0
-            )
-        }
+        return {"truss, right model": right, "truss, wrong model": right.rescaled(theta)}
 
 
 @dataclass
@@ -145,6 +95,8 @@ class Girder:
 
     seed: int
     states = states(GIRDER_STATES)
+    realisations = 10
+    is_calibrated = True
     detectors = ("compensated",)
 
     def __post_init__(self):
@@ -161,7 +113,7 @@ class Girder:
         return campaign.temperatures, campaign.frequencies
 
     def models(self):
-        return {"wrong": self.bridge.model}
+        return {"girders, calibrated models": self.bridge.model}
 
 
 def chain(model, noise, T, F):
@@ -178,138 +130,117 @@ def detector(name, columns):
     return compensated(columns)
 
 
-def predicted(fem, T, F, real, measured, models, options):
-    """A study, and its bands by kind: (detector, state) -> (lowest, highest).
-
-    The study evaluates measured records, too, so that a record without the modes that a detector needs counts in
-    neither rate.
-    """
-    scenarios = [Scenario("healthy"), *(Scenario(name, damage) for name, damage in real.states.items())]
-    study = DetectabilityStudy(
-        fem,
-        {name: detector(name, list(F.columns)) for name in real.detectors},
-        scenarios,
-        uncertainty=PARTS if models else PARTS[:-1],
-        models=models,
-        n_replicates=options.replicates,
-        random_state=real.seed,
-    )
-    study.run(T, T.join(F), reference=measured, confidence=CONFIDENCE)
-    keys = list(study.replicates_.rates)
-    bands = {"noise": {}, "weather": {}, "weather, baseline": {}, "default": {}}
-    found = study.replicates_
-
-    def of_first(n_replicates, n_parts):
-        rates = {key: steps[:n_replicates, :n_parts] for key, steps in found.rates.items()}
-        return replace(found, parts=found.parts[:n_parts], rates=rates)
-
-    for key in keys:
-        draws = found.rates[key][:, -1]  # two in each replicate
-        of_noise = found.own[key].mean() + np.sqrt(2) * (draws - draws.mean(axis=1, keepdims=True))
-        bands["noise"][key] = np.quantile(of_noise, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], method="weibull")
-        bands["weather"][key] = of_first(options.replicates, 1).prediction_interval(key, CONFIDENCE)
-        bands["weather, baseline"][key] = of_first(options.replicates, 2).prediction_interval(key, CONFIDENCE)
-        bands["default"][key] = of_first(DEFAULT_REPLICATES, 2).prediction_interval(key, CONFIDENCE)
-    if models:
-        bands["all"] = {key: found.prediction_interval(key, CONFIDENCE) for key in keys}
-    return study, bands
+def bands(study):
+    """Bands by kind: (detector, state) -> (lowest, highest)."""
+    found, of_noise = study.replicates_, {}
+    ends = (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2
+    for key, rates in found.rates.items():
+        draws = rates[:, -1]  # two in each replicate
+        alone = found.own[key].mean() + np.sqrt(2) * (draws - draws.mean(axis=1, keepdims=True))
+        of_noise[key] = np.quantile(alone, ends, method="weibull")
+    first = {key: rates[:, :1] for key, rates in found.rates.items()}
+    kinds = {"noise, weather": replace(found, parts=found.parts[:1], rates=first), DEFAULT: found}
+    of_others = {
+        kind: {key: some.prediction_interval(key, CONFIDENCE) for key in some.rates} for kind, some in kinds.items()
+    }
+    return {"noise alone": of_noise} | of_others
 
 
-def realisation(kind, seed, options):
-    """One row for each model, calibration, band, detector and state."""
+def realisation(kind, seed):
+    """One row for each model, band, detector and state."""
     warnings.simplefilter("ignore")
     real, rows, began = kind(seed), [], time.process_time()
-    if options.quick:
-        real.states = dict(list(real.states.items())[1::2])
-        real.detectors = real.detectors[:1]
     T, F = real.year()
-    damages = {"healthy": {}, **real.states}
-    years = {state: real.later(number, damage) for number, (state, damage) in enumerate(damages.items())}
-    measured = {state: new_T.join(new_F) for state, (new_T, new_F) in years.items()}
+    scenarios = [Scenario("healthy"), *(Scenario(name, damage) for name, damage in real.states.items())]
+    years = {one.name: real.later(number, one.damage) for number, one in enumerate(scenarios)}
+    coldest, later = (float(one.min().mean()) for one in (T, years["healthy"][0]))
     for name, model in real.models().items():
-        own_models = [] if options.calibrated else [(False, model, None)]
-        if not options.aligned:
+        if real.is_calibrated:
             updater = ModelUpdater(model, bounds=0.6, prior=0.15).fit(F, frequency_std=DEVIATION * F.mean())
-            number = 0 if options.without_ensemble else options.replicates
-            ensemble = updater.sample_models(number, random_state=seed) if number else None
-            own_models.append((True, updater.model_, ensemble))
-        for calibrated, own, models in own_models:
-            if name == "right" and not (calibrated or options.aligned):
-                continue
-            study, kinds = predicted(chain(own, real.noise, T, F), T, F, real, measured, models, options)
-            rates = study.results_.set_index(["source", "detector", "scenario"])["rate"]
-            for band, found in kinds.items():
-                for key, (lowest, highest) in found.items():
-                    row = {"model": name, "calibrated": calibrated, "band": band, "detector": key[0], "state": key[1]}
-                    predicted_rate, truth = rates["simulated"][key], rates["reference"][key]
-                    rows.append(row | {"rate": predicted_rate, "low": lowest, "high": highest, "truth": truth})
-    coldest = [f"{one.min().mean():.1f}" for one in (T, years["healthy"][0])]
+            model = updater.model_
+        detectors = {name: detector(name, list(F.columns)) for name in real.detectors}
+        fem = chain(model, real.noise, T, F)
+        study = DetectabilityStudy(fem, detectors, scenarios, uncertainty="auto", random_state=real.seed)
+        measured = {state: new_T.join(new_F) for state, (new_T, new_F) in years.items()}
+        study.run(T, T.join(F), reference=measured, confidence=CONFIDENCE)  # of records that detectors can evaluate
+        rates = study.results_.set_index(["source", "detector", "scenario"])["rate"]
+        for band, found in bands(study).items():
+            for key, (low, high) in found.items():
+                row = {"model": name, "seed": seed, "band": band, "state": key[1], "low": low, "high": high}
+                row |= {"rate": rates["simulated"][key], "truth": rates["reference"][key]}
+                rows.append(row | {"colder": coldest - later > COLDER})
     spent = f"{time.process_time() - began:.0f} s of one core"
-    print(f"  {kind.__name__}, seed {seed}: coldest {coldest[0]} C, {coldest[1]} C when measured; {spent}", flush=True)
-    return pd.DataFrame(rows).assign(seed=seed)
+    print(f"  {kind.__name__}, seed {seed}: coldest {coldest:.1f} C, {later:.1f} C when measured; {spent}", flush=True)
+    return pd.DataFrame(rows)
 
 
 def table(found):
-    """Shares that intervals cover, in percent, by model, calibration and kind of band."""
+    """Shares of measured rates in the bands, in percent; by model for states that are partly detected."""
+    found["held"] = (found["low"] - 1e-9 <= found["truth"]) & (found["truth"] <= found["high"] + 1e-9)
+    found["width"], is_healthy = found["high"] - found["low"], found["state"] == "healthy"
+    counted = found[~is_healthy & found["rate"].between(*PARTLY)]
     rows = {}
-    for key, part in found.groupby(["model", "calibrated", "band"], sort=False):
-        damaged = part[part["state"] != "healthy"]
-        partly = damaged[damaged["rate"].between(*PARTLY)]
-        by_seed = held(partly).groupby(partly["seed"]).mean()
-        rows[(key[0], "calibrated" if key[1] else "aligned", key[2])] = {
-            "partly detected": len(partly),
-            "held": 100 * held(partly).mean(),
-            "+-": 100 * by_seed.std() / np.sqrt(len(by_seed)),
-            "too high": 100 * (partly["truth"] < partly["low"] - 1e-9).mean(),
-            "too low": 100 * (partly["truth"] > partly["high"] + 1e-9).mean(),
-            "width": 100 * (partly["high"] - partly["low"]).mean(),
-            "error of the rate": 100 * np.sqrt(((partly["rate"] - partly["truth"]) ** 2).mean()),
-            "partly, as measured": 100 * held(damaged[damaged["truth"].between(*PARTLY)]).mean(),
-            "all states": 100 * held(damaged).mean(),
-            "false alarms": 100 * held(part[part["state"] == "healthy"]).mean(),
+    for name, part in counted.groupby("model", sort=False):
+        kinds = {band: 100 * some["held"].mean() for band, some in part.groupby("band", sort=False)}
+        default = part[part["band"] == DEFAULT]
+        healthy = found[is_healthy & (found["model"] == name) & (found["band"] == DEFAULT)]
+        by_seed = default.groupby("seed")["held"].mean()
+        rows[name] = {
+            "rates": len(default),
+            **kinds,
+            "standard error": 100 * by_seed.std() / np.sqrt(len(by_seed)),
+            "width, default": 100 * default["width"].mean(),
+            "false alarms, default": 100 * healthy["held"].mean(),
         }
-    return pd.DataFrame(rows).T
+    return pd.DataFrame(rows).T.astype({"rates": int})
 
 
-def held(rows):
-    """Whether each band holds the truth."""
-    return (rows["low"] - 1e-9 <= rows["truth"]) & (rows["truth"] <= rows["high"] + 1e-9)
+def by_winter(found):
+    """Rates of the girders in the default's bands, and false alarms, by what their training winter was like."""
+    rows = {}
+    girders = found[found["model"].str.startswith("girders") & (found["band"] == DEFAULT)]
+    for is_colder, part in girders.groupby("colder"):
+        healthy = part[part["state"] == "healthy"]
+        counted = part[(part["state"] != "healthy") & part["rate"].between(*PARTLY)]
+        rows[f"measured winter {'more than 1' if is_colder else 'at most 1'} °C colder than the learned one"] = {
+            "girders": part["seed"].nunique(),
+            "rates": len(counted),
+            "in bands, %": 100 * counted["held"].mean(),
+            "false alarms, predicted, %": 100 * healthy["rate"].mean(),
+            "measured, %": 100 * healthy["truth"].mean(),
+            "girders with false alarms in bands": int(healthy["held"].sum()),
+        }
+    return pd.DataFrame(rows).T.astype({"girders": int, "rates": int, "girders with false alarms in bands": int})
 
 
-STRUCTURES = {"truss": Truss, "footbridge": Footbridge, "girder": Girder}
+STRUCTURES = {"truss": Truss, "girder": Girder}
 
 
 def main():
     options = arguments(
         __doc__,
         structures=STRUCTURES,
-        realisations=(20, "of each structure"),
-        replicates=(20, "of each study, and models of each ensemble"),
+        realisations=(int, "of each structure; 6 of the truss, 10 girders by default"),
         first_seed=0,
         jobs=1,
-        quick=(False, "half of the states, and one detector"),
-        aligned=(False, "models as they are, without an ensemble"),
-        calibrated=(False, "calibrated models alone"),
-        without_ensemble=(False, "and no bands of all uncertainty"),
     )
-    numbers = range(options.first_seed, options.first_seed + options.realisations)
+    began, jobs = time.perf_counter(), []
+    for kind in (STRUCTURES[name] for name in options.structures):
+        numbers = range(options.first_seed, options.first_seed + (options.realisations or kind.realisations))
+        jobs += [delayed(realisation)(kind, seed) for seed in numbers]
+    found = pd.concat(Parallel(n_jobs=options.jobs)(jobs), ignore_index=True)
+    shares = table(found)
+    shown("Measured rates of alarms, and percent of them in bands of 90 %", shares, 1)
+    if (found["model"].str.startswith("girders")).any():
+        shown("Girders whose measured winter is colder than the one that was learned, and others", by_winter(found), 1)
+    print(f"  {time.perf_counter() - began:.0f} s in all")
     missed = 0
-    for name in options.structures:
-        began, kind = time.perf_counter(), STRUCTURES[name]
-        jobs = (delayed(realisation)(kind, seed, options) for seed in numbers)
-        found = pd.concat(Parallel(n_jobs=options.jobs)(jobs), ignore_index=True)
-        print(
-            f"\n{name}: {len(numbers)} realisations, {found['state'].nunique() - 1} states, bands of 90 %; in percent"
-        )
-        shares = table(found)
-        print(shares.round(1).to_string())
-        print(f"  {time.perf_counter() - began:.0f} s in all")
-        for key, row in shares[shares.index.get_level_values(2).isin(["default", "all"])].iterrows():
-            of_independent = 100 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / row["partly detected"])
-            margin = 2 * np.nanmax([row["+-"], of_independent])
-            met = WANTED[0] - margin <= row["held"] <= WANTED[1] + margin
-            missed += not met
-            print(f"{'met' if met else 'MISSED':7} {', '.join(key)}: {row['held']:.0f} % held, target {WANTED}")
+    for name, row in shares.iterrows():
+        of_independent = 100 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / row["rates"])
+        margin = 2 * np.nanmax([row["standard error"], of_independent])
+        met = WANTED[0] - margin <= row[DEFAULT] <= WANTED[1] + margin
+        missed += not met
+        print(f"{'met' if met else 'MISSED':7} {name}: {row[DEFAULT]:.0f} % held, target {WANTED}")
     return 1 if missed else 0
 
 

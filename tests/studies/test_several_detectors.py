@@ -13,6 +13,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import (
+    DirectionalDetector,
     FusedDetector,
     MahalanobisDetector,
     OutlierDetector,
@@ -159,6 +160,7 @@ class CountedForest(IsolationForest):
 def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
     forest = OutlierDetector(CountedForest(n_estimators=10))
     several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
+    several["falls"] = compensated(DirectionalDetector())  # which has to know what residuals are made of
     without = study_of(fem, several, SCENARIOS)
     without.run(WEATHER, SIDE_BY_SIDE)
     once = CountedForest.n_fits

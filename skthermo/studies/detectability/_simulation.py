@@ -25,6 +25,7 @@ from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._validation import _num_samples, last_step, seed_parts
 from skthermo.detection import DamageDetector
+from skthermo.detection._base import Origin, of_origin, origin_of
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
 from skthermo.surrogate import FittedChain
@@ -164,8 +165,13 @@ class Candidate:
             before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
             begins = before.steps[:-1], healthy
 
+            def transformed() -> tuple[Pipeline, Table, Origin | None]:
+                rows = before.fit_transform(healthy)
+                return before, rows, origin_of(rows)
+
             def learn() -> tuple[Pipeline, Table]:
-                return remembered(memory, "head", lambda: (before, before.fit_transform(healthy)), begins)
+                known, rows, origin = remembered(memory, "steps", transformed, begins)
+                return known, of_origin(rows, origin)
 
             before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
             head = tuple(step for _, step in before.steps[:-1])
