@@ -16,7 +16,7 @@ CHOSEN = {
     "accuracy": "0.5 1 2 5 10 20 30 90",
     "accuracy_costs": "5 30",
     "accuracy_detection": "0.3 0.95 2 20 40 50",
-    "accuracy_studies": "95",
+    "accuracy_studies": "2 5 10 20 30 90 95",
 }
 INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
