@@ -70,7 +70,7 @@ PARTS = {
     "service-records": Part("service_records.py --seeds 2"),
     "study-bands": Part("study_bands.py --replicates 10 --calibrated --first-seed 1"),
     "smallest-losses": Part("directions.py --parts smallest"),
-    "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
+    "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),
