@@ -48,7 +48,6 @@ def timing(options, quick=None, **more):
 
 
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
-FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
@@ -58,7 +57,12 @@ PARTS = {
     "z24-detectors": Part("z24_detectors.py", **Z24),
     "plain-call": Part("plain_call.py --first-seed 200", **Z24),
     "plain-call-others": Part("plain_call.py --first-seed 100", **Z24),
-    "fleet-prior": Part(FLEET),
+    "sensors": Part("monitor_sensors.py", **Z24),
+    "drift": Part("parameter_drift.py"),
+    "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
+    "fleet-prior": Part("fleet_prior.py --members frequencies"),
+    "fleet-prior-models": Part("fleet_prior.py --days 15 30 60"),
+    "fleet-monitors": Part("fleet_monitor.py"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss --boxes 0.3"),
@@ -71,6 +75,7 @@ PARTS = {
     "study-bands": Part("study_bands.py --replicates 10 --calibrated --first-seed 1"),
     "smallest-losses": Part("directions.py --parts smallest"),
     "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid"),
+    "nightly-call": timing("nightly_jobs.py", "--nights 1 --bridges 2"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),
