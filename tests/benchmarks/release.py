@@ -62,6 +62,7 @@ PARTS = {
     "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
     "fleet-prior": Part("fleet_prior.py --members frequencies"),
     "fleet-prior-models": Part("fleet_prior.py --days 15 30 60"),
+    "fleet-unlike": Part("fleet_real.py", needs="tower"),
     "fleet-monitors": Part("fleet_monitor.py", "--kinds girder --fleet 8 --new 1 --days 30"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
