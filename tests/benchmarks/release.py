@@ -63,7 +63,7 @@ PARTS = {
     "fleet-prior": Part("fleet_prior.py --members frequencies"),
     "fleet-prior-models": Part("fleet_prior.py --days 15 30 60"),
     "fleet-unlike": Part("fleet_real.py", needs="tower"),
-    "fleet-monitors": Part("fleet_monitor.py", "--kinds girder --fleet 8 --new 1 --days 30"),
+    "fleet-monitors": Part("fleet_monitor.py"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss --boxes 0.3"),
