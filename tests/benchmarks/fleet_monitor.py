@@ -194,8 +194,8 @@ def main():
     options = arguments(
         __doc__,
         kinds=(["girder", "truss"], None, list(DAMAGED)),
-        fleet=(20, "bridges of each kind with a year of records"),
-        new=(6, "new bridges of each kind"),
+        fleet=(15, "bridges of each kind with a year of records"),
+        new=(5, "new bridges of each kind"),
         days=list(DAYS),
         seed=0,
     )
