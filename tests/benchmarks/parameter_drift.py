@@ -185,7 +185,7 @@ PARTS = {"tracked": tracked_table, "monitor": monitor_table}
 
 
 def main():
-    options = arguments(__doc__, parts=PARTS, seeds=12)
+    options = arguments(__doc__, parts=PARTS, seeds=6)
     missed = [PARTS[part](options.seeds) for part in options.parts]
     return int(any(missed))
 
