@@ -48,7 +48,6 @@ def timing(options, quick=None, **more):
 
 
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
-FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
 BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 WRONG = "both aligned damage white lasting louder"
 PARTS = {
@@ -68,7 +67,11 @@ PARTS = {
     "z24-detectors": Part("z24_detectors.py", **Z24),
     "plain-call": Part("plain_call.py --first-seed 200", **Z24),
     "plain-call-others": Part("plain_call.py --first-seed 100", **Z24),
-    "fleet-prior": Part(FLEET),
+    "sensors": Part("monitor_sensors.py", **Z24),
+    "drift": Part("parameter_drift.py --parts tracked"),
+    "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
+    "fleet-prior": Part("fleet_prior.py --members frequencies"),
+    "fleet-monitors": Part("fleet_monitor.py"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss --boxes 0.3"),
@@ -79,7 +82,8 @@ PARTS = {
     "slow-memory": Part("slow_memory.py"),
     "service-records": Part("service_records.py --seeds 2"),
     "study-bands": Part("study_bands.py"),
-    "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
+    "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid"),
+    "nightly-call": timing("nightly_jobs.py --nights 3", "--nights 1 --bridges 2"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),

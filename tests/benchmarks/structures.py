@@ -5,7 +5,7 @@
   the core of the deck, and bearings that stiffen as they freeze move its frequencies, and noise that lasts.
 - `slow_soil`: a girder whose soil follows the weather slowly.
 - `Campaign`: records of one of `KNOWN` structures, and a chain that has learned them; later records with damage.
-- `AGEING`: campaigns of bridges that age for years, and chains that learn from their first year.
+- `AgeingTruss`: campaigns of a truss that ages for years, and chains that learn from their first year.
 """
 
 from collections import defaultdict
@@ -16,18 +16,18 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import scipy.io
-from harness import DATA, KW51_NOISE, autoregression, joined
+from harness import DATA, autoregression, joined
 from scipy.signal import lfilter
 from scipy.special import ndtri
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
-from skthermo.datasets import kw51_sensors, make_kw51, make_kw51_campaign, make_truss, make_truss_campaign
+from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
 from skthermo.datasets._fleet_site import Law, SiteClimate, drawn_by_hour, persistent, stream
 from skthermo.datasets._kw51_campaign import memory
 from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure, add_noise, load_affine
 from skthermo.preprocessing import BiasAligner, LagFeatures
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 STEEL = {"E": 210e9, "G": 81e9, "density": 7850.0}
 
@@ -595,7 +595,6 @@ KNOWN = {
 class AgeingTruss:
     """Daily records with 1 % of noise."""
 
-    name = "truss"
     groups = ("bottom", "top", "diagonal")
 
     def campaign(self, n_years, seed, correlation=0.0, **changes):
@@ -614,31 +613,3 @@ class AgeingTruss:
         return DataInformedFEM(
             make_truss(), inverse=PosteriorInverse(noise=0.01), aligner="passthrough", random_state=0
         )
-
-
-class AgeingKW51:
-    """Records every six hours, with gaps, from when there is a temperature."""
-
-    name = "KW51"
-    groups = ("arch", "girders", "braces", "plate", "arch_connections")
-    first, year, every = 1236, 8766, 6
-
-    def campaign(self, n_years, seed, correlation=0.0, **changes):
-        options = {"n_hours": self.first + n_years * self.year, "retrofit": False, "random_state": 100 + seed}
-        records = joined(make_kw51_campaign(correlation=correlation, **options, **changes))
-        return records[self.first :: self.every], int(np.ceil(self.year / self.every))
-
-    def chain(self):
-        model = kw51_reduced()
-        mapper = make_pipeline(LagFeatures(24 // self.every, freq=f"{self.every}h"), TemperatureMapper())
-        options = {"inverse": PosteriorInverse(noise=KW51_NOISE), "aligner": BiasAligner(model)}
-        return DataInformedFEM(model, mapper=mapper, **options, random_state=0)
-
-
-@cache
-def kw51_reduced():
-    """The updated model, reduced."""
-    return make_kw51(updated=True).reduced(0.3, tol=5e-5, random_state=0)
-
-
-AGEING = {"truss": AgeingTruss, "KW51": AgeingKW51}
