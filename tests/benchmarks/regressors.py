@@ -1,6 +1,6 @@
 """Regressors as inverse surrogate M1 and as temperature mapper M2, by the recipes of ``examples/plot_regressors.py``.
 
-    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/regressors.py
+OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/regressors.py
 """
 
 import numpy as np

@@ -64,7 +64,7 @@ PARTS = {
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss --boxes 0.3"),
     "updating": Part("updating.py", **FRAME),
-    "updating-lbfgs": Part("updating.py --method lbfgs", **FRAME),
+    "interval-coverage": Part("interval_coverage.py"),
     "record-checks": Part("record_checks.py", **Z24),
     "record-defects": Part("record_defects.py"),
     "slow-memory": Part("slow_memory.py"),
