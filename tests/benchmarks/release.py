@@ -62,7 +62,7 @@ PARTS = {
     "fleet-prior": Part(FLEET),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
-    "shapes": Part("shape_inputs.py", "--rows 20 --models truss --boxes 0.3"),
+    "shapes": Part("shape_inputs.py", "--rows 20 --models truss"),
     "updating": Part("updating.py", **FRAME),
     "interval-coverage": Part("interval_coverage.py"),
     "record-checks": Part("record_checks.py", **Z24),
