@@ -15,7 +15,7 @@ def mean_of(tables, column):
 
 
 def main():
-    options = arguments(__doc__, seeds=3)
+    options = arguments(__doc__, seeds=2)
     seeds, size = range(options.seeds), page.FULL
     models, inverse = page.structures(), {}
     for noise in (0.0, 0.005):
