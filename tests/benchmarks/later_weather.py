@@ -28,7 +28,7 @@ def tower(log):
     page = str(EXAMPLES / "plot_your_own_structure.py")
     with mock.patch.object(sys, "argv", [page, str(log)]), contextlib.redirect_stdout(io.StringIO()):
         found = runpy.run_path(page)
-    n_train, n_records = found["n_train"], len(found["T"])
+    n_train, n_records = found["n_train"], len(found["history"])
     return (n_train, n_records - n_train), found["errors"], found["held"].mean()
 
 
