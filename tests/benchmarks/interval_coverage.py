@@ -46,7 +46,7 @@ def row(correlation, repeats):
 
 
 def main():
-    options = arguments(__doc__, repeats=10, correlations=[0.0, 0.5, 0.9, 0.98])
+    options = arguments(__doc__, repeats=5, correlations=[0.0, 0.5, 0.9, 0.98])
     rows = {f"{correlation:g}": row(correlation, options.repeats) for correlation in options.correlations}
     title = f"Frequencies of a later year in their 90 % intervals; truss, 1 % noise, {options.repeats} repeats"
     shown(title, pd.DataFrame(rows).T.rename_axis("correlation from day to day"), 1)

@@ -60,7 +60,7 @@ def poles(accelerations, *, order=None, quick=None, br=20, ref_ind=REFERENCES, m
 
 
 def main():
-    options = arguments(__doc__, records=(12, "for each setting"), settings=SETTINGS)
+    options = arguments(__doc__, records=(8, "for each setting"), settings=SETTINGS)
 
     truss = make_truss()
     f, phi = truss.modes(np.ones((1, 4)))

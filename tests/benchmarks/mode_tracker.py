@@ -92,7 +92,7 @@ def ways(records, reference, max_shift):
 def main():
     from harness import arguments, shown  # which tests that import this do not have
 
-    n_records = arguments(__doc__, records=1000).records
+    n_records = arguments(__doc__, records=300).records
     rows = {}
     for n_sensors, noise, mixes in [
         (12, 0.3, 8),
@@ -110,7 +110,7 @@ def main():
         name = f"{n_sensors} sensors, shape noise {noise:.0%}{'' if mixes == 8 else ', spurious poles like two modes'}"
         rows[name] = {way: right(poles, true) for way, poles in found.items()}
     for n_sensors in (16, 5):
-        records, true, reference = z24_poles(min(n_records, 400), n_sensors, 0.2)
+        records, true, reference = z24_poles(n_records, n_sensors, 0.2)
         found = {"shapes": ModeTracker(reference).fit_transform(records).poles, "sorting": by_sorting(records, 4)}
         name = f"FE model of Z24, {n_sensors} sensors, shape noise 20%"
         rows[name] = {way: right(poles, true) for way, poles in found.items()}

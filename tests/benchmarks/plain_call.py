@@ -164,7 +164,7 @@ STRUCTURES = {"truss": truss, "bridges": bridges, "frozen": frozen}
 
 
 def main():
-    options = arguments(__doc__, structures=STRUCTURES, first_seed=200, seeds=(3, "of campaigns"), bridges=6)
+    options = arguments(__doc__, structures=STRUCTURES, first_seed=200, seeds=(3, "of campaigns"), bridges=4)
     rows = [pd.Series(case.errors()) for name in options.structures for case in STRUCTURES[name](options)]
     table = pd.concat(rows).rename_axis(["records", "state", "way"]).groupby(level=[0, 1, 2], sort=False).mean()
     shown("Error of the frequencies of a later year, %, by one setting", table.unstack("way", sort=False), 3)

@@ -31,7 +31,7 @@ from skthermo.monitoring import Monitor, track_parameters
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 PER_DAY = 4
-SHARES = (5, 50)
+SHARES = (20,)
 DEFECTS = {
     "size": "far too large",
     "sign": "other sign",
