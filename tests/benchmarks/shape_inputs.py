@@ -41,8 +41,10 @@ def errors(parameter, full, model, bounds, dofs, options):
     shapes = {"dofs": dofs, "shape_noise": options.shape_noise}
     for inputs, X, more in (("frequencies", F, {}), ("frequencies and shapes", both, shapes)):
         found = PosteriorInverse(model, **settings, **more).fit(X).invert(X)
-        row[f"error from {inputs}, %"] = 100 * np.abs(found.theta / theta - 1)[:, column].mean()
-        held = 100 * (np.abs(found.theta - theta) < 1.645 * found.std).mean(axis=0)
+        known = found.converged
+        row[f"error from {inputs}, %"] = 100 * np.abs(found.theta / theta - 1)[known, column].mean()
+        row[f"not converged from {inputs}"] = str((~known).sum())
+        held = 100 * (np.abs(found.theta - theta) < 1.645 * found.std)[known].mean(axis=0)
     return row | {"parameters in 90 % intervals, %": f"{held.min():.0f} to {held.max():.0f}"}
 
 
