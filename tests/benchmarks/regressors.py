@@ -15,14 +15,14 @@ def mean_of(tables, column):
 
 
 def main():
-    options = arguments(__doc__, seeds=2)
+    options = arguments(__doc__, seeds=1)
     seeds, size = range(options.seeds), page.FULL
     models, inverse = page.structures(), {}
     for noise in (0.0, 0.005):
         for name, (model, bounds, network) in models.items():
             tables = [page.inverse_results(model, bounds, network, noise, seed, size) for seed in seeds]
             inverse[f"{name}, {noise:.1%} noise" if noise else f"{name}, no noise"] = mean_of(tables, "error")
-    shown(f"M1: error of the parameters, %; {options.seeds} seeds", pd.DataFrame(inverse), "3g")
+    shown(f"M1: error of the parameters, %; seeds: {options.seeds}", pd.DataFrame(inverse), "3g")
     campaigns = {
         "truss": lambda seed: page.truss_campaign(seed, size),
         "KW51": lambda seed: page.kw51_campaign(models["KW51"][0], seed, size),
@@ -39,9 +39,9 @@ def main():
         for word, sign in (("hotter", 1), ("colder", -1)):
             truth = np.nan if law is None else page.beyond(law, given[0].train[0], sign)
             beyond[f"{name}, {word}"] = pd.concat([pd.Series({"truth": truth}), mean_of(tables, f"20 °C {word}")])
-    shown(f"A chain by its M1: error of later frequencies, %; {options.seeds} seeds", pd.DataFrame(chains), "3g")
+    shown(f"A chain by its M1: error of later frequencies, %; seeds: {options.seeds}", pd.DataFrame(chains), "3g")
     shown(
-        f"A chain by its M2, and the same regressor direct: error of later frequencies, %; {options.seeds} seeds",
+        f"A chain by its M2, and the same regressor direct: error of later frequencies, %; seeds: {options.seeds}",
         pd.DataFrame(mappers),
         "3g",
     )
