@@ -65,7 +65,7 @@ def more_modes(options):
 def main():
     options = arguments(
         __doc__,
-        rows=(200, "test rows"),
+        rows=(60, "test rows"),
         noise=(0.001, "relative deviation of the noise of frequencies"),
         shape_noise=(0.01, "noise of shapes, a share of their rms"),
         models=["truss", "KW51"],
