@@ -9,9 +9,8 @@ boosting. The small network is M1's default, and piecewise-linear regression is 
 
 Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
 its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
-minutes. :doc:`/accuracy_regressors` has tables of that size. The data of Z24 belong to KU Leuven; with the folder or the
-file that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
-:download:`page_recipes.py` beside it.
+minutes. The data of Z24 belong to KU Leuven; with the folder or the file that holds them as an argument, M2 is compared
+on them, too. The page needs :download:`regressors_recipes.py` and :download:`page_recipes.py` beside it.
 """
 
 # sphinx_gallery_thumbnail_number = 2
