@@ -9,9 +9,8 @@ boosting. The small network is M1's default, and piecewise-linear regression is 
 
 Run it with ``python examples/plot_regressors.py``. This page shows few simulations and records and one seed, so that
 its times and errors are rough; with ``--full`` it has five times as many and five seeds, which takes about twelve
-minutes, and :doc:`/accuracy_regressors` has the tables. The data of Z24 belong to KU Leuven; with the folder or the
-file that holds them as an argument, M2 is compared on them, too. The page needs :download:`regressors_recipes.py` and
-:download:`page_recipes.py` beside it.
+minutes. The data of Z24 belong to KU Leuven; with the folder or the file that holds them as an argument, M2 is compared
+on them, too. The page needs :download:`regressors_recipes.py` and :download:`page_recipes.py` beside it.
 """
 
 # sphinx_gallery_thumbnail_number = 2
@@ -46,7 +45,7 @@ from regressors_recipes import (
 
 parser = command_line()
 parser.add_argument("data", type=Path, nargs="?", help="file or folder with the data of Z24")
-parser.add_argument("--full", action="store_true", help="as in the guide, about twelve minutes")
+parser.add_argument("--full", action="store_true", help="five times as many simulations, about twelve minutes")
 parser.add_argument("--seeds", type=int, help="repetitions to average over (default 1, with --full 5)")
 options = parser.parse_args()
 size, seeds = FULL if options.full else SMALL, range(options.seeds or (5 if options.full else 1))
@@ -154,6 +153,6 @@ ax.set(xlabel=label, ylabel=f"$f_{mode + 1}$ (Hz)")
 ax.legend(ncols=2)
 
 # %%
-# :doc:`/accuracy_regressors` says which regressor to choose, with means of five seeds.
+# :doc:`/accuracy_regressors` says which regressor to choose.
 
 save_figures(options.figures)

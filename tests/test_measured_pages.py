@@ -13,7 +13,8 @@ DOCS, MEASURED = ROOT / "docs", ROOT / "docs" / "measured"
 RESULTS = sorted((MEASURED / "results").glob("*.json"))
 # Settings of the measurements, not results, by page.
 CHOSEN = {
-    "accuracy": "0.5 1 2 5 10 20 30 90",
+    "accuracy": "7.5",
+    "accuracy_regressors": "",
     "accuracy_costs": "5 30",
     "accuracy_detection": "0.3 0.95 2 20 40 50",
     "accuracy_studies": "2 5 10 20 30 90 95",

@@ -237,7 +237,6 @@ SOIL_PARAMETERS = [
     "soil 3",
 ]
 SOIL_GROUPS = [*(f"span {i + 1}" for i in range(4)), "bearings", "soil 1", "soil 2", "soil 3"]
-SOIL_DAMAGES = [{"span 2": 0.2}, {"bearings": 0.2}, {"soil 1": 0.2}, {"soil 2": 0.2}]
 MODEL_ERROR = (0.03, 0.08)  # of each parameter of the user's model
 SOIL_MODES = 7
 

@@ -80,6 +80,10 @@ class TestValues:
             ("isolated-level", "f1", "doubtful"),
         ]
 
+    def test_a_mass_that_warms_while_records_are_left_out_is_at_no_other_level(self):
+        rise = np.concatenate([np.linspace(8.0, 8.6, 70), 9.5 + 0.4 * (1 - np.exp(-np.arange(295) / 40))])
+        assert check_records(T.assign(T1=rise), None).table.empty
+
     @pytest.mark.parametrize(
         ("tables", "expected"),
         [

@@ -35,6 +35,7 @@ FREEZING, COLD, HOT, DEGREES = 32.0, -60.0, 170.0, 1.8  # in Fahrenheit
 KELVIN = (183.0, 373.0)  # the same range in kelvin
 FAR = 50.0  # degrees beyond all others, of a value that is none
 JUMP = 30.0  # the same, of a value that repeats exactly
+APART_AT_LEAST = 10.0  # degrees between two levels, which a structure passes between records that are left out
 WIDEST, WIDE = 180.0, 90.0  # degrees that a thermometer spans in the open, and that it does beside another
 SMOOTH = 4.0  # times a step between records, that temperatures span and errors do not
 SCALES = (10.0, 100.0, 1000.0)  # tenths, hundredths, thousandths of a degree
@@ -221,8 +222,8 @@ class Column:
                 isolated[ends] |= gap and repeated[ends].all()
         return levels[isolated]
 
-    def levels_apart(self) -> Array:
-        """Values at another level than the others: beyond a gap of a third of all that the column spans.
+    def levels_apart(self, least: float = 0.0) -> Array:
+        """Values at another level than the others: beyond this gap, and a third of all that the column spans.
 
         The narrowest part of the values says how far they scatter. Where it does not, or few are known, none are.
         """
@@ -238,7 +239,7 @@ class Column:
             gaps = np.diff(levels)
             place = int(gaps.argmax())
             side = levels[: place + 1] if levels[place] < middle else levels[place + 1 :]
-            if gaps[place] < max(GAP * scatter, EMPTY * (levels[-1] - levels[0])) or (
+            if gaps[place] < max(least, GAP * scatter, EMPTY * (levels[-1] - levels[0])) or (
                 np.abs(side - middle).min() < APART * scatter
             ):
                 break
@@ -277,7 +278,7 @@ class Column:
             self.put_aside("kelvin", levels[in_kelvin])
             self.put_aside("placeholders", levels[is_none & ~in_kelvin])
         self.put_aside("isolated-level", self.isolated_levels(JUMP))
-        self.put_aside("another-level", self.levels_apart())
+        self.put_aside("another-level", self.levels_apart(APART_AT_LEAST))
 
     def put_placeholders_aside(self) -> None:
         """What loggers write for a missing response, far from all others."""
