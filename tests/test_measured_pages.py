@@ -25,6 +25,7 @@ NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
 LIST = rf"{NUMBER}(?:(?:,| and| to| or|,? and|;) {NUMBER})*"
 UNITS = r"%|percent|points|seconds|minutes|times|[smµ]?s\b|[MG]B"
 NO_PROSE = re.compile(r"``[^`]+``|:[\w:]+:`[^`]*`|^\.\. .*$|`[^`]*`_+|(?<=\d),(?=\d{3})", re.MULTILINE)
+NO_TABLE = re.compile(r"^``python .*$|``[^`]+``|(?<=\d),(?=\d{3})", re.MULTILINE)
 
 
 def stated(text):
@@ -38,7 +39,7 @@ def stated(text):
 def is_in(number, table):
     """Whether a number is one of a table's, or a hundred times one, rounded as far as it is written."""
     half = 0.5001 * 10.0 ** Decimal(number).as_tuple().exponent
-    found = [abs(float(text)) for text in re.findall(rf"(?<![\w.]){NUMBER}", NO_PROSE.sub("", table))]
+    found = [abs(float(text)) for text in re.findall(rf"(?<![\w.]){NUMBER}", NO_TABLE.sub("", table))]
     return any(abs(scale * value - float(number)) <= half for value in found for scale in (1, 100))
 
 
@@ -101,6 +102,6 @@ def test_readme_and_home_say_what_the_summary_says():
     assert stated(cards)
     assert stated(readme)
     assert not unknown(cards, (MEASURED / "summary.rst").read_text())
-    output = readme.partition("```text")[2].partition("```")[0]
+    study = (MEASURED / "readme-study.rst").read_text()
     prose = re.sub(r"```.*?```|<img[^>]*>", "", readme, flags=re.DOTALL)
-    assert not unknown(prose, (MEASURED / "summary.rst").read_text() + output)
+    assert not unknown(prose, (MEASURED / "summary.rst").read_text() + study, "3.11")
