@@ -70,6 +70,8 @@ PARTS = {
     "service-records": Part("service_records.py --seeds 2"),
     "study-bands": Part("study_bands.py --replicates 10 --calibrated --first-seed 1"),
     "smallest-losses": Part("directions.py --parts smallest"),
+    "explained-damage": Part("explained_damage.py"),
+    "explained-kw51": Part("explained_damage.py --structures KW51 --designs frequencies shapes"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),
