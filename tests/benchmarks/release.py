@@ -72,6 +72,8 @@ PARTS = {
     "smallest-losses": Part("directions.py --parts smallest"),
     "explained-damage": Part("explained_damage.py"),
     "explained-kw51": Part("explained_damage.py --structures KW51 --designs frequencies shapes"),
+    "kw51-study": Part("kw51_study.py"),
+    "kw51-choices": Part("kw51_study.py --all --seeds 1"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pays": timing("solves.py --parts pays"),
