@@ -75,7 +75,7 @@ PARTS = {
     "located-damage": Part("located_damage.py"),
     "z24-damage": Part("z24_damage.py", **Z24),
     "program-calls": Part("program_calls.py"),
-    "other-tools": Part("other_tools.py --seeds 3"),
+    "other-tools": Part("other_tools.py --seeds 5"),
     "kw51-study": Part("kw51_study.py"),
     "kw51-choices": Part("kw51_study.py --all --seeds 1"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
