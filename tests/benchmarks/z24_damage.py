@@ -27,18 +27,14 @@ def alarms(records, targets):
 
 
 def parameters(measured, names):
-    """Changes after the second damaged day beside the scatter of healthy days without frost, in percent."""
+    """Changes of means of days beside their scatter on healthy days without frost, in percent."""
     days = damage.changes(measured, names)
     T = measured.baseline[z24.PAVEMENT]
     frozen = T.groupby(T.index.floor("D")).mean() < damage.FROST
-    after = days.damaged[2:]
-    return pd.DataFrame(
-        {
-            "least change": after.max().where(after.mean() < 0, after.min()),
-            "largest change": after.min().where(after.mean() < 0, after.max()),
-            "scatter of healthy days": days.baseline[~frozen].std(),
-        }
-    ).rename_axis("parameter")
+    values = {f"damaged day {number}": days.damaged.iloc[number - 1] for number in (1, 2, 3)}
+    values[f"days 4 to {len(days.damaged)}, mean"] = days.damaged[3:].mean()
+    values["scatter of healthy days"] = days.baseline[~frozen].std()
+    return pd.DataFrame(values).rename_axis("parameter")
 
 
 def main():
@@ -64,7 +60,7 @@ def main():
     print(found.summary())
     records = z24.Records.of(bridge)
     measured, names = damage.in_parameters(records)
-    shown("Z24: parameters from each record, change by day means, %", parameters(measured, names), 1)
+    shown("Z24: parameters from each record, change of day means, %", parameters(measured, names), 1)
     both = {"four parameters": alarms(measured, names), "four frequencies": alarms(records, z24.FREQUENCIES)}
     shown("Z24: alarms of a detector, whitened, %", pd.DataFrame(both).T.rename_axis("of"), 1)
     return int(found.table["probability"].idxmax() != "soil")
