@@ -60,7 +60,7 @@ def evaluated(records, fitted, draws):
     """Figures of one campaign and chain."""
     table = sum(rates(*fitted.detection(seed=seed)) for seed in range(draws)) / draws
     healthy, after = (table.xs(key) for key in ("healthy", "retrofit"))
-    round_trip, errors = fitted.fem.report_.modes["round trip"], fitted.errors(records.clean)
+    round_trip, errors = fitted.fem.report_.modes.get("round trip"), fitted.errors(records.clean)
     values = [
         fitted.fem.report_.rows.trained,
         0.0 if round_trip is None else round_trip.abs().max(),
@@ -101,7 +101,7 @@ def with_gaps(records, healthy):
 def main():
     options = arguments(
         __doc__,
-        seeds=(5, "campaigns"),
+        seeds=(3, "campaigns"),
         first=(100, "seed of the first campaign"),
         draws=(5, "draws of the chain's noise"),
         all=(False, "all recipes, from the paper's choices to the default"),
