@@ -15,7 +15,7 @@ RESULTS = sorted((MEASURED / "results").glob("*.json"))
 CHOSEN = {
     "accuracy": "0.5 1 2 5 10 20 30 90",
     "accuracy_costs": "5 30",
-    "accuracy_identification": "0.2 1 5 6 20",
+    "accuracy_identification": "",
 }
 INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
