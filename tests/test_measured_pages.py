@@ -16,6 +16,7 @@ CHOSEN = {
     "accuracy": "0.5 1 2 5 10 20 30 90",
     "accuracy_costs": "5 30",
     "accuracy_identification": "",
+    "accuracy_kw51": "",
 }
 INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
