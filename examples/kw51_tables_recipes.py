@@ -146,7 +146,7 @@ def choice(records, fitted):
     found = {noise: rates(*fitted.detection(noise)) for noise in (0.0, "fitted")}
     alarms, index = ({noise: table[column] for noise, table in found.items()} for column in ("alarms, %", "mean index"))
     measured = fitted.records.frequencies if records.clean is None else records.clean
-    round_trip = fitted.fem.report_.modes["round trip"]  # of a regressor
+    round_trip = fitted.fem.report_.modes.get("round trip")  # of a regressor
     return {
         "records that train": fitted.fem.report_.rows.trained,
         "round trip, %": 0.0 if round_trip is None else round_trip.abs().max(),

@@ -19,6 +19,8 @@ CHOSEN = {
     "accuracy_detection": "0.3 0.95 2 20 40 50",
     "accuracy_studies": "2 5 10 20 30 90 95",
     "accuracy_monitoring": "",
+    "accuracy_identification": "",
+    "accuracy_kw51": "",
 }
 INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"

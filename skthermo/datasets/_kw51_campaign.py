@@ -418,10 +418,9 @@ def make_kw51_campaign(
     Notes
     -----
     The bridge is the updated model of `make_kw51` with bearings added. :ref:`campaign-of-kw51` says how weather moves
-    its ten multipliers, what the retrofit changes, and what is known or assumed of the measurements; over ten seeds,
-    correlations with temperature differ from theirs by at most 0.09 (``python tests/benchmarks/kw51_campaign.py``). A
-    model with the five thermal parameters of `make_kw51` as functions of tBD31A can come close to this bridge, but
-    cannot be exact.
+    its ten multipliers, what the retrofit changes, and what is known or assumed of the measurements;
+    :doc:`/accuracy_kw51` has statistics of both side by side. A model with the five thermal parameters of `make_kw51`
+    as functions of tBD31A can come close to this bridge, but cannot be exact.
 
     Examples
     --------

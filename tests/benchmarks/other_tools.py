@@ -6,15 +6,12 @@
 PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals, and both beside an
 isolation forest on raw frequencies; MAPIE's split conformal intervals of each frequency, calibrated on a second healthy
 year, beside `predict_interval`; SMT's Kriging beside scikit-learn's Gaussian process as inverse surrogate, without
-refining. What is not installed is left out.
+refining.
 """
-
-import importlib
-import time
 
 import numpy as np
 import pandas as pd
-from harness import arguments, joined
+from harness import arguments, joined, shown
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.compose import make_column_transformer
 from sklearn.ensemble import IsolationForest
@@ -88,7 +85,9 @@ def detectors(seed):
         alarm.fit(baseline)
         for severity in (0.0, 0.1, 0.2):
             later = records(1000 + seed, **({"bottom": severity} if severity else {}))[0]
-            found[name, f"{severity:.0%} damage"] = 100 * (alarm.predict(later) == -1).mean()
+            found[name, "no damage" if not severity else f"{100 * severity:.0f} %"] = (
+                100 * (alarm.predict(later) == -1).mean()
+            )
     return pd.Series(found)
 
 
@@ -115,8 +114,7 @@ def intervals(seed):
 
 
 def surrogates(seed):
-    """Mean error of ln theta in percent of inverse surrogates that do not refine, and seconds of learning."""
-    importlib.import_module("smt")
+    """Mean error of ln theta in percent of inverse surrogates that do not refine."""
     truss, fresh = make_truss(), sample(make_truss(), 0.2, 500, random_state=1000 + seed)
     kernel = ConstantKernel() * RBF(np.ones(6)) + WhiteKernel(noise_level_bounds=(1e-8, 10))
     found = {}
@@ -124,23 +122,24 @@ def surrogates(seed):
         "SMT's Kriging": Kriging(),
         "GaussianProcessRegressor": GaussianProcessRegressor(kernel),
     }.items():
-        start = time.perf_counter()
         inverse = InverseSurrogate(truss, regressor, bounds=0.2, n_samples=200, random_state=seed).fit()
-        found[name, "learning, s"] = time.perf_counter() - start
         found[name, "error, %"] = 100 * np.abs(np.log(inverse.predict(fresh.frequencies) / fresh.theta)).mean()
     return pd.Series(found)
 
 
+COMPARED = {
+    detectors: "Alarms on the truss, % of the records, by what the bottom chord has lost; 2 % false alarms asked for",
+    intervals: "Intervals of 90 % on the truss: frequencies of a later year inside, and widths",
+    surrogates: "Inverse surrogates of the truss from 200 noise-free simulations, error of ln theta",
+}
+
+
 def main():
     options = arguments(__doc__, seeds=10)
-    for compare in (detectors, intervals, surrogates):
-        print(compare.__doc__)
-        try:
-            found = pd.concat([compare(seed) for seed in range(options.seeds)], axis=1)
-        except ImportError as error:
-            print(f"left out: {error}\n")
-            continue
-        print(f"{found.mean(axis=1).unstack().to_string(float_format='%.3g')}\n", flush=True)
+    for compare, title in COMPARED.items():
+        found = pd.concat([compare(seed) for seed in range(options.seeds)], axis=1)
+        table = found.mean(axis=1).unstack(sort=False).rename_axis("way")
+        shown(f"{title}; mean of {options.seeds} realisations", table, 3 if compare is surrogates else 1)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from sklearn.utils import Bunch
 from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
 from skthermo.datasets._fleet_site import Law, SiteClimate, drawn_by_hour, persistent, stream
 from skthermo.datasets._kw51_campaign import memory
-from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure, add_noise, load_affine
+from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure, add_noise
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
@@ -358,7 +358,6 @@ CORRELATIONS = (0.0, 0.5, 0.9)
 SEVERITIES = (-0.01, 0.5)  # that reduced models of the truth cover
 N_SHAPES = 5  # measured shapes that are averaged
 SHAPE_NOISE = 0.01
-LAG_DAYS = 3.0  # after which half of a change of the weather has reached the parameters that lag
 
 
 def days(n_records, random):
@@ -398,13 +397,7 @@ class Campaign:
     structure: object
     seed: int
     wrong: bool = False
-    memory: float | None = None
-    is_plain: bool = False
-    n_days: int = TRAINING_DAYS
     chains: dict = field(default_factory=dict)
-
-    def __post_init__(self):
-        self.memory = memory_of(self.seed) if self.memory is None else self.memory
 
     @property
     def fem(self):
@@ -423,9 +416,7 @@ class Campaign:
         return model.damaged({group: WRONG * random.choice([-1, 1]) for group in self.structure.groups})
 
     def chain(self, model):
-        """A chain of one model, to be fitted; a plain one has no settings."""
-        if self.is_plain:
-            return DataInformedFEM(model, random_state=self.seed)
+        """A chain of one model, to be fitted."""
         box = 0.3
         small = model.reduced(box, random_state=0) if self.structure.is_large else model
         return DataInformedFEM(
@@ -439,12 +430,12 @@ class Campaign:
     @property
     def records(self):
         """Healthy temperatures and frequencies to learn from."""
-        return self.structure.records(self.n_days, {}, self.memory, 1000 + self.seed)
+        return self.structure.records(TRAINING_DAYS, {}, memory_of(self.seed), 1000 + self.seed)
 
     def later(self, damage, number):
         """Later records with some damage; another number for other weather and noise."""
         seed = 100_000 + 1000 * self.seed + number
-        T, F = self.structure.records(LATER_DAYS, damage, self.memory, seed)
+        T, F = self.structure.records(LATER_DAYS, damage, memory_of(self.seed), seed)
         return T, spoiled(F, seed)
 
 
@@ -520,18 +511,6 @@ class Smooth:
         return tuple(found)
 
 
-@dataclass
-class Lagging(Smooth):
-    """The same, but the last two parameters follow means of earlier weather, which no thermometer shows."""
-
-    def theta(self, T, damage):
-        theta = super().theta(T, damage)
-        n_parameters = theta.shape[1] - len(self.groups)
-        earlier = super().theta(T.ewm(halflife=LAG_DAYS).mean(), damage)
-        theta[:, n_parameters - 2 : n_parameters] = earlier[:, n_parameters - 2 : n_parameters]
-        return theta
-
-
 @cache
 def known_truss():
     return KnownTruss()
@@ -544,12 +523,6 @@ def known_kw51():
     return Smooth.of(
         "KW51", model, (*groups, "arch_connections", "pipes"), 0.002, sensors=list(kw51_sensors().values())
     )
-
-
-@cache
-def known_frame():
-    model = load_affine(DATA / "building_frame" / "ConcreteBuildingFrame.mat")
-    return Smooth.of("frame", model.with_parameters(["E_5", "E_11", "E_12"]), tuple(sorted(model.groups)), 0.002)
 
 
 SEVEN_GROUPS = ("side span", "main span", "tip", "pylon", "backstays", "main stays", "bearings")
@@ -576,18 +549,10 @@ def seven_groups(bridge):
     return Structure(bridge.nodes, bridge.members, bridge.supports, groups)
 
 
-@cache
-def known_girder():
-    parameters = ["girder", "pavement", "bearings"]
-    return Lagging.of("girder", soil_girder(6).assemble(parameters, groups=SOIL_GROUPS), SOIL_GROUPS, 0.002)
-
-
 KNOWN = {
     "truss": known_truss,
     "KW51": known_kw51,
-    "frame": known_frame,
     "footbridge": known_footbridge,
-    "girder": known_girder,
 }
 
 
