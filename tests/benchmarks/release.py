@@ -89,6 +89,7 @@ PARTS = {
     "scale-defaults": timing("scale.py --rows 52560 525600 --parts defaults"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
+    "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
     "large-grid": timing("large_models.py --kind grid --dof 100000"),
     "large-solid": timing("large_models.py --kind solid --dof 50000"),
     "larger-grid": timing("large_models.py --kind grid --dof 300000"),

@@ -7,10 +7,10 @@ Frequencies of the truss follow made-up weather, with noise that is correlated i
 size has a process of its own, whose peak memory, without that of its workers, is printed. In the part "chain", the
 inverse is a linear regression, which costs the same for each record; the part "defaults" has the defaults of all.
 "service" is a monitor that is fitted to the first tenth of the records, and then updated by each of the other days;
-"fleet" are bridges with a year of hourly records each, whose files are updated by a day, in seconds by the clock. The
-exit code is 1 if a step takes more than three times as long a record or bridge as with the next smaller size, where a
-quadratic one takes ten times as long, a part more than 4 GB, an update of the last days more than twice as long as one
-of the first.
+"fleet" are bridges with a year of hourly records each, whose files are updated by a day, in "workers" by two processes
+as well and in seconds by the clock. The exit code is 1 if a step takes more than three times as long a record or bridge
+as with the next smaller size, where a quadratic one takes ten times as long, a part more than 4 GB, an update of the
+last days more than twice as long as one of the first.
 """
 
 import json
@@ -145,8 +145,8 @@ def says(name, value, *, is_missed=False):
     print(json.dumps({"name": name, "value": float(value), "is_missed": bool(is_missed)}))
 
 
-def fleet(n_bridges):
-    """Bridges with files of their own, of a few fitted monitors, and new records of two days."""
+def made_fleet(n_bridges):
+    """A folder of bridges with files of their own, of a few fitted monitors, and their new records of a day."""
     folder, many = Path(tempfile.mkdtemp()), range(n_bridges)
     fitted, days = [], {}
     for bridge in list(make_fleet(N_FITTED, kinds=["girder"], random_state=0).values()):
@@ -168,23 +168,26 @@ def fleet(n_bridges):
             found[f"bridge {number:04}"] = own * (1 + 1e-4 * random.standard_normal(own.shape))
         return found
 
-    processor = []
+    return folder, new
 
-    def alone():
-        start = time.process_time()
-        Fleet(folder).update(new(0))
-        processor.append(time.process_time() - start)
 
+def fleet(n_bridges):
+    folder, new = made_fleet(n_bridges)
     yield "reading the folder", lambda: Fleet(folder)
-    yield "update, one process", alone
-    yield "update, two processes", lambda: Fleet(folder).update(new(1), n_jobs=2)
-    yield "update, two workers of Dask", lambda: by_dask(lambda: Fleet(folder).update(new(2)))
+    yield "update by a day", lambda: Fleet(folder).update(new(0))
     yield "table and summary", lambda: (Fleet(folder).table, Fleet(folder).summary())
     yield "status", lambda: Fleet(folder).status()
     yield "discoveries", lambda: Fleet(folder).discoveries()
     yield "owner's page", lambda: owner_report(Fleet(folder), folder / "fleet.html", now="2026-01-05")
-    says("update, one process: processor time a bridge, ms", 1e3 * processor[0] / n_bridges)
     says("file of a bridge, MB", next(folder.glob("*.bridge")).stat().st_size / 1e6)
+    shutil.rmtree(folder)
+
+
+def workers(n_bridges):
+    folder, new = made_fleet(n_bridges)
+    yield "one process", lambda: Fleet(folder).update(new(0))
+    yield "two processes", lambda: Fleet(folder).update(new(1), n_jobs=2)
+    yield "two workers of Dask", lambda: by_dask(lambda: Fleet(folder).update(new(2)))
     shutil.rmtree(folder)
 
 
@@ -198,24 +201,27 @@ def by_dask(way):
 
 
 OF_RECORDS = (preprocessing, chain, defaults, service)
-PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
+OF_BRIDGES = (fleet, workers)
+PARTS = {part.__name__: part for part in (*OF_RECORDS, *OF_BRIDGES)}
 TEN_MINUTES = "ten-minute records of the truss (3 temperatures, 6 frequencies, 5 % missing); processor seconds"
 TITLES = {
     "preprocessing": f"Preparing {TEN_MINUTES}",
     "chain": f"A chain with a linear regression as M1, {TEN_MINUTES}",
     "defaults": f"Chain and study by default, {TEN_MINUTES}",
     "service": f"A monitor in service, {TEN_MINUTES}",
-    "fleet": "A fleet updated by a day of hourly records, each with a baseline of a year; seconds by the clock, two cores",
+    "fleet": "A fleet with baselines of a year of hourly records; processor seconds",
+    "workers": "The fleet's update by a day of hourly records, seconds by the clock on two cores",
 }
 
 
 def one(part, size, **options):
     """Print seconds of each step of a part, and gigabytes, as lines of JSON."""
-    if part is fleet:
-        steps, clock = fleet(size), time.perf_counter
+    clock = time.perf_counter if part is workers else time.process_time
+    if part in OF_BRIDGES:
+        steps = part(size)
     else:
         T, F = records(size, 10 if part is service else 1)
-        steps, clock = part(T, with_faults(F), **options), time.process_time
+        steps = part(T, with_faults(F), **options)
     for step, way in steps:
         start = clock()
         way()
@@ -235,13 +241,13 @@ def main():
     if options.one:
         part = PARTS[options.parts[0]]
         more = {"n_replicates": options.replicates} if part is defaults else {}
-        one(part, (options.bridges if part is fleet else options.rows)[0], **more)
+        one(part, (options.bridges if part in OF_BRIDGES else options.rows)[0], **more)
         return 0
     missed = 0
     for part in options.parts:
-        option, what, sizes = "bridges", "bridge", options.bridges
-        if part != "fleet":
-            option, what, sizes = "rows", "record", options.rows
+        option, what, sizes = "rows", "record", options.rows
+        if PARTS[part] in OF_BRIDGES:
+            option, what, sizes = "bridges", "bridge", options.bridges
         seconds, others = {}, {}
         for size in sizes:
             command = [sys.executable, __file__, "--one", f"--{option}", str(size), "--parts", part]
