@@ -49,7 +49,6 @@ def timing(options, quick=None, **more):
 
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
 FLEET = "fleet_prior.py --bridges 18 --groups 3 --newcomers 3 --days 15 30 60 --starts winter --members chains"
-BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py", **Z24),
@@ -75,12 +74,7 @@ PARTS = {
     "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),
     "two-workers": timing("solves.py --parts workers"),
-    "reduced-models": timing("reduced_models.py", **FRAME),
-    "searches": timing("searches.py"),
-    "speed": timing(f"speed.py --rows {BESIDE}"),
-    "speed-frame": timing("speed.py --rows frame-1000 frame-10000", **FRAME),
-    "speed-studies": timing("speed.py --rows study-footbridge study-footbridge-all"),
-    "speed-before": timing("speed.py --before ccaa270a --rows study-truss --rounds 1"),
+    "speed": timing("speed.py", **FRAME),
     "scaling": timing(
         "scaling.py --figure docs/images/scaling.png", "--most-samples 100 --most-full 100 --sizes 2 --rounds 1"
     ),
