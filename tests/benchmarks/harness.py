@@ -119,15 +119,6 @@ def peak_megabytes(way=None):
     return peak / 1e6
 
 
-def core_rates():
-    """Flops a second of a matrix product on this core, and bytes a second to and from memory."""
-    square, long = np.random.default_rng(0).standard_normal((1500, 1500)), np.zeros(20_000_000)
-    product, stream = (
-        min(timed(way)[0] for _ in range(5)) for way in (lambda: square @ square, lambda: np.add(long, 1.0, out=long))
-    )
-    return 2 * len(square) ** 3 / product, 16 * len(long) / stream
-
-
 def draw(model, n_samples, seed=0, bounds=0.3):
     """Parameters that are uniform within bounds."""
     return 1 + bounds * np.random.default_rng(seed).uniform(-1, 1, (n_samples, len(model.parameter_names)))

@@ -71,9 +71,8 @@ PARTS = {
     "smallest-losses": Part("directions.py --parts smallest"),
     "false-alarms": Part("false_alarm_rates.py", "--quick --laws iid"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
-    "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),
-    "two-workers": timing("solves.py --parts workers"),
+    "two-workers": timing("solves.py --parts workers --rounds 3"),
     "speed": timing("speed.py", **FRAME),
     "scaling": timing(
         "scaling.py --figure docs/images/scaling.png", "--most-samples 100 --most-full 100 --sizes 2 --rounds 1"
@@ -84,11 +83,8 @@ PARTS = {
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
     "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
-    "large-grid": timing("large_models.py --kind grid --dof 100000"),
-    "large-solid": timing("large_models.py --kind solid --dof 50000"),
-    "larger-grid": timing("large_models.py --kind grid --dof 300000"),
+    "large-models": timing("large_models.py", "--models grid-3000 solid-3000"),
     "exports": timing("large_exports.py --dofs 100000", "--dofs 600"),
-    "roofline": timing("solves.py --parts bounds", **FRAME),
 }
 
 
