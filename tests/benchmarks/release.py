@@ -75,7 +75,8 @@ PARTS = {
     "two-workers": timing("solves.py --parts workers --rounds 3"),
     "speed": timing("speed.py", **FRAME),
     "scaling": timing(
-        "scaling.py --figure docs/images/scaling.png", "--most-samples 100 --most-full 100 --sizes 2 --rounds 1"
+        "scaling.py --rounds 1 --most-samples 100000 --figure docs/images/scaling.png",
+        "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",
     ),
     "scale-preparing": timing("scale.py --rows 52560 525600 --parts preprocessing"),
     "scale-records": timing("scale.py --rows 52560 525600 --parts chain"),

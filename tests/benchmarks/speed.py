@@ -374,7 +374,7 @@ def main():
         before=(str, "a git revision to compare with"),
         rows=(WORKS, "works"),
         rounds=3,
-        long=(40.0, "seconds after which no further round begins"),
+        long=(20.0, "seconds after which no further round begins"),
         quick=(False, "small works"),
         work=(str, "a work in this process, for the script itself"),
     )
