@@ -7,7 +7,7 @@ A slab bridge as a grillage of beams (two-dimensional, 6 degrees of freedom a no
 (three-dimensional, 3 a node), with 5 parameters: three thirds of the deck, its pavement or cross beams, and its
 bearings. The matrices are written as a folder of .npz files, as an FE program would, and read by `load_affine`. Each
 model is solved by SuperLU and, where it is installed, by rslab, in processes of their own. A chain is fitted to the
-grillages only.
+models that ``--chains`` names.
 """
 
 import importlib.util
@@ -168,7 +168,7 @@ def one(kind, n_dof, n_days):
     step("frequencies at one theta", lambda: model.frequencies(theta[1:]))
     step("frequencies with derivatives", lambda: model.linearised(theta[1:]))
     found["peak memory so far, MB"] = peak_megabytes()
-    if kind == "grid" and n_days:
+    if n_days:
         T, F = records(model, n_days)
         chain = DataInformedFEM(model, inverse=PosteriorInverse(noise=0.001), reduce=True, random_state=0)
         step(f"fit of a chain to {n_days} records", lambda: chain.fit(T, F))
@@ -181,7 +181,8 @@ def main():
     options = arguments(
         __doc__,
         models=["grid-100000", "grid-300000", "solid-50000"],
-        days=(365, "records of the chain; 0 leaves the chain out"),
+        chains=(["grid-100000"], "models to which a chain is fitted"),
+        days=(365, "records of the chain"),
         one=(False, "in this process, for the script itself"),
     )
     if options.one:
@@ -191,7 +192,8 @@ def main():
     table = {}
     for model in options.models:
         for solver in ["superlu", *["rslab"][: importlib.util.find_spec("rslab") is not None]]:
-            command = [sys.executable, __file__, "--one", "--models", model, "--days", str(options.days)]
+            n_days = options.days if model in options.chains else 0
+            command = [sys.executable, __file__, "--one", "--models", model, "--days", str(n_days)]
             environment = os.environ | {"SKTHERMO_SOLVER": solver}
             done = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
             found = json.loads(done.stdout.splitlines()[-1])

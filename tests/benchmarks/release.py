@@ -75,16 +75,16 @@ PARTS = {
     "two-workers": timing("solves.py --parts workers --rounds 3"),
     "speed": timing("speed.py", **FRAME),
     "scaling": timing(
-        "scaling.py --rounds 1 --most-samples 100000 --figure docs/images/scaling.png",
+        "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",
         "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",
     ),
     "scale-preparing": timing("scale.py --rows 52560 525600 --parts preprocessing"),
-    "scale-records": timing("scale.py --rows 52560 525600 --parts chain"),
+    "scale-records": timing("scale.py --rows 5256 52560 --parts chain"),
     "scale-defaults": timing("scale.py --rows 52560 525600 --parts defaults"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
     "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
-    "large-models": timing("large_models.py", "--models grid-3000 solid-3000"),
+    "large-models": timing("large_models.py", "--models grid-3000 solid-3000 --chains grid-3000"),
     "exports": timing("large_exports.py --dofs 100000", "--dofs 600"),
 }
 

@@ -39,7 +39,7 @@ def by_samples(most, most_full, bridge, rounds):
     )
     table = {}
     for name, solver, limit, before in runs:
-        counts = [10**k for k in range(2, 7) if 10**k <= limit]
+        counts = [10**k for k in range(1, 7) if 10**k <= limit]
         ways = {n: lambda n=n, solver=solver: sample(solver, BOUNDS, n, random_state=0) for n in counts}
         seconds = {n: seconds_of(way, rounds if n < limit else 1) for n, way in ways.items()}
         table[name] = [(n, before + passed) for n, passed in seconds.items()]
