@@ -79,7 +79,7 @@ PARTS = {
         "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",
     ),
     "scale-preparing": timing("scale.py --rows 52560 525600 --parts preprocessing"),
-    "scale-records": timing("scale.py --rows 5256 52560 --parts chain"),
+    "scale-records": timing("scale.py --rows 52560 157680 --parts chain"),
     "scale-defaults": timing("scale.py --rows 5256 52560 --parts defaults"),
     "scale-defaults-long": timing("scale.py --rows 525600 --parts defaults"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
