@@ -127,7 +127,7 @@ def row(reader, file, matrix):
     process.join()
     error = abs(scipy.sparse.csc_array(found) - matrix).max() / abs(matrix).max()
     size = file.stat().st_size
-    columns = ("file, MB", "processor, s", "peak, MB", "peak / file", "error")
+    columns = ("file, MB", "seconds", "peak memory, MB", "peak memory / file", "largest relative error")
     return dict(zip(columns, (size / 1e6, seconds, memory / 1e6, memory / size, float(error)), strict=True))
 
 
@@ -146,7 +146,10 @@ def main():
         scipy.io.hb_write(file, matrix)
         rows["Harwell-Boeing, RUA"] = row(ours, file, matrix)
         rows["the same by scipy.io.hb_read"] = row(scipy.io.hb_read, file, matrix)
-    shown(f"Formats, {matrix.shape[0]} degrees of freedom, {matrix.nnz} entries", pd.DataFrame(rows).T, "3g")
+    title = (
+        f"Reading a stiffness of {matrix.shape[0]:,} degrees of freedom and {matrix.nnz:,} entries, processor seconds"
+    )
+    shown(title, pd.DataFrame(rows).T, "3g")
 
 
 if __name__ == "__main__":

@@ -1,24 +1,29 @@
-"""Time and memory of exported models of 100,000 degrees of freedom and more, from the files to a fitted chain.
+"""Time and memory of exported models of 50,000 to 300,000 degrees of freedom, from the files to a fitted chain.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/large_models.py --kind grid --dof 100000
-    OMP_NUM_THREADS=1 SKTHERMO_SOLVER=rslab python tests/benchmarks/large_models.py --kind solid --dof 100000
+    OMP_NUM_THREADS=1 python tests/benchmarks/large_models.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/large_models.py --models grid-3000 solid-3000
 
 A slab bridge as a grillage of beams (two-dimensional, 6 degrees of freedom a node) or as a lattice of solid elements
 (three-dimensional, 3 a node), with 5 parameters: three thirds of the deck, its pavement or cross beams, and its
-bearings. The matrices are written as a folder of .npz files, as an FE program would, and read by `load_affine`. The
-factorisation is compared with what the core gives: the rate of matrix products, and of a sum of long vectors.
+bearings. The matrices are written as a folder of .npz files, as an FE program would, and read by `load_affine`. Each
+model is solved by SuperLU and, where it is installed, by rslab, in processes of their own. A chain is fitted to the
+models that ``--chains`` names.
 """
 
+import importlib.util
+import json
+import os
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import scipy.sparse
-from harness import arguments, core_rates, peak_megabytes, timed
+from harness import arguments, peak_megabytes, shown, timed
 
-from skthermo.fem import load_affine
-from skthermo.fem.modal import check_supported, count_modes
+from skthermo.fem import linearise, load_affine
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 
 SPAN, WIDTH, DEPTH = 48.0, 12.0, 1.2
@@ -123,6 +128,7 @@ def grid(n_dof):
 
 
 KINDS = {"grid": grid, "solid": solid}
+SOLVERS = {"superlu": "SuperLU", "rslab": "rslab"}
 
 
 def write(folder, terms, mass):
@@ -131,79 +137,71 @@ def write(folder, terms, mass):
 
 
 def records(model, n_days):
-    """A year of temperatures and frequencies: stiffness falls by .4 % a degree in the deck."""
-    random = np.random.default_rng(0)
+    """A year of temperatures and frequencies: the deck loses 0.4 % of its stiffness a degree, effects multiply."""
+    random, nominal = np.random.default_rng(0), np.ones((1, 5))
     days = pd.date_range("2021-01-01", periods=n_days, freq="D")
     season = 10 - 12 * np.cos(2 * np.pi * np.arange(n_days) / 365)
     T = pd.DataFrame({"air": season + random.normal(0, 3, n_days)}, index=days)
-    theta = 1 - 0.004 * (T.to_numpy() - 10) * np.array([1.0, 1.0, 1.0, 1.2, 0.3])
-    frequencies = model.frequencies(np.clip(theta, 0.82, 1.18))
+    theta = np.clip(1 - 0.004 * (T.to_numpy() - 10) * np.array([1.0, 1.0, 1.0, 1.2, 0.3]), 0.82, 1.18)
+    first, slopes = linearise(model, nominal, relative=True)
+    frequencies = first * np.exp(np.log(theta) @ slopes[0].T)
     return T, frequencies * (1 + 0.001 * random.standard_normal(frequencies.shape))
 
 
-def step(what, way):
-    """Run a way once; print its seconds of the processor, and the peak memory of the process so far."""
-    seconds, result = timed(way)
-    print(f"{what:<44}{seconds:9.2f} s{peak_megabytes():9.0f} MB", flush=True)
-    return result
+def one(kind, n_dof, n_days):
+    """Steps of one model by one solver: their processor seconds, and the peak memory."""
+    found = {}
+
+    def step(name, way):
+        found[f"{name}, s"], result = timed(way)
+        return result
+
+    with tempfile.TemporaryDirectory() as folder:
+        terms, mass = KINDS[kind](n_dof)
+        write(folder, terms, mass)
+        found["degrees of freedom"] = mass.shape[0]
+        found["million entries of the stiffness"] = sum(matrix.nnz for matrix in terms.values()) / 1e6
+        del terms, mass
+        model = step("reading with all checks", lambda: load_affine(folder))
+    theta = 1 + BOUNDS * np.random.default_rng(1).uniform(-1, 1, (2, 5))
+    model.frequencies(theta[:1])  # orders the elimination
+    step("frequencies at one theta", lambda: model.frequencies(theta[1:]))
+    step("frequencies with derivatives", lambda: model.linearised(theta[1:]))
+    found["peak memory so far, MB"] = peak_megabytes()
+    if n_days:
+        T, F = records(model, n_days)
+        chain = DataInformedFEM(model, inverse=PosteriorInverse(noise=0.001), reduce=True, random_state=0)
+        step(f"fit of a chain to {n_days} records", lambda: chain.fit(T, F))
+        step("its predictions", lambda: chain.predict(T))
+        found["peak memory with a chain, MB"] = peak_megabytes()
+    print(json.dumps(found))
 
 
 def main():
     options = arguments(
         __doc__,
-        kind=("grid", None, list(KINDS)),
-        dof=100_000,
-        days=(365, "records of the chain; 0 leaves the chain out"),
-        solves=(3, "full solves whose time is measured"),
-        full_only=(False, "leave out the reduced model and the chain"),
+        models=["grid-100000", "grid-300000", "solid-50000"],
+        chains=(["grid-100000"], "models to which a chain is fitted"),
+        days=(365, "records of the chain"),
+        one=(False, "in this process, for the script itself"),
     )
-    with tempfile.TemporaryDirectory() as folder:
-        terms, mass = step("generating the matrices", lambda: KINDS[options.kind](options.dof))
-        write(folder, terms, mass)
-        entries = sum(matrix.nnz for matrix in terms.values())
-        print(f"{options.kind} of {mass.shape[0]} degrees of freedom, {entries} entries of stiffness")
-        model = step("load_affine, with all checks", lambda: load_affine(folder))
-    print(model, model.frequencies(np.ones((1, 5)))[0].round(3))
-    stiffness, mass = model.matrices(np.ones(5))
-    step("check_supported alone", lambda: check_supported(stiffness))
-    step("count_modes alone", lambda: count_modes(mass, at_least=6))
-    theta = 1 + BOUNDS * np.random.default_rng(1).uniform(-1, 1, (options.solves, 5))
-    step(f"frequencies of {options.solves} theta", lambda: model.frequencies(theta))
-    step(f"Jacobians of {options.solves} theta", lambda: model.jacobian(theta))
-    seconds, flops, n_bytes = factorisation(model)
-    rate, bandwidth = core_rates()
-    print(
-        f"factorisation: {flops / 1e9:.2f} Gflop, {n_bytes / 1e6:.0f} MB of factors, {flops / seconds / 1e9:.1f} "
-        f"Gflop/s of {rate / 1e9:.0f}, bound {max(flops / rate, n_bytes / bandwidth):.3f} s, measured {seconds:.3f} s"
-    )
-    if options.full_only:
+    if options.one:
+        kind, n_dof = options.models[0].split("-")
+        one(kind, int(n_dof), options.days)
         return
-    reduced = step("reduced(0.2)", lambda: model.reduced(BOUNDS, random_state=0))
-    print(f"{reduced.basis_size_} vectors, {len(reduced.snapshot_points_)} snapshots, error {reduced.error_:.1e}")
-    if options.days:
-        T, F = records(reduced, options.days)
-        inverse = PosteriorInverse(noise=0.001)
-        chain = DataInformedFEM(model, inverse=inverse, reduce=True, random_state=0)
-        step(f"fit of a chain, {options.days} records", lambda: chain.fit(T, F))
-        step("predict", lambda: chain.predict(T))
-
-
-def factorisation(model):
-    """Seconds, flops and bytes of one factorisation L L', the order of elimination left out."""
-    matrix = model.matrices(np.ones(5))[0]
-    elimination = model._core.stiffness.pattern.elimination
-    seconds = [timed(lambda: elimination.factorise(matrix))[0] for _ in range(3)]
-    return min(seconds[1:]), *work(elimination, matrix)
-
-
-def work(elimination, matrix):
-    """Flops, and bytes of the entries of L, from the columns' lengths or the solver's dense fronts."""
-    if hasattr(elimination, "_analysis"):  # rslab: columns and rows of each front
-        fronts = np.array(elimination._analysis.front_dims, dtype=float)
-        lengths = np.concatenate([rows - np.arange(columns) for columns, rows in fronts])
-    else:
-        lengths = np.diff(elimination.factorise(matrix).args[0].L.indptr).astype(float)
-    return (lengths**2).sum(), 8 * lengths.sum()
+    table = {}
+    for model in options.models:
+        for solver in ["superlu", *["rslab"][: importlib.util.find_spec("rslab") is not None]]:
+            n_days = options.days if model in options.chains else 0
+            command = [sys.executable, __file__, "--one", "--models", model, "--days", str(n_days)]
+            environment = os.environ | {"SKTHERMO_SOLVER": solver}
+            done = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
+            found = json.loads(done.stdout.splitlines()[-1])
+            name = {"grid": "grillage", "solid": "solid"}[model.split("-")[0]]
+            title = f"{name} of {found.pop('degrees of freedom'):,}, {SOLVERS[solver]}"
+            table[title] = found
+            print(title, found, flush=True)
+    shown("Slab bridges by degrees of freedom and solver, processor seconds of one core", pd.DataFrame(table), "3g")
 
 
 if __name__ == "__main__":

@@ -48,7 +48,6 @@ def timing(options, quick=None, **more):
 
 
 Z24, FRAME = {"needs": "z24"}, {"needs": "building_frame"}
-BESIDE = "two-files monitor-later lags lags-many gaps gaps-year intervals drawn-models study-of-eight kw51-damaged"
 WRONG = "both aligned damage white lasting louder"
 PARTS = {
     "readme-study": Part("readme_study.py", "--years 1"),
@@ -92,36 +91,29 @@ PARTS = {
     "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid"),
     "nightly-call": timing("nightly_jobs.py --nights 3", "--nights 1 --bridges 2"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
-    "solves-pays": timing("solves.py --parts pays"),
     "solves-pynite": timing("solves.py --parts pynite"),
-    "two-workers": timing("solves.py --parts workers"),
-    "reduced-models": timing("reduced_models.py", **FRAME),
-    "searches": timing("searches.py"),
-    "speed": timing(f"speed.py --rows {BESIDE}"),
-    "speed-frame": timing("speed.py --rows frame-1000 frame-10000", **FRAME),
-    "speed-studies": timing("speed.py --rows study-footbridge study-footbridge-all"),
-    "speed-before": timing("speed.py --before ccaa270a --rows study-truss --rounds 1"),
+    "two-workers": timing("solves.py --parts workers --rounds 3"),
+    "speed": timing("speed.py", **FRAME),
     "scaling": timing(
-        "scaling.py --figure docs/images/scaling.png", "--most-samples 100 --most-full 100 --sizes 2 --rounds 1"
+        "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",
+        "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",
     ),
     "scale-preparing": timing("scale.py --rows 52560 525600 --parts preprocessing"),
-    "scale-records": timing("scale.py --rows 52560 525600 --parts chain"),
+    "scale-records": timing("scale.py --rows 52560 157680 --parts chain"),
     "scale-defaults": timing("scale.py --rows 5256 52560 --parts defaults"),
     "scale-defaults-long": timing("scale.py --rows 525600 --parts defaults"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
-    "large-grid": timing("large_models.py --kind grid --dof 100000"),
-    "large-solid": timing("large_models.py --kind solid --dof 50000"),
-    "larger-grid": timing("large_models.py --kind grid --dof 300000"),
+    "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
+    "large-models": timing("large_models.py", "--models grid-3000 solid-3000 --chains grid-3000"),
     "exports": timing("large_exports.py --dofs 100000", "--dofs 600"),
-    "roofline": timing("solves.py --parts bounds", **FRAME),
 }
 
 
 def run(name, measured, quick):
-    """The result of a part, from its file if it is there and had no error."""
+    """The result of a part, from its file if it is there and has tables."""
     part, file, tables = PARTS[name], measured / "results" / f"{name}.json", measured / f"{name}.tables.json"
-    if file.exists() and (found := json.loads(file.read_text()))["exit code"] in (0, 1):
+    if file.exists() and (found := json.loads(file.read_text()))["exit code"] in (0, 1) and found["tables"]:
         return found
     words = shlex.split(f"{part.options} {part.quick}" if quick else part.options)
     if quick and "--figure" in words:

@@ -1,18 +1,19 @@
-"""What users wait for, now and before: processor seconds and peak memory of the same works in one run.
+"""What users wait for: processor seconds and peak memory of works, beside other ways to the same.
 
-    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py --before HEAD~20
-    OMP_NUM_THREADS=1 python tests/benchmarks/speed.py --before 807a281 --rows lags study-truss
+    OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py
+    OMP_NUM_THREADS=1 python tests/benchmarks/speed.py --before HEAD~20 --rows lags study-truss
 
-Each work runs in a process of its own, by turns with a copy of the code of this folder and of another revision. Printed
-are medians of processor seconds (worker processes included), how many times faster it is now, and the largest peak
-memory. "beside" is how many times longer another way takes in the same process: a loop of ``scipy.sparse.linalg.eigsh``
-over the same matrices, for lags ``pandas.concat`` of shifts, for gaps ``KNNImputer``, for eight detectors a study for
-each, for a monitor after ten years its updates after one. Works on the building frame need its file in the folder that
+Each work runs in a process of its own. Printed are medians of processor seconds (worker processes included), how many
+times as long the other way takes in the same process, and the largest peak memory of the process, imports and the other
+way included. The first line of a work's function says what it is and, after "beside", what the other way is; a loop of
+``eigsh`` is that of ``scipy.sparse.linalg`` over ready-made matrices. With ``--before``, works run by turns with a copy
+of the code of this folder and of another revision. Works on the building frame need its file in the folder that
 SKTHERMO_DATA names. The exit code is 1 if something has become slower by more than 10 %: if even the fastest round
 takes more than 1.1 times the median of before.
 """
 
 import contextlib
+import inspect
 import json
 import os
 import shutil
@@ -31,14 +32,15 @@ import scipy.sparse.linalg
 from harness import DATA, arguments, draw, joined, peak_megabytes, processor_seconds, recipes, shown, split
 from sklearn.impute import KNNImputer
 from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
-from structures import Footbridge, building_frame, footbridge, lagged
+from structures import Footbridge, building_frame, footbridge, frame_bridge, lagged
 
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
 from skthermo.fem import add_noise, sample
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import KNNGapImputer, LagFeatures
+from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
@@ -56,14 +58,15 @@ class Clock:
     reference: float = 0.0
 
     @contextlib.contextmanager
-    def work(self):
+    def work(self, times=1.0):
+        """What counts so many times."""
         start = processor_seconds()
         yield
-        self.seconds += processor_seconds() - start
+        self.seconds += times * (processor_seconds() - start)
 
     @contextlib.contextmanager
     def beside(self, times=1.0):
-        """What counts so many times."""
+        """The other way, which counts so many times."""
         start = processor_seconds()
         yield
         self.reference += times * (processor_seconds() - start)
@@ -75,15 +78,27 @@ def eigsh_loop(model, n_samples):
     return lambda: [scipy.sparse.linalg.eigsh(K, model.n_modes, M, sigma=0) for K, M in matrices]
 
 
-def frame_samples(clock, quick, n_samples):
-    """Reduced models of the building frame: basis and samples, beside a loop of eigsh."""
-    model, n_samples, n_loop = building_frame(), n_samples // 10 if quick else n_samples, 5 if quick else 20
+def frame_samples(clock, quick, structure, n_samples):
+    """{n_samples:,} samples of a {structure}, its reduced model made on the way, beside a loop of eigsh."""
+    small = frame_bridge(6, 2, 1) if quick else frame_bridge()
+    model, n_loop = small if structure == BRIDGE else building_frame(), 5 if quick else 20
     solve = eigsh_loop(model, n_loop)
     with clock.beside(n_samples / n_loop):
         solve()
     with clock.work():
         reduced = model.reduced(BOUNDS, random_state=0)
         sample(reduced, BOUNDS, n_samples, random_state=0)
+
+
+def derivatives(clock, quick):
+    """Frequencies and derivatives by 5 parameters, bridge of 3,600 degrees of freedom, beside central differences."""
+    model = frame_bridge(*((4, 1, 1) if quick else (16, 3, 4)))
+    theta, steps = draw(model, 20), 1e-3 * np.eye(len(model.parameter_names))
+    around = np.concatenate([theta, *(theta + sign * step for step in steps for sign in (1, -1))])
+    with clock.work(1 / len(theta)):
+        model.linearised(theta)
+    with clock.beside(1 / len(theta)):
+        model.frequencies(around)
 
 
 def hourly_year(n_hours):
@@ -98,7 +113,7 @@ def hourly_year(n_hours):
 
 
 def kw51_damaged(clock, quick):
-    """Fit to an hourly year of KW51 and simulation of it in fifteen states of damage."""
+    """Chain of KW51: fit to an hourly year, and its simulation in fifteen states of damage."""
     T, F = hourly_year(800 if quick else 8760)
     model = make_kw51()
     inverse = PosteriorInverse(noise=0.001, reduce=True)
@@ -111,20 +126,21 @@ def kw51_damaged(clock, quick):
 
 
 def lags(clock, quick, n_rows=8760):
-    """24 lags of the temperatures of seven sensors, regular stamps, beside pandas."""
+    """24 lags of {n_rows:,} hourly temperatures of 7 sensors, beside pandas' shift and concat."""
     n_sensors, n_rows = 7, n_rows // 10 if quick else n_rows
     random = np.random.default_rng(0)
     T = pd.DataFrame(random.standard_normal((n_rows, n_sensors)), pd.date_range("2020", periods=n_rows, freq="h"))
     T = T.add_prefix("T")
-    for _ in range(max(200 // n_sensors * 8760 // n_rows, 5)):
-        with clock.beside():
+    n_times = max(200 // n_sensors * 8760 // n_rows, 5)
+    for _ in range(n_times):
+        with clock.beside(1 / n_times):
             pd.concat([T.shift(k) for k in range(24)], axis=1)
-        with clock.work():
+        with clock.work(1 / n_times):
             LagFeatures(24, freq="1h").fit_transform(T)
 
 
 def gaps(clock, quick, n_rows=30_000):
-    """KNNGapImputer beside KNNImputer: seven correlated columns, 10 % missing."""
+    """Gaps of {n_rows:,} records of 7 columns filled, 10 % missing, beside scikit-learn's KNNImputer."""
     random = np.random.default_rng(0)
     values = random.standard_normal((3000 if quick else n_rows, 7)) @ random.standard_normal((7, 7))
     values[random.random(values.shape) < 0.1] = np.nan
@@ -147,7 +163,7 @@ def intervals(clock, quick):
 
 
 def drawn_models(clock, quick):
-    """Two models drawn from the calibration of KW51's reduced model."""
+    """Two models drawn from the calibration of KW51."""
     model = make_kw51().reduced(BOUNDS, random_state=0)
     measured = model.frequencies(draw(model, 1, bounds=0.1))[0]
     update = ModelUpdater(model, prior=0.15).fit(measured, frequency_std=0.005 * measured)
@@ -156,7 +172,7 @@ def drawn_models(clock, quick):
 
 
 def truss_chain(clock, quick):
-    """Fit and predictions of the truss's chain, a year of daily records."""
+    """Chain of the truss: fit to a year of days, and predictions of it."""
     year = make_truss_campaign(random_state=0)
     fem = DataInformedFEM(make_truss(), inverse=PosteriorInverse(noise=0.01), random_state=0)
     with clock.work():
@@ -174,15 +190,14 @@ def truss_years():
 
 
 def identified(clock, quick):
-    """identify_damage: a damaged year of the truss, five times."""
+    """Damage identified from a year of days of the truss."""
     fem, _, later = truss_years()
     with clock.work():
-        for _ in range(5):
-            identify_damage(fem, later.temperatures, later.frequencies, random_state=0)
+        identify_damage(fem, later.temperatures, later.frequencies, random_state=0)
 
 
 def truss_study(clock, quick):
-    """A study of the truss by default: one detector, 16 scenarios, 20 repeats."""
+    """Study of the truss by default, a year of days: one detector, 16 states, 20 repeats."""
     fem, _, later = truss_years()
     scenarios = sweep(fem, (0.05, 0.1, 0.15, 0.2, 0.3), groups=["bottom", "top", "diagonal"])
     study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=20, random_state=0)
@@ -190,8 +205,8 @@ def truss_study(clock, quick):
         study.run(later.temperatures)
 
 
-def footbridge_study(clock, quick, uncertainty=None):
-    """A study of the footbridge by default: seven states, 4380 records, two detectors."""
+def footbridge_study(clock, quick, title, **options):
+    """Study of a footbridge, {title}: two detectors, 7 states, 4,380 records."""
     bridge = Footbridge(0)
     records, later = bridge.training(True), bridge.T[bridge.n :]
     model = footbridge(pylon=1.1).assemble(bridge.groups, n_modes=len(bridge.modes), track=True)
@@ -201,14 +216,13 @@ def footbridge_study(clock, quick, uncertainty=None):
     compensator = TemperatureCompensator(lagged(TemperatureMapper()), targets=bridge.modes)
     lasts = {"single": MahalanobisDetector(), "day": WindowedAlarm("1D")}
     detectors = {name: make_pipeline(compensator, last) for name, last in lasts.items()}
-    options = {} if uncertainty is None else {"uncertainty": uncertainty}
     study = DetectabilityStudy(fem, detectors, scenarios[:3] if quick else scenarios, random_state=0, **options)
     with clock.work():
         study.run(later)
 
 
 def many_detectors(clock, quick):
-    """A study of eight detectors on 13 states of the truss, 20 repeats, beside a study for each."""
+    """Study of eight detectors, 13 states of the truss, noise alone, beside a study for each detector."""
     fem, year, later = truss_years()
     everyone = field_detectors(list(year.frequencies))
     names = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, Gaussian mixture"]
@@ -227,6 +241,22 @@ def many_detectors(clock, quick):
             run(name)
 
 
+def search(clock, quick):
+    """Search over 12 settings of a chain's mapper by five folds, with memory, beside one without."""
+    year = make_truss_campaign(samples_per_year=60 if quick else 365, random_state=0)
+    grid, inverse = {"mapper__regressor__alpha": np.logspace(-2, 3, 12)}, PosteriorInverse(noise=0.01)
+
+    def searched(memory):
+        mapper = TemperatureMapper(Ridge())
+        fem = DataInformedFEM(make_truss(), inverse=inverse, mapper=mapper, memory=memory, random_state=0)
+        GridSearchCV(fem, grid, cv=BlockedKFold(5)).fit(year.temperatures, year.frequencies)
+
+    with clock.beside():
+        searched(None)
+    with tempfile.TemporaryDirectory() as memory, clock.work():
+        searched(memory)
+
+
 def hourly_monitor(n_years=2):
     campaign = make_truss_campaign(n_years, samples_per_year=8760, samples_per_day=24, random_state=0)
     records = joined(campaign)
@@ -235,24 +265,15 @@ def hourly_monitor(n_years=2):
     return Monitor(make_pipeline(compensator, WindowedAlarm("24h")), random_state=0), records
 
 
-def monitor_update(clock, quick):
-    """Monitor.update, sixty single days."""
-    monitor, records = hourly_monitor()
-    monitor.fit(records[:8760])
-    with clock.work():
-        for start in range(8760, 8760 + 60 * 24, 24):
-            monitor.update(records[start : start + 24])
-
-
 def monitor_update_later(clock, quick):
-    """Monitor.update, sixteen single days after ten years of hourly records, beside those after one year."""
+    """Monitor updated by a day of hourly records, after ten years, beside the same after one year."""
     n_years = 2 if quick else 10
     monitor, records = hourly_monitor(n_years + 2)
     monitor.fit(records[:8760])
     for clocked, first in ((clock.beside, 8760), (clock.work, 8760 * n_years)):
         for start in range(8760 + 16 * 24, first, 730):
             monitor.update(records[start : min(start + 730, first)])
-        with clocked():
+        with clocked(1 / 16):
             for start in range(first, first + 16 * 24, 24):
                 monitor.update(records[start : start + 24])
 
@@ -276,26 +297,44 @@ def page_of_two_files(clock, quick):
         assert (Path(folder) / "page.html").stat().st_size
 
 
-WORKS = {
-    "frame-1000": partial(frame_samples, n_samples=1000),
-    "frame-10000": partial(frame_samples, n_samples=10_000),
-    "kw51-damaged": kw51_damaged,
-    "lags": lags,
-    "lags-many": partial(lags, n_rows=100_000),
-    "gaps": gaps,
-    "gaps-year": partial(gaps, n_rows=8760),
-    "intervals": intervals,
-    "drawn-models": drawn_models,
-    "truss-chain": truss_chain,
-    "identify": identified,
-    "study-of-eight": many_detectors,
-    "study-truss": truss_study,
-    "study-footbridge": footbridge_study,
-    "study-footbridge-all": partial(footbridge_study, uncertainty="all"),
-    "monitor-update": monitor_update,
-    "monitor-later": monitor_update_later,
-    "two-files": page_of_two_files,
+FRAME, BRIDGE = "building frame of 2,302 degrees of freedom", "bridge of 20,940 degrees of freedom"
+GROUPS = {
+    "Models": {
+        "frame-1000": partial(frame_samples, structure=FRAME, n_samples=1000),
+        "frame-10000": partial(frame_samples, structure=FRAME, n_samples=10_000),
+        "bridge-10000": partial(frame_samples, structure=BRIDGE, n_samples=10_000),
+        "derivatives": derivatives,
+        "drawn-models": drawn_models,
+    },
+    "Records and monitors": {
+        "lags": lags,
+        "lags-many": partial(lags, n_rows=100_000),
+        "gaps-year": partial(gaps, n_rows=8760),
+        "gaps": gaps,
+        "monitor-later": monitor_update_later,
+        "two-files": page_of_two_files,
+    },
+    "Chains and studies": {
+        "truss-chain": truss_chain,
+        "intervals": intervals,
+        "kw51-damaged": kw51_damaged,
+        "search": search,
+        "identify": identified,
+        "study-truss": truss_study,
+        "study-of-eight": many_detectors,
+        "study-footbridge": partial(footbridge_study, title="by default"),
+        "study-footbridge-all": partial(footbridge_study, title="all uncertainty", uncertainty="all"),
+    },
 }
+WORKS = {name: work for works in GROUPS.values() for name, work in works.items()}
+
+
+def said(work):
+    """What a work is, and what its other way is."""
+    settings = {name: parameter.default for name, parameter in inspect.signature(work).parameters.items()}
+    line = (work.func if isinstance(work, partial) else work).__doc__.splitlines()[0]
+    what, _, other = line.format(**settings).rstrip(".").partition(", beside ")
+    return what, other
 
 
 def copy_of(revision, folder):
@@ -334,8 +373,8 @@ def main():
         __doc__,
         before=(str, "a git revision to compare with"),
         rows=(WORKS, "works"),
-        rounds=5,
-        long=(40.0, "seconds after which no further round begins"),
+        rounds=3,
+        long=(20.0, "seconds after which no further round begins"),
         quick=(False, "small works"),
         work=(str, "a work in this process, for the script itself"),
     )
@@ -344,20 +383,29 @@ def main():
         WORKS[options.work](clock, options.quick)
         print(json.dumps({"seconds": clock.seconds, "beside": clock.reference, "megabytes": peak_megabytes()}))
         return 0
-    rows, slower = {}, []
+    slower = []
     with tempfile.TemporaryDirectory() as folder:
         states = ({"before": options.before} if options.before else {}) | {"now": None}
         packages = {state: copy_of(revision, Path(folder) / state) for state, revision in states.items()}
-        for name in [one for one in options.rows if DATA is not None or not one.startswith("frame")]:
-            found = measure(name, packages, options)
-            rows[name] = {f"{state}, s": table["seconds"].median() for state, table in found.items()}
-            rows[name] |= {f"{state}, MB": table["megabytes"].max() for state, table in found.items()}
-            if "now" in found:
-                rows[name]["beside"] = found["now"]["beside"].median() / rows[name]["now, s"]
-            if len(found) == 2:
-                rows[name]["times faster"] = rows[name]["before, s"] / rows[name]["now, s"]
-                slower += [name] * bool(found["now"]["seconds"].min() > 1.1 * rows[name]["before, s"])
-    shown("Seconds, megabytes, and times as long as now", pd.DataFrame(rows).T, "3g")
+        for title, works in GROUPS.items():
+            rows = {}
+            for name in [one for one in works if one in options.rows and (DATA or not one.startswith("frame"))]:
+                found, (what, other) = measure(name, packages, options), said(works[name])
+                seconds = {state: table["seconds"].median() for state, table in found.items()}
+                row = rows[what] = {"seconds": seconds.get("now")}
+                if "before" in seconds:
+                    row |= {"seconds before": seconds["before"]}
+                if len(found) == 2:
+                    row["times as long before"] = seconds["before"] / seconds["now"]
+                    slower += [name] * bool(found["now"]["seconds"].min() > 1.1 * seconds["before"])
+                if "now" in found:
+                    times = found["now"]["beside"].median() / seconds["now"]
+                    row |= {"other way, times as long": times if other else None, "other way": other}
+                    row["peak memory, MB"] = found["now"]["megabytes"].max()
+            if rows:
+                shown(
+                    f"{title}: processor seconds, median of up to {options.rounds} rounds", pd.DataFrame(rows).T, "3g"
+                )
     print(f"slower by more than 10 %: {', '.join(slower) or 'nothing'}")
     return int(bool(slower))
 

@@ -714,8 +714,7 @@ class AffineModel:
 
         Notes
         -----
-        The costs are rounded from those of lines and grids of beams with 2 to 20 parameters within 30 %
-        (``python tests/benchmarks/solves.py --parts pays``).
+        The costs are rounded from those of lines and grids of beams with 2 to 20 parameters within 30 %.
 
         Examples
         --------
