@@ -84,7 +84,8 @@ def test_everything_public_has_a_docstring():
 def test_documented_parameters_are_the_signatures():
     wrong = []
     for name, function, documented in DOCUMENTED:
-        expected = [("**" if p.kind is p.VAR_KEYWORD else "") + p.name for p in own_parameters(function)]
+        stars = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
+        expected = [stars.get(p.kind, "") + p.name for p in own_parameters(function)]
         names = [part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")]
         if names != expected:
             wrong.append(f"{name}: documented {names}, expected {expected}")

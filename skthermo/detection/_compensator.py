@@ -37,6 +37,7 @@ from skthermo._tables.frames import (
     positions_of,
     warn_of_markers,
 )
+from skthermo._tables.origins import Changes, Origin, with_origin
 from skthermo._validation import (
     BaseSearchCV,
     Estimator,
@@ -56,7 +57,7 @@ from skthermo._validation import (
     validate_data,
     warn_of_fleet,
 )
-from skthermo.detection._base import Changes, Origin, mean_log_density, with_origin
+from skthermo.detection._base import mean_log_density
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing import RecordFindings, check_records, set_aside
 from skthermo.residuals.folds import Folds

@@ -20,8 +20,9 @@ from sklearn.utils.metaestimators import available_if
 from skthermo._estimators.warnings import reported_by_caller, without_warnings
 from skthermo._tables.arrays import Array, check_probability, patterns, range_sums
 from skthermo._tables.frames import correlation_time, first_disorder
+from skthermo._tables.origins import Changes, Origin, with_origin
 from skthermo._validation import Interval, StrOptions, check_is_fitted
-from skthermo.detection._base import Changes, DamageDetector, Origin, conformal_threshold, with_origin
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.detection._directional import (
     Detectability,
     DirectionalDetector,

@@ -43,8 +43,10 @@ def read_records(
 
     Returns
     -------
-    temperatures, frequencies : DataFrame
-        On the same stamps, in order of time; temperatures in degrees Celsius, NaN where a value is missing.
+    temperatures : DataFrame
+        In degrees Celsius and in order of time, NaN where a value is missing.
+    frequencies : DataFrame
+        On the same stamps.
 
     Raises
     ------

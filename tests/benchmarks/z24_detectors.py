@@ -21,7 +21,7 @@ damage, comparison, z24 = map(recipes, ("z24_damage", "z24_detector", "z24"))
 
 FALSE, FOUND = "false alarms", "damage found"
 HINDSIGHT, FORESIGHT, NEARER = "hindsight", "foresight", "assumed damage, chain of all healthy records"
-TOLD = (HINDSIGHT, FORESIGHT)
+KNOWN = (HINDSIGHT, FORESIGHT)
 TARGETS = [  # of rank correlations and shares in the band
     (HINDSIGHT, FOUND, ">= 0.95", ">= 0.8"),
     (HINDSIGHT, FALSE, ">= 0.9", ">= 0.7"),
@@ -35,9 +35,9 @@ COMPETITOR, WHITENED = "raw, 20 neighbours", ("piecewise-linear, whitened", "boo
 def beside_each_other(tables):
     """Measured and simulated rates of every detector, in percent."""
     columns = {(state, "measured"): tables[HINDSIGHT][state, "measured"] for state in (FALSE, FOUND)}
-    columns |= {(state, kind): tables[kind][state, "simulated"] for state in (FALSE, FOUND) for kind in TOLD}
-    table = pd.DataFrame(columns)[[(state, name) for state in (FALSE, FOUND) for name in ("measured", *TOLD)]]
-    return table.set_axis([name if name in TOLD else f"{state}, {name}" for state, name in table], axis=1)
+    columns |= {(state, kind): tables[kind][state, "simulated"] for state in (FALSE, FOUND) for kind in KNOWN}
+    table = pd.DataFrame(columns)[[(state, name) for state in (FALSE, FOUND) for name in ("measured", *KNOWN)]]
+    return table.set_axis([name if name in KNOWN else f"{state}, {name}" for state, name in table], axis=1)
 
 
 def agreements(tables):

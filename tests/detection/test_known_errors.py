@@ -6,8 +6,8 @@ import pytest
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.pipeline import make_pipeline
 
+from skthermo._tables.origins import origin_of
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.detection._base import origin_of
 from skthermo.preprocessing import LagFeatures
 from skthermo.residuals.gaussian import Gaussian
 from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of

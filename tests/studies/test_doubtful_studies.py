@@ -74,7 +74,7 @@ def test_one_warning_counts_the_families_whose_curves_lie_beside_their_points(fe
     both = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"]))
     results = both.run(WEATHER)
     results.loc[results["measure"] == "POD", "rate"] = [0.3, 0.35, 0.99] * 2
-    with pytest.warns(UserWarning, match="of 3 .*1 times more for other families.*poor-curve-fit") as caught:
+    with pytest.warns(UserWarning, match="of 3 .*1 time more for other families.*poor-curve-fit") as caught:
         both.minimum_detectable_damage(method="curve")
     assert len(caught) == 1
 

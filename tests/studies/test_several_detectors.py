@@ -362,7 +362,7 @@ def test_one_warning_for_one_cause_names_the_detectors(fem):
     fit, evaluated = caught
     assert fit.category is ConvergenceWarning
     assert str(fit.message) == (
-        "no convergence in 7 steps (detectors 'first', 'second'; and 1 times more in the fits of the detectors)"
+        "no convergence in 7 steps (detectors 'first', 'second'; and 1 time more in the fits of the detectors)"
     )
     assert str(evaluated.message) == (
         "365 odd records (detectors 'first', 'second'; and 5 times more in the simulations of this study)"

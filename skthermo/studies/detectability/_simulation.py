@@ -23,9 +23,9 @@ from skthermo._estimators.memory import remembered
 from skthermo._estimators.warnings import warnings_of_detector, without_warnings
 from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
 from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._tables.origins import Origin, of_origin, origin_of
 from skthermo._validation import _num_samples, last_step, seed_parts
 from skthermo.detection import DamageDetector
-from skthermo.detection._base import Origin, of_origin, origin_of
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
 from skthermo.surrogate import FittedChain
