@@ -28,6 +28,7 @@ NUMBERS_AT_ONCE = 4_000_000  # held in memory
 SPARE = 1.25  # so many times as many places are searched at once for all columns with gaps
 LEAST_SHARE = 1 / 3  # of the places, for which a column with gaps is searched with the others
 MOST_KEPT = 16_000_000  # positions of nearest places that are kept, of 4 bytes
+LEAST_NEW = 0.1  # of the kept places, above which new ones are sorted in
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
 SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
 MOST_LEARNED = 20_000  # records that show how sensors go together as well as more of them would
@@ -408,9 +409,10 @@ def weather_axes(weather: Array, explained: float = EXPLAINED) -> tuple[Array, A
 
 
 class NearestPlaces:
-    """Places, of which a number is nearest to each wanted one; no wanted place is searched for twice.
+    """Places, of which a number is nearest to each wanted one; many wanted places are searched for once.
 
-    Results are kept up to `MOST_KEPT` positions, those asked for first. Copies, saved ones too, begin with none.
+    Results are kept up to `MOST_KEPT` positions, those asked for first, and few new ones beside many are searched for
+    again rather than sorted in. Copies, saved ones too, begin with none.
     """
 
     _kept: tuple[NDArray[np.void], Array, NDArray[np.int32]] | None = None
@@ -431,20 +433,20 @@ class NearestPlaces:
         (n_wanted, number)."""
         size = wanted.itemsize * wanted.shape[1]
         keys = np.ascontiguousarray(wanted).view(np.dtype((np.void, size))).ravel()  # equal where all bytes are
-        found = self._kept or (keys[:0], np.empty(0), np.empty((0, self.number), dtype=np.int32))
-        at = np.searchsorted(found[0], keys)
-        new = np.append(found[0], keys[:1])[at] != keys
-        new |= at == len(found[0])
-        if new.any():
-            distances, near = np.empty(new.sum()), np.empty((new.sum(), self.number), dtype=np.int32)
-            for part in parts(len(near), self.number):
-                lengths, near[part] = self._tree.kneighbors(wanted[new][part])
-                distances[part] = lengths.mean(axis=1)
-            known, first = np.unique(np.append(found[0], keys[new]), return_index=True)
-            found = known, np.append(found[1], distances)[first], np.append(found[2], near, axis=0)[first]
-            at = np.searchsorted(known, keys)
-            self._kept = found if found[2].size <= MOST_KEPT else self._kept
-        return found[1][at], found[2][at]
+        kept = self._kept or (keys[:0], np.empty(0), np.empty((0, self.number), dtype=np.int32))
+        at = np.searchsorted(kept[0], keys)
+        new = (at == len(kept[0])) | (np.append(kept[0], keys[:1])[at] != keys)
+        distances, near = np.empty(len(keys)), np.empty((len(keys), self.number), dtype=np.int32)
+        distances[~new], near[~new] = kept[1][at[~new]], kept[2][at[~new]]
+        rows = np.flatnonzero(new)
+        for part in parts(len(rows), self.number):
+            lengths, near[rows[part]] = self._tree.kneighbors(wanted[rows[part]])
+            distances[rows[part]] = lengths.mean(axis=1)
+        if len(rows) > LEAST_NEW * len(kept[0]) and (len(kept[0]) + len(rows)) * self.number <= MOST_KEPT:
+            known, first = np.unique(np.append(kept[0], keys[rows]), return_index=True)
+            both = np.append(kept[1], distances[rows]), np.append(kept[2], near[rows], axis=0)
+            self._kept = known, *(values[first] for values in both)
+        return distances, near
 
 
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
