@@ -8,8 +8,9 @@ measured in each state, and the user's own detectors evaluate it. Structures:
 
 - the truss of the thermo-mechanical law (four zones of temperature that no multiplier of a group follows exactly),
   with the right FE model, and with one of which two groups are 5 % too stiff or too soft;
+- the footbridge, whose FE model has 16 beams for 44, and every stiffness 3 to 5 % off, calibrated by `ModelUpdater`;
 - girders of `make_fleet`, one in each realisation, with the user's model of each, whose stiffnesses are 2 to 5 % off,
-  calibrated by `ModelUpdater`.
+  calibrated, too.
 
 Counted are states of which the predicted share is between 5 and 95 %: of the others, nearly every band holds. The exit
 code is 1 if the default's bands cover less than 85 or more than 95 % of them, by more than twice the sampling error.
@@ -22,8 +23,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, shown
+from harness import arguments, compensated, shown, split
 from joblib import Parallel, delayed
+from structures import FOOTBRIDGE_GROUPS, footbridge
+from structures import Footbridge as Measured
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
@@ -46,6 +49,14 @@ TRUSS_STATES = {
     "diagonal": (0.03, 0.05, 0.08, 0.11),
     "bottom and top": (0.04, 0.07, 0.1, 0.14),
 }
+FOOTBRIDGE_STATES = {
+    "side span": (0.03, 0.05, 0.08, 0.12),
+    "main stays": (0.01, 0.02, 0.03, 0.05),
+    "bearings": (0.03, 0.05, 0.08, 0.12),
+    "side span and backstays": (0.02, 0.04, 0.06, 0.1),
+}
+COARSE = [0.0, 3.75, 7.5, 11.25, 15.0, 19.5, 24.0, 28.5, 33.0, 37.5, 42.0, 46.5, 51.0, 54.75, 58.5, 62.25, 66.0]
+"""Nodes of the deck in the user's model, m: those of the stays and of the supports, and one between."""
 GIRDER_STATES = {
     "girder": (0.01, 0.02, 0.04, 0.07),
     "first span": (0.02, 0.04, 0.07, 0.12),
@@ -87,6 +98,34 @@ class Truss:
         theta = np.ones(4)
         theta[random.choice(3, 2, replace=False)] += OFF * random.choice([-1, 1], 2)
         return {"truss, right model": right, "truss, wrong model": right.rescaled(theta)}
+
+
+@dataclass
+class Footbridge:
+    """One realisation of the footbridge, a record a day, and a coarse model of wrong stiffnesses."""
+
+    seed: int
+    states = states(FOOTBRIDGE_STATES)
+    realisations = 5
+    is_calibrated = True
+    detectors = ("compensated",)
+    noise = Measured.noise
+
+    def __post_init__(self):
+        self.bridge = Measured(self.seed)
+
+    def year(self):
+        return split(self.bridge.training(False)[:: Measured.per_day])
+
+    def later(self, number, damage):
+        return split(self.bridge.evaluated(damage)[:: Measured.per_day])
+
+    def models(self):
+        random, n_groups = np.random.default_rng(self.seed), len(FOOTBRIDGE_GROUPS)
+        off = 1 + random.uniform(0.03, 0.05, n_groups) * random.choice([-1, 1], n_groups)
+        structure = footbridge(stations=COARSE, stiffness=dict(zip(FOOTBRIDGE_GROUPS, off, strict=True)))
+        model = structure.assemble(FOOTBRIDGE_GROUPS, n_modes=len(Measured.modes), track=True)
+        return {"footbridge, calibrated models": model.reduced(0.7, random_state=0)}
 
 
 @dataclass
@@ -213,14 +252,14 @@ def by_winter(found):
     return pd.DataFrame(rows).T.astype({"girders": int, "rates": int, "girders with false alarms in bands": int})
 
 
-STRUCTURES = {"truss": Truss, "girder": Girder}
+STRUCTURES = {"truss": Truss, "footbridge": Footbridge, "girder": Girder}
 
 
 def main():
     options = arguments(
         __doc__,
         structures=STRUCTURES,
-        realisations=(int, "of each structure; 6 of the truss, 10 girders by default"),
+        realisations=(int, "of each structure; 6 trusses, 5 footbridges, 10 girders by default"),
         first_seed=0,
         jobs=1,
     )
