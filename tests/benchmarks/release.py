@@ -101,7 +101,7 @@ PARTS = {
     "scale-preparing": timing("scale.py --rows 52560 525600 --parts preprocessing"),
     "scale-records": timing("scale.py --rows 52560 157680 --parts chain"),
     "scale-defaults": timing("scale.py --rows 5256 52560 --parts defaults"),
-    "scale-defaults-long": timing("scale.py --rows 525600 --parts defaults"),
+    "scale-defaults-long": timing("scale.py --rows 52560 525600 --parts defaults --replicates 2"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
     "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
