@@ -225,8 +225,8 @@ DetectorsDisplay.from_predictions(results, groups=groups)
 
 # %%
 # .. image:: /images/z24_detectors.png
-#    :alt: Rates of alarms of 22 of these detectors, measured as dots on simulated bands: false alarms from 0 to 24 %,
-#          damage found from 3 to 98 %; nearly every dot lies in its band or at its end
+#    :alt: Rates of alarms of 26 detectors, measured as dots on simulated bands: false alarms from 0 to 25 %,
+#          damage found from 3 to 99 %; nearly every dot lies in its band or at its end
 #
 # All measured false alarms lie in their bands, 25 of 26 rates of damage found do, and the detectors stand in nearly the
 # same order. The local outlier factor finds less than its band: what the identification calls "something else" is not
