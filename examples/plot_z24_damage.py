@@ -207,7 +207,7 @@ print(agreement(table).round(3).to_string())
 #    boosted trees, whitened                     1.2       1.3         90.0      74.0
 #    linear regression                          12.1      12.2         93.1      96.6
 #    linear regression, whitened                24.5      23.8         98.5      99.7
-#    chain                                       0.2       0.1         55.4      16.0
+#    chain                                       0.2       0.1         55.4      16.1
 #    chain, whitened                             0.4       0.5         88.5      58.1
 #    piecewise-linear, isolation forest          0.0       0.1         12.3       2.7
 #    piecewise-linear, 20 neighbours             0.0       0.1         88.5      59.8
