@@ -1,5 +1,7 @@
 """Detectors that the field uses, with and without temperatures, each calibrated to one rate of false alarms."""
 
+import warnings
+
 import numpy as np
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.decomposition import PCA, FactorAnalysis
@@ -67,7 +69,9 @@ class Cointegration(OutlierMixin, BaseEstimator):
             from statsmodels.tsa.vector_ar.vecm import coint_johansen
         except ImportError as error:
             raise ImportError("cointegration needs statsmodels; get it with: pip install statsmodels") from error
-        self.vector_ = coint_johansen(X, 0, 1).evec[:, 0]  # with a constant, and one lagged difference
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", np.exceptions.ComplexWarning)  # of eigenvectors that are real
+            self.vector_ = coint_johansen(X, 0, 1).evec[:, 0]  # with a constant, and one lagged difference
         self.mean_, self.deviation_ = np.mean(X @ self.vector_), np.std(X @ self.vector_)
         return self
 

@@ -103,7 +103,7 @@ def frame_bridge(n_bays=40, n_elements=4, n_stringers=9, n_zones=1, **options):
 
 def building_frame(**options):
     """An exported model of 2302 degrees of freedom, 913 of them massless, and 14 parameters."""
-    content = scipy.io.loadmat(DATA / "building_frame" / "ConcreteBuildingFrame.mat")
+    content = scipy.io.loadmat(DATA / "building_frame" / "ConcreteBuildingFrame.mat", spmatrix=False)
     names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
     return AffineModel({(name,): content[name] for name in names}, content["M0"], **options)
 

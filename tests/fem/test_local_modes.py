@@ -18,7 +18,7 @@ def building_frame(n_modes=5):
     folder = os.environ.get("SKTHERMO_DATA")
     if not folder:
         pytest.skip("SKTHERMO_DATA is not set")
-    data = scipy.io.loadmat(Path(folder) / "building_frame" / "ConcreteBuildingFrame.mat")
+    data = scipy.io.loadmat(Path(folder) / "building_frame" / "ConcreteBuildingFrame.mat", spmatrix=False)
     names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
     return AffineModel({(name,): data[name] for name in names}, data["M0"], n_modes=n_modes)
 

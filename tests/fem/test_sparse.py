@@ -141,7 +141,7 @@ def test_the_exported_building_frame_has_its_reference_frequencies():
     if "SKTHERMO_DATA" not in os.environ:
         pytest.skip("SKTHERMO_DATA does not name the folder with building_frame/ConcreteBuildingFrame.mat")
     file = Path(os.environ["SKTHERMO_DATA"]) / "building_frame" / "ConcreteBuildingFrame.mat"
-    content = scipy.io.loadmat(file)
+    content = scipy.io.loadmat(file, spmatrix=False)
     names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
     model = AffineModel({(name,): content[name] for name in names}, content["M0"])
     assert (model.n_dof, int((content["M0"].diagonal() == 0).sum())) == (2302, 913)
