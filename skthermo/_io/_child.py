@@ -112,7 +112,11 @@ def _variable(body: Bytes, order: str) -> Any:
         raise ValueError(f"{n_parts} parts; expected {expected}")
     header = b"MATLAB 5.0".ljust(HEADER - 4) + struct.pack(order + "2H", 0x0100, 0x4D49)
     stream = io.BytesIO(header + struct.pack(order + "2I", MATRIX, len(body)) + body)
-    (value,) = [value for name, value in scipy.io.loadmat(stream, spmatrix=False).items() if name[:2] != "__" or name[-2:] != "__"]
+    (value,) = [
+        value
+        for name, value in scipy.io.loadmat(stream, spmatrix=False).items()
+        if name[:2] != "__" or name[-2:] != "__"
+    ]
     if scipy.sparse.issparse(value) and not scipy.sparse.csc_array(value).has_canonical_format:
         raise ValueError("sparse rows that do not rise within their columns")
     return _plain(value)

@@ -110,10 +110,15 @@ PARTS = {
 }
 
 
-def run(name, measured, quick):
-    """The result of a part, from its file if it is there and has tables."""
+def run(name, measured, quick, again):
+    """The result of a part, from its file if it is there and has tables and is not wanted again."""
     part, file, tables = PARTS[name], measured / "results" / f"{name}.json", measured / f"{name}.tables.json"
-    if file.exists() and (found := json.loads(file.read_text()))["exit code"] in (0, 1) and found["tables"]:
+    if (
+        not again
+        and file.exists()
+        and (found := json.loads(file.read_text()))["exit code"] in (0, 1)
+        and found["tables"]
+    ):
         return found
     words = shlex.split(f"{part.options} {part.quick}" if quick else part.options)
     if quick and "--figure" in words:
@@ -166,12 +171,10 @@ def main():
     for name in names:
         if name not in there:
             print(f"{name}: left out, without data")
-        elif options.again:
-            (measured / "results" / f"{name}.json").unlink(missing_ok=True)
     for is_timing, jobs in ((False, 2), (True, 1)):
         some = [name for name in there if PARTS[name].is_timing == is_timing]
         with ThreadPoolExecutor(jobs) as pool:
-            for found in pool.map(lambda name: run(name, measured, options.quick is not None), some):
+            for found in pool.map(lambda name: run(name, measured, options.quick is not None, options.again), some):
                 print(f"{found['part']}: exit code {found['exit code']}, {found['seconds']} s", flush=True)
                 missed += [found["part"]] * (found["exit code"] != 0)
     print(f"failed, or with a target that is missed: {', '.join(missed) or 'nothing'}")
