@@ -104,7 +104,6 @@ PARTS = {
     "scale-defaults-long": timing("scale.py --rows 52560 525600 --parts defaults --replicates 2"),
     "scale-service": timing("scale.py --rows 525600 --parts service"),
     "scale-fleet": timing("scale.py --bridges 1000 --parts fleet"),
-    "scale-fleet-workers": timing("scale.py --bridges 1000 --parts workers"),
     "large-models": timing("large_models.py", "--models grid-3000 solid-3000 --chains grid-3000"),
     "exports": timing("large_exports.py --dofs 100000", "--dofs 600"),
 }
