@@ -72,7 +72,7 @@ class SampleCache:
     def _opened(self) -> Iterator[sqlite3.Connection]:
         """The database; what is written is kept if nothing fails."""
         try:
-            with closing(sqlite3.connect(self.path, SECONDS, isolation_level=None)) as database, database:
+            with closing(sqlite3.connect(self.path, timeout=SECONDS, isolation_level=None)) as database, database:
                 # A killed process loses nothing; a power failure may cost the file, which only saves time.
                 database.execute("PRAGMA synchronous = OFF")
                 yield database
