@@ -1,6 +1,9 @@
 """Numbers of the measured pages, of README and of the home page are in tables that ``release.py`` wrote."""
 
+import csv
 import importlib.util
+import io
+import itertools
 import json
 import re
 from decimal import Decimal
@@ -26,9 +29,7 @@ INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
 LIST = rf"{NUMBER}(?:(?:,| and| to| or|,? and|;) {NUMBER})*"
 UNITS = r"%|percent|points|seconds|minutes|times|[smµ]?s\b|[MG]B"
-BETWEEN_CELLS = re.compile(r',(?=(?:[^"\n]*"[^"\n]*")*[^"\n]*$)', re.MULTILINE)  # not those of "20,940"
 NO_PROSE = re.compile(r"``[^`]+``|:[\w:]+:`[^`]*`|^\.\. .*$|`[^`]*`_+|(?<=\d),(?=\d{3})", re.MULTILINE)
-NO_TABLE = re.compile(r"^``python .*$|``[^`]+``|(?<=\d),(?=\d{3})", re.MULTILINE)
 
 
 def stated(text):
@@ -39,26 +40,32 @@ def stated(text):
     return {number.lstrip("-") for part in (*before_units, *with_points) for number in re.findall(NUMBER, part)}
 
 
-def tables_of(names):
-    """Tables of parts, and of the summary, which is no CSV."""
-    texts = {name: (MEASURED / f"{name}.rst").read_text() for name in names}
-    return "\n".join(BETWEEN_CELLS.sub(" , ", text) if name != "summary" else text for name, text in texts.items())
+def cells_of(names):
+    """Titles and cells of the tables of parts; the summary, which no command wrote, as it is."""
+    for name in names:
+        if name == "summary":
+            yield (MEASURED / "summary.rst").read_text()
+        else:
+            for title, table in json.loads((MEASURED / "results" / f"{name}.json").read_text())["tables"].items():
+                yield from (title, *itertools.chain.from_iterable(csv.reader(io.StringIO(table))))
 
 
-def is_in(number, table):
-    """Whether a number is one of a table's, or a hundred times one, rounded as far as it is written."""
+def is_in(number, cells):
+    """Whether a number is one of the cells', or a hundred times one, rounded as far as it is written."""
     half = 0.5001 * 10.0 ** Decimal(number).as_tuple().exponent
-    found = [abs(float(text)) for text in re.findall(rf"(?<![\w.]){NUMBER}", NO_TABLE.sub("", table))]
+    texts = (re.sub(r"(?<=\d),(?=\d{3})", "", cell) for cell in cells)
+    found = [abs(float(text)) for cell in texts for text in re.findall(rf"(?<![\w.]){NUMBER}", cell)]
     return any(abs(scale * value - float(number)) <= half for value in found for scale in (1, 100))
 
 
-def unknown(text, table, chosen=""):
-    """Numbers that a text states and a table lacks, each with its place."""
+def unknown(text, parts, chosen=""):
+    """Numbers that a text states and the tables of parts lack, each with its place."""
+    cells = list(cells_of(parts))
     prose = re.sub(r"\s+", " ", text)
     return {
         number: re.findall(rf".{{0,50}}(?<![\w.]){re.escape(number)}(?![\w.]).{{0,20}}", prose)[:2]
         for number in stated(text)
-        if number not in chosen.split() and not is_in(number, table)
+        if number not in chosen.split() and not is_in(number, cells)
     }
 
 
@@ -90,7 +97,7 @@ def test_no_table_was_written_by_hand():
 def test_numbers_of_the_prose_are_in_the_tables(page):
     text = (DOCS / f"{page}.rst").read_text()
     assert INCLUDE.search(text)
-    assert not unknown(text, tables_of(INCLUDE.findall(text)), CHOSEN[page])
+    assert not unknown(text, INCLUDE.findall(text), CHOSEN[page])
 
 
 def rows_of_the_summary():
@@ -100,9 +107,9 @@ def rows_of_the_summary():
 @pytest.mark.parametrize("row", rows_of_the_summary(), ids=lambda row: row.partition("\n")[0][:40])
 def test_a_row_of_the_summary_is_what_its_parts_printed(row):
     *said, parts = row.split("     - ")
-    tables = tables_of(re.findall(r"``([\w-]+)``", parts))
-    assert tables
-    assert not unknown("\n".join(said), tables)
+    names = re.findall(r"``([\w-]+)``", parts)
+    assert names
+    assert not unknown("\n".join(said), names)
 
 
 def test_readme_and_home_say_what_the_summary_says():
@@ -110,7 +117,6 @@ def test_readme_and_home_say_what_the_summary_says():
     cards = home.partition(":class-container: measured")[2].partition(":class-container:")[0]
     assert stated(cards)
     assert stated(readme)
-    assert not unknown(cards, (MEASURED / "summary.rst").read_text())
-    study = (MEASURED / "readme-study.rst").read_text()
+    assert not unknown(cards, ["summary"])
     prose = re.sub(r"```.*?```|<img[^>]*>", "", readme, flags=re.DOTALL)
-    assert not unknown(prose, (MEASURED / "summary.rst").read_text() + study, "3.11")
+    assert not unknown(prose, ["summary", "readme-study"], "3.11")

@@ -450,10 +450,12 @@ def _look_at_table(
     """Form of a CSV file or workbook, units of its columns as a line below the names has them, columns of text, and
     notes."""
     if file.suffix.lower() in WORKBOOKS:
-        separator, decimal, sheets = ",", *_form_of_workbook(file)
+        sheet, sheets = _longest_sheet(file)
+        separator, decimal = ",", _decimal_of(sheet)
+        rows = _rows_of_cells(sheet, decimal)
     else:
         (separator, decimal), sheets = _division(text_of(file), file), []
-    rows, _ = rows_in(file, CsvFormat(separator, decimal))
+        rows, _ = rows_in(file, CsvFormat(separator, decimal))
     width = used_width([row for _, row in rows], _usual_width([row for _, row in rows[:MOST_LOOKED_AT]]))
     rows = [(line, without_margin(row, width)) for line, row in rows]
     rows = [(line, row) for line, row in rows if len(row) == width]
@@ -497,15 +499,14 @@ def _look_at_table(
     return form, units, texts, [*sheets, *notes]
 
 
-def _form_of_workbook(file: Path) -> tuple[str, list[str]]:
-    """The decimal sign by which the most cells are numbers, and which of several sheets is read."""
-    cells, note = _longest_sheet(file)
+def _decimal_of(sheet: Any) -> str:
+    """The decimal sign by which the most cells of a sheet are numbers."""
 
     def n_numbers(decimal: str) -> int:
-        rows = _rows_of_cells(cells[:MOST_LOOKED_AT], decimal)
+        rows = _rows_of_cells(sheet[:MOST_LOOKED_AT], decimal)
         return sum(_is_number(cell, decimal) is True for _, row in rows for cell in row)
 
-    return max(DECIMALS, key=n_numbers), note
+    return max(DECIMALS, key=n_numbers)
 
 
 def _division(text: str, file: Path) -> tuple[str, str]:

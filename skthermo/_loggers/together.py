@@ -169,6 +169,7 @@ def once(table: pd.DataFrame) -> pd.DataFrame:
     if again.any():
         raise ValueError(
             f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
-            f"{table.index[again][0]}; expected each once. If the clocks go back then, [csv] time_zone says where"
+            f"{table.index[again][0]}; expected each once. If the clocks go back then, give the time zone ([csv] "
+            "time_zone of settings)"
         )
     return table

@@ -118,11 +118,9 @@ class Proposal:
             until=until,
         )
         T, F = baseline[roles["temperatures"]], baseline[roles["responses"]]
-        units = {name: read.units[name] for name in roles["responses"]}
-        unit = next(iter(units.values())) if len(set(units.values())) == 1 else ""
-        return cls(
-            looks, form, records, baseline, len(read.waiting), units, check_records(T, F, unit=unit), find_memory(T, F)
-        )
+        unit = next(iter(read.units.values())) if len(set(read.units.values())) == 1 else ""
+        found = check_records(T, F, unit=unit), find_memory(T, F)
+        return cls(looks, form, records, baseline, len(read.waiting), read.units, *found)
 
     @property
     def step(self) -> pd.Timedelta:

@@ -3,8 +3,8 @@
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/z24_detectors.py
 
 Detectors learn the first four fifths of the healthy records. Rates of alarms on the last fifth, and on the records
-after damage began, stand beside those that the FE model simulates in the same weather: in hindsight by a chain of all
-healthy records, with the damage that was identified, drawn with its uncertainty; in foresight by a chain of the
+after damage began, are compared with those that the FE model simulates in the same weather: in hindsight by a chain of
+all healthy records, with the damage that was identified, drawn with its uncertainty; in foresight by a chain of the
 detectors' own baseline, with an assumed damage of the soil of 18 %. Bands of 95 % include noise and, in hindsight,
 uncertain severities. Then simulation chooses a detector from the baseline alone, by damage of every group, and the
 choice is checked against the measured records. The exit code is 1 if a target is missed.
